@@ -1,4 +1,4 @@
-// Whole constructions from a mesh in memory: hierarchy and field.
+// Benchmarks of whole constructions from a mesh in memory: the BVH of its triangles and the field.
 
 #include <string>
 

@@ -1,4 +1,4 @@
-// CGAL's tree of boxes, without its exact arithmetic: squared distances in double.
+// Exact distances by CGAL's AABB tree with a kernel of plain doubles instead of exact arithmetic.
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>

@@ -1,5 +1,5 @@
 #pragma once
-// Two bodies side by side, whose contacts are compared with those of other libraries.
+// Poses of two bodies side by side, at which contacts are compared with those of other libraries.
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -12,28 +12,28 @@ namespace hpsdf::bench {
 
 const TriangleMesh& armadillo();
 
-/// Where the bunny and the armadillo are, in the world.
+/// World poses of the bunny and the armadillo.
 struct Places {
   Eigen::Isometry3d bunny, armadillo;
 };
 
 enum class Nearness {
-  touching,  ///< 1 to 99 samples of both lie in the other body, as in a pile
-  apart,     ///< none is less than 0.03 away from it, farther than samples are from each other, some less than 0.1
+  touching,  ///< 1 to 99 samples of either body lie inside the other body, as in a pile
+  apart,     ///< each body has samples within 0.1 of the other one, but none within 0.03 (more than the sample spacing)
 };
 
-/// So many, by chance.
+/// Number of random poses for each kind of nearness.
 constexpr std::size_t kPlaces = 100;
 const std::vector<Places>& places(Nearness nearness);
 
-/// What was found in one place.
+/// The contacts of the bunny and the armadillo at one pair of poses.
 struct Touch {
   std::size_t contacts = 0;
   double deepest = 0;
 };
 
-/// Times `find`, which takes `Places` and returns a `Touch`, over all places. Reports contacts a place, the deepest of
-/// all and the number of places that had any.
+/// Times `find`, which takes `Places` and returns a `Touch`, over all pairs of poses. Reports the mean number of
+/// contacts, the deepest contact and the number of pairs of poses that have contacts.
 template <typename Find>
 void timeContacts(benchmark::State& state, Nearness nearness, Find find) {
   const std::vector<Places>& all = places(nearness);

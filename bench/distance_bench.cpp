@@ -1,4 +1,4 @@
-// Exact signed distances by one thread.
+// Benchmarks of exact signed distances on one thread.
 
 #include <algorithm>
 #include <span>
@@ -8,7 +8,7 @@
 namespace hpsdf::bench {
 namespace {
 
-/// All points of a construction.
+/// Returns all points at which the construction of the bunny's field asks for the distance.
 ConstructionPoints record() {
   ConstructionPoints all;
   const auto recording = [&all](std::span<const Vector3> points, std::span<double> out) {
@@ -20,7 +20,7 @@ ConstructionPoints record() {
   return all;
 }
 
-/// Every n-th batch, for about `count` points.
+/// Returns every n-th batch, with n chosen such that about `count` points remain.
 ConstructionPoints thinned(const ConstructionPoints& all, std::size_t count) {
   const std::size_t every = std::max<std::size_t>(1, all.points.size() / count);
   ConstructionPoints result;

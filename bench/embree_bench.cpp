@@ -1,4 +1,4 @@
-// Embree's point query: unsigned, in single precision; the closest point on a triangle is the caller's work.
+// Distances by Embree's point query: unsigned, in single precision; the distance to a triangle is computed here.
 
 #include <embree3/rtcore.h>
 #include <pmmintrin.h>
@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-/// While it lives, tiny numbers count as zero on this thread, as Embree asks for its speed.
+/// Treats denormal numbers as zero on this thread during its lifetime, as Embree recommends for speed.
 class FlushToZero {
  public:
   FlushToZero() { _mm_setcsr(before_ | _MM_FLUSH_ZERO_ON | _MM_DENORMALS_ZERO_ON); }
@@ -51,7 +51,7 @@ class EmbreeMesh {
  public:
   explicit EmbreeMesh(const TriangleMesh& mesh) : triangles_(mesh.triangles) {
     for (const Vector3& v : mesh.vertices) vertices_.push_back(v.cast<float>());
-    vertices_.emplace_back();  // Embree reads 16 bytes at each
+    vertices_.emplace_back();  // padding: Embree reads 16 bytes at each vertex
     RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices_.data(), 0,
                                sizeof(Vector3f), mesh.vertices.size());
@@ -77,7 +77,7 @@ class EmbreeMesh {
     float distance;
   };
 
-  /// Unsigned distance, searched from the distance to triangle `start` on.
+  /// Returns the unsigned distance; the search radius starts as the distance to triangle `start`.
   Nearest nearestFrom(const Vector3f& x, unsigned start) const {
     return search(x, {this, start, distanceTo(x, start)});
   }
@@ -97,7 +97,7 @@ class EmbreeMesh {
     return best;
   }
 
-  /// Embree's callback for a triangle within the radius: true where the radius has shrunk.
+  /// Embree's callback for a triangle within the search radius; returns true if it has reduced the radius.
   static bool visit(RTCPointQueryFunctionArguments* arguments) {
     Nearest& best = *static_cast<Nearest*>(arguments->userPtr);
     RTCPointQuery& query = *arguments->query;
@@ -119,7 +119,7 @@ const EmbreeMesh& embreeBunny() {
   return mesh;
 }
 
-/// Stops a benchmark whose distances are not ours: another amount of work would be compared.
+/// Fails a benchmark whose distances differ from ours, because their times would not be comparable.
 void check(benchmark::State& state, const std::vector<Vector3>& points, const std::vector<float>& distances) {
   std::vector<double> exact(points.size());
   bunnyDistance()(points, exact);

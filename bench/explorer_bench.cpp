@@ -1,4 +1,4 @@
-// A frame of the explorer, slice and all panels, when its plane has been moved; by Mesa's software renderer.
+// Time of a frame of the explorer (slice and all panels) by Mesa's software renderer, after the slice plane moved.
 
 #include <fmt/format.h>
 
@@ -22,7 +22,7 @@ void explorerFrame(benchmark::State& state) {
     app::runScript(session, app::parseScript(registry, "bench", line, {}));
   };
   run("show slice size=1280x720 gl=software");
-  explorerOf(session).frame();  // compiles the shaders, measures the jumps
+  explorerOf(session).frame();  // compiles the shaders and measures the jumps between cells
   int step = 0;
   for ([[maybe_unused]] auto _ : state) {
     run(fmt::format("plane offset={}", 0.001 * (++step % 500)));

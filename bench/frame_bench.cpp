@@ -1,4 +1,4 @@
-// A traced frame of the bunny by Mesa's software renderer, field resident.
+// Time of a sphere-traced frame of the bunny by Mesa's software renderer, after the field was uploaded.
 
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"

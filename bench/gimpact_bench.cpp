@@ -1,4 +1,4 @@
-// Bullet's triangle against triangle on the same bodies: GImpact in double precision, as Debian builds it.
+// Contacts of the same two bodies by Bullet's GImpact (triangle against triangle), in double precision as in Debian.
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
@@ -19,7 +19,7 @@
 namespace hpsdf::bench {
 namespace {
 
-/// A mesh as GImpact takes it, with its tree of boxes.
+/// A mesh as a GImpact shape with its tree of boxes.
 class Body {
  public:
   explicit Body(const TriangleMesh& mesh) {
@@ -33,7 +33,7 @@ class Body {
     indexed.m_vertexType = PHY_DOUBLE;
     triangles_.addIndexedMesh(indexed, PHY_INTEGER);
     shape_.emplace(&triangles_);
-    shape_->setMargin(0);  // as ours: less work than with some
+    shape_->setMargin(0);  // like the field's contact query; a margin would cost more work
     shape_->updateBound();
     object.setCollisionShape(&*shape_);
   }
@@ -45,7 +45,7 @@ class Body {
   std::optional<btGImpactMeshShape> shape_;
 };
 
-/// All contacts, where Bullet would keep the four of a manifold: less work, and as many as ours.
+/// Counts all contacts and keeps none; Bullet's manifold would keep up to four, with more work.
 class Contacts : public btManifoldResult {
  public:
   using btManifoldResult::btManifoldResult;
@@ -58,7 +58,7 @@ class Contacts : public btManifoldResult {
   Touch found;
 };
 
-/// Keeps the algorithm of the two, as Bullet does from step to step.
+/// Two bodies and their collision algorithm, which is kept between calls as Bullet keeps it between time steps.
 class Pair {
  public:
   Pair(const TriangleMesh& first, const TriangleMesh& second) : first_(first), second_(second) {
@@ -105,12 +105,12 @@ void full(benchmark::State& state, Nearness nearness) {
     state.SkipWithError("triangles and samples do not touch in the same places");
 }
 
-/// With about so many vertices.
+/// Returns the mesh, coarsened to about `count` vertices.
 TriangleMesh withVertices(std::size_t count, const TriangleMesh& mesh) {
   return app::coarse(mesh, std::sqrt(1.2 * surfaceArea(mesh) / double(count)));
 }
 
-/// As many vertices as ours has samples.
+/// Uses coarse meshes with as many vertices as the field's contact query has samples.
 void coarse(benchmark::State& state) {
   static const TriangleMesh first = withVertices(10'000, bunny()), second = withVertices(10'000, armadillo());
   static Pair pair(first, second);

@@ -1,4 +1,4 @@
-// Peak memory of the bunny's construction, in a process of its own.
+// Peak memory of the construction of the bunny's field, measured in a separate process.
 
 #include <malloc.h>
 #include <sys/resource.h>
@@ -24,7 +24,7 @@ double meshBytes(const TriangleMesh& mesh) {
 }
 
 struct Bytes {
-  double peak;  ///< above what the process held before, the mesh included
+  double peak;  ///< in bytes, above the memory that the process held before, plus the mesh
   double field;
   double meshAndHierarchy;
 };
@@ -37,9 +37,9 @@ Bytes constructAndMeasure(const TriangleMesh& mesh) {
   return {peakBytes() - before + meshBytes(mesh), double(field.bytes()), meshBytes(mesh) + double(distance.bytes())};
 }
 
-/// In a child, whose peak starts at what it holds: that of reading the mesh is forgotten. The caller has no threads.
+/// Measures in a forked child, whose peak excludes reading the mesh. The caller must have no other threads.
 Bytes measureInChild(const TriangleMesh& mesh) {
-  malloc_trim(0);  // what reading the mesh left free would hide as much of the construction
+  malloc_trim(0);  // otherwise the construction could reuse memory freed by the mesh reader, which would not count
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) throw std::runtime_error("no pipe");
   const pid_t child = fork();

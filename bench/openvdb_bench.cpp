@@ -1,5 +1,5 @@
-// OpenVDB's narrow-band level set of the bunny: 256 voxels along the mesh's longest side, three each way of the
-// surface.
+// OpenVDB's narrow-band level set of the bunny: 256 voxels along the mesh's longest side, and three voxels on each side
+// of the surface.
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
@@ -14,7 +14,7 @@ constexpr std::size_t kPoints = 1'000'000;
 constexpr double kVoxel = 2.0 / 256;
 constexpr float kHalfWidth = 3;
 
-/// The mesh as OpenVDB takes it.
+/// A mesh in OpenVDB's types.
 struct VdbMesh {
   explicit VdbMesh(const TriangleMesh& mesh) {
     for (const Vector3& v : mesh.vertices) points.emplace_back(float(v.x()), float(v.y()), float(v.z()));
@@ -38,7 +38,7 @@ const openvdb::FloatGrid& bunnyLevelSet() {
   return *grid;
 }
 
-/// Trilinear, at every point; the accessor keeps the way to the last leaf.
+/// Interpolates trilinearly at every point; the accessor caches the path to the last leaf.
 void sample(const openvdb::FloatGrid& grid, const std::vector<Vector3>& points, std::vector<double>& out) {
   using Accessor = openvdb::FloatGrid::ConstAccessor;
   const Accessor accessor = grid.getConstAccessor();

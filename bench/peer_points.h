@@ -1,14 +1,14 @@
 #pragma once
-// The points at which exact distances are compared with those of other libraries.
+// Points at which exact distances are computed by this library and by others, for comparison.
 
 #include "scene.h"
 
 namespace hpsdf::bench {
 
-/// Points of the bunny's construction at τ = 1e-5 in their order, about 300,000 in whole batches from all of it.
+/// About 300,000 points at which the bunny's construction at τ = 1e-5 asks for distances: whole batches, in order.
 struct ConstructionPoints {
   std::vector<Vector3> points;
-  std::vector<std::size_t> batches;  ///< sizes: these many points were asked for at once
+  std::vector<std::size_t> batches;  ///< number of points in each batch, i.e. in one call of the distance function
 };
 const ConstructionPoints& constructionPoints();
 

@@ -1,4 +1,4 @@
-// Contacts of one pair of bodies, and of a pile, by one thread: bodies of 10,000 samples, as in the paper's sec. 4.
+// Contacts of one pair of bodies and of a pile, on one thread; bodies have 10,000 samples, as in sec. 4 of the paper.
 
 #include <tbb/task_arena.h>
 
@@ -45,10 +45,10 @@ Eigen::Isometry3d randomPose(std::mt19937_64& random, double reach) {
   return pose;
 }
 
-/// 800 bodies in a lattice of 10 x 10 x 8, turned and moved by chance: all pairs of which the spheres meet, both ways.
+/// Returns all ordered pairs with overlapping bounding spheres among 800 bodies in a randomly disturbed lattice.
 std::vector<BodyPair> pile() {
   constexpr int kBodies = 800;
-  constexpr double kPitch = 2.05;  // some 50 contacts a body, five times as many as in the paper
+  constexpr double kPitch = 2.05;  // gives about 50 contacts per body, five times as many as in the paper
   std::mt19937_64 random(2016);
   std::vector<BodyPair> bodies, pairs;
   for (int i = 0; i < kBodies; ++i) {
@@ -98,7 +98,7 @@ void collider(benchmark::State& state) {
   timeEach(state, 1, [&] { benchmark::DoNotOptimize(FieldCollider(field)); });
 }
 
-/// On poses that touch.
+/// Times a query on random poses that have 1 to 99 contacts.
 void query(benchmark::State& state) {
   std::mt19937_64 random(2016);
   physics::ContactQuery query;
@@ -119,7 +119,7 @@ void report(const physics::QueryCost& cost, std::size_t of, benchmark::State& st
   state.counters["evaluations"] = double(cost.evaluations) / double(of);
 }
 
-/// Both ways, as two bodies in Bullet.
+/// Queries the samples of each body in the field of the other one, as for two bodies in Bullet.
 void bothWays(benchmark::State& state, Nearness nearness) {
   physics::ContactQuery query;
   timeContacts(state, nearness, [&](const Places& where) {

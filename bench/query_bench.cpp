@@ -1,4 +1,4 @@
-// Queries of a field at a million random points in random order, by one thread.
+// Times of a field's queries at a million random points in random order, on one thread.
 
 #include "hpsdf/continuity.h"
 #include "scene.h"
@@ -36,7 +36,7 @@ void batchedGradients(benchmark::State& state, const Field& field) {
   timeEach(state, kPoints, [&] { field.valuesAndGradients(points, out); });
 }
 
-/// With zones of the default's width.
+/// Returns the bunny's field, blended with the default width of the blend zones.
 const Field& blendedBunny() {
   static const Field field = blended(bunnyField());
   return field;

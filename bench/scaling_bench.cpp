@@ -1,4 +1,4 @@
-// How a construction's cost grows: with a smaller target, and with a finer mesh of the same surface.
+// Growth of a construction's cost with a smaller target error, and with a finer mesh of the same surface.
 
 #include <cmath>
 #include <map>
@@ -9,7 +9,7 @@
 namespace hpsdf::bench {
 namespace {
 
-/// Each face cut into four of the same plane.
+/// Splits each triangle into four coplanar triangles at the midpoints of its edges.
 TriangleMesh subdivided(const TriangleMesh& mesh) {
   TriangleMesh fine;
   fine.vertices = mesh.vertices;

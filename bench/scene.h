@@ -1,5 +1,5 @@
 #pragma once
-// What the benchmarks share: meshes in [-1, 1]³, the paper's domain, points, and fields that are built once a process.
+// Inputs that the benchmarks share: meshes in [-1, 1]³, the paper's domain, points, and fields built once per process.
 
 #include <benchmark/benchmark.h>
 
@@ -14,28 +14,28 @@
 
 namespace hpsdf::bench {
 
-/// A mesh of the folder HPSDF_MESHES, e.g. "paper/bunny_69k.obj", normalised. Throws `Error` where it is not there.
+/// Returns a normalized mesh from the folder HPSDF_MESHES, e.g. "paper/bunny_69k.obj". Throws `Error` if it is missing.
 TriangleMesh testMesh(const std::string& name);
 
 const TriangleMesh& bunny();
 const ExactDistance& bunnyDistance();
 
-/// At τ = 1e-6, the other options by default.
+/// Returns the bunny's field for the target error τ = 1e-6, with default options otherwise.
 const Field& bunnyField();
 const Field& armadilloField();
 
 Box paperDomain();  ///< [-1.1, 1.1]³
 
-/// Uniform in the domain, in random order.
+/// Returns random points, uniformly distributed in the domain.
 std::vector<Vector3> uniformPoints(std::size_t count);
 
-/// Within `reach` of the bunny's surface, uniform in area and in height above it.
+/// Returns points within `reach` of the bunny's surface, uniformly distributed in surface area and in height.
 std::vector<Vector3> nearPoints(std::size_t count, double reach);
 
-/// RMS of `values` less the exact distances at `points`.
+/// Returns the RMS difference between `values` and the exact distances to the bunny at `points`.
 double rmsError(const std::vector<Vector3>& points, const std::vector<double>& values);
 
-/// Runs `pass`, which does `count` things, and reports the CPU seconds of one of them by this thread, as a counter.
+/// Runs `pass`, which processes `count` items, and reports this thread's CPU seconds per item as a counter.
 template <typename Pass>
 void timeEach(benchmark::State& state, std::size_t count, Pass pass) {
   for ([[maybe_unused]] auto _ : state) {

@@ -1,5 +1,4 @@
-// Inside or outside by the winding number: the hierarchy against the sum over all faces, and what it costs a
-// construction.
+// Times of the inside test by winding number: by hierarchy, by the sum over all faces, and within a construction.
 
 #include "hpsdf/detail/sign_check.h"
 #include "scene.h"

@@ -1,4 +1,4 @@
-// Writes the indices of the body and of the triangle that a pixel sees. The CPU computes distances and normals
+// Writes the indices of the body and of the triangle that is visible in a pixel. The CPU computes distances and normals
 // in double precision.
 
 flat in uint body;

@@ -1,9 +1,9 @@
-// Lookup and evaluation of a field. Positions are in grid coordinates, in which the domain is [0, grid] and a base cell a
-// unit cube.
+// Lookup and evaluation of a field. Positions are in grid coordinates, in which the domain is [0, grid] and a base
+// cell, a root of the octree, is a unit cube.
 
-layout(binding = 0) uniform usamplerBuffer nodes;        // see FieldUpload
-layout(binding = 1) uniform samplerBuffer coefficients;  // see FieldUpload
-layout(binding = 5) uniform samplerBuffer coefficientQuads;  // four coefficients per texel
+layout(binding = 0) uniform usamplerBuffer nodes;        // octree nodes, packed as described at class FieldUpload
+layout(binding = 1) uniform samplerBuffer coefficients;  // coefficients of the leaves' polynomials
+layout(binding = 5) uniform samplerBuffer coefficientQuads;  // the same coefficients, four per texel
 layout(location = 0) uniform uvec3 grid;
 
 const uint kNoCell = 0xffffffffu;
@@ -13,8 +13,8 @@ struct Node {
   bool leaf;
   // Members for internal nodes:
   uint firstChild;
-  float lo, hi;  // range of the field
-  // Members for leaves; for the bounds see SurfaceBounds:
+  float lo, hi;  // lower and upper bound of the field in the node
+  // Members for leaves; the last three are bounds as in SurfaceBounds:
   int degree;
   int offset;  // index of the first coefficient
   float valueDeviation, gradientDeviation, secondDerivative;
@@ -36,15 +36,15 @@ Node fetchNode(uint index) {
   return node;
 }
 
-// Data about the blending at a point of a leaf. All members are 0 in a field without blending.
+// Data about the blending of neighbouring leaves at a point of a leaf. All members are 0 in a field without blending.
 struct BlendZone {
   bool inside;                                        // whether other leaves may have a weight at the point
-  float valueDifference, gradientDifference, extent;  // see BlendZoneBounds
-  float width;                                        // width of the blend zones along the faces, in edges of the leaf
+  float valueDifference, gradientDifference, extent;  // bounds of the blending, as in BlendZoneBounds
+  float width;                                        // width of the blend zones, as a share of the leaf's edge
 };
 
-// The value of the field at a point, and the range of some polynomials there: the least and the greatest value
-// at the point of the polynomials of all leaves with a weight.
+// The value of the field at a point, and the least and the greatest value at this point of the leaf polynomials that
+// are blended there.
 struct FieldRange {
   float value, lowest, highest;
 };
@@ -61,21 +61,20 @@ void nextLegendre(inout float value, inout float previous, float x, float i) {
   value = next;
 }
 
-// Leaves up to degree 4 have a fixed order of coefficients: the terms up to degree 3, then the terms of degree
-// 4. The latter are zero in a leaf of a lower degree. Such leaves are evaluated without loops and from whole
-// texels, because loops and single loads are slow on llvmpipe.
+// The highest degree that is evaluated without loops and from texels of four coefficients, because loops and single
+// loads are slow on llvmpipe. Leaves up to this degree store terms up to degree 3 first, then terms of degree 4.
 const int kLowDegree = 4;
 
 struct LowDegree {
-  vec4 a;  // c_000 to c_003
-  vec4 b;  // c_010, c_011, c_012, c_020
-  vec4 c;  // c_021, c_030, c_100, c_101
-  vec4 d;  // c_102, c_110, c_111, c_120
-  vec4 e;  // c_200, c_201, c_210, c_300
-  vec4 f;  // c_004, c_013, c_022, c_031
-  vec4 g;  // c_040, c_103, c_112, c_121
-  vec4 h;  // c_130, c_202, c_211, c_220
-  vec4 i;  // c_301, c_310, c_400
+  vec4 a;  // coefficients c_000 to c_003
+  vec4 b;  // coefficients c_010, c_011, c_012, c_020
+  vec4 c;  // coefficients c_021, c_030, c_100, c_101
+  vec4 d;  // coefficients c_102, c_110, c_111, c_120
+  vec4 e;  // coefficients c_200, c_201, c_210, c_300
+  vec4 f;  // coefficients c_004, c_013, c_022, c_031
+  vec4 g;  // coefficients c_040, c_103, c_112, c_121
+  vec4 h;  // coefficients c_130, c_202, c_211, c_220
+  vec4 i;  // coefficients c_301, c_310, c_400
 };
 
 LowDegree fetchLowDegree(int offset, int degree) {
@@ -141,7 +140,7 @@ float evaluate(int offset, int degree, vec3 local) {
   return evaluateLowDegree(fetchLowDegree(offset, degree), local);
 }
 
-// Steps the recurrence of the derivatives: replaces L_i' and L_{i-1}' by L_{i+1}' and L_i'. `value` is L_i.
+// Steps the recurrence of the Legendre derivatives: replaces L_i' and L_{i-1}' by L_{i+1}' and L_i'. `value` is L_i.
 void nextDerivative(inout float derivative, inout float previous, float value, int i) {
   float next = previous + float(2 * i + 1) * value;
   previous = derivative;
@@ -182,7 +181,7 @@ vec4 evaluateLowDegreeWithGradient(LowDegree s, vec3 one) {
   vec3 twoSlope = 3.0 * one;
   vec3 threeSlope = 7.5 * one * one - 1.5;
   vec3 fourSlope = (17.5 * one * one - 7.5) * one;
-  // The names of partial sums: xIyJ is the sum over k of c_IJk L_k(z), and xI is the sum over j of xIyJ L_j(y).
+  // Partial sums: xIyJ is the sum over k of c_IJk L_k(z), and xI is the sum over j of xIyJ L_j(y).
   float x0y1 = s.b.x + s.b.y * one.z + s.b.z * two.z + s.f.y * three.z;
   float x0y2 = s.b.w + s.c.x * one.z + s.f.z * two.z;
   float x0y3 = s.c.y + s.f.w * one.z;

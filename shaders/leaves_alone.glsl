@@ -1,5 +1,4 @@
-// The field without blending: the polynomial of each leaf is the field in that leaf. This file has the same
-// functions as leaves_blended.glsl.
+// The functions of leaves_blended.glsl for a field without blending: within a leaf, the field is the leaf's polynomial.
 
 const bool kBlended = false;
 

@@ -1,20 +1,20 @@
 // The field with blending (core/src/field/query/blend.h): near the faces of a leaf the field is the weighted
 // mean of the polynomials of several leaves.
 
-layout(binding = 6) uniform usamplerBuffer zones;  // see FieldUpload
-layout(location = 18) uniform float blend;         // see FieldData::blend
+layout(binding = 6) uniform usamplerBuffer zones;  // blend extents and bounds of each leaf; see FieldUpload
+layout(location = 18) uniform float blend;         // width of the blend zones as a share of a leaf's edge
 
 const bool kBlended = true;
 
-const int kWall = 31;     // stands for the depth of a neighbour at the domain's walls
+const int kWall = 31;     // takes the place of a neighbour's depth at the boundary of the domain
 const int kDeepest = 20;  // greatest depth of a leaf
 
-// Returns true if a point of a leaf, in local coordinates, lies in a blend zone.
+// Returns true if a point of a leaf, in local coordinates, lies near a face, where several leaves are blended.
 bool isInBlendZone(vec3 local) { return any(greaterThan(abs(local), vec3(1.0 - 2.0 * blend))); }
 
-// Finds the cells of depth `level` whose distance from a point is at most `near` (up to 0.5) of their edge
-// length. There are one or two along each axis, from `first` to `first` + `more`. The point is given by its
-// cell of depth `depth` and the fraction within that cell.
+// Finds the cells of depth `level` whose distance from a point is at most `near` (up to 0.5) times their edge length:
+// one or two along each axis, from `first` to `first` + `more`. The point is given by its cell of depth `depth` and its
+// position `fraction` in that cell.
 void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float near, out ivec3 first,
                     out ivec3 more) {
   ivec3 cell;
@@ -35,23 +35,23 @@ void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float 
   more = clamp(cell + ivec3(greaterThan(inCell, vec3(1.0 - near))), ivec3(0), last) - first;
 }
 
-// For each axis, returns the depth of the smallest leaf that touches this leaf's side nearer to the point
-// `local`, or kWall if this side lies at a wall of the domain.
+// For each axis, returns the depth of the smallest leaf at the leaf's face that is nearer to the point `local`, or
+// kWall if this face lies on the domain's boundary.
 ivec3 smallestNeighbour(uint extents, vec3 local) {
   uvec3 shift = uvec3(0u, 10u, 20u) + 5u * uvec3(greaterThan(local, vec3(0.0)));
   return ivec3(uvec3(extents) >> shift & kWall);
 }
 
-// For each axis, returns the distance of a point from the nearer side of the leaf, positive inside. The unit is
-// the leaf's blend extent across this side.
+// For each axis, returns the distance of a point from the leaf's nearer face, positive inside. The unit is the distance
+// to which the leaf's blending weight reaches across this face.
 vec3 rampPosition(uint extents, int depth, vec3 local) {
   ivec3 neighbour = smallestNeighbour(extents, local);
   vec3 t = (1.0 - abs(local)) * ldexp(vec3(0.5), neighbour - depth) / blend;
   return mix(t, vec3(1.0), equal(neighbour, ivec3(kWall)));
 }
 
-// The derivatives of the weight's ramps at the ramp positions `t`, with respect to the leaf's local
-// coordinates.
+// The derivatives, with respect to the leaf's local coordinates, of the three factors of its blending weight. `t` are
+// the positions that rampPosition returns.
 vec3 rampSlopes(uint extents, int depth, vec3 local, vec3 t) {
   return -sign(local) * 0.75 * (1.0 - t * t) * ldexp(vec3(0.5), smallestNeighbour(extents, local) - depth) / blend;
 }
@@ -66,20 +66,20 @@ vec3 localInOther(ivec4 other, ivec3 cellIndex, int depth, vec3 local) {
   return 2.0 * inOther - 1.0;
 }
 
-// candidateOffset is the offset of the n-th candidate cell from the first. candidateNumber numbers a candidate
-// by its offset.
+// candidateOffset returns the offset of the n-th candidate cell from the first one, along each axis 0 or 1.
+// candidateNumber turns such an offset into a number from 0 to 7.
 ivec3 candidateOffset(int n, ivec3 more) { return ivec3(n, n >> more.x, n >> (more.x + more.y)) & more; }
 int candidateNumber(ivec3 offset) { return offset.x + 2 * offset.y + 4 * offset.z; }
 
-// The weighted sum of the polynomials of leaves at a point. The first polynomial is subtracted from the others
-// before they are summed, for the sake of single precision. Each vec4 holds a gradient (xyz), in the local
-// coordinates of the point's own leaf, and a value (w).
+// The weighted sum of leaf polynomials at a point. The first polynomial is subtracted from all others to reduce
+// rounding errors in single precision. Each vec4 holds a gradient (xyz), in the local coordinates of the leaf that
+// contains the point, and a value (w).
 struct LeafSum {
   vec4 first, sum, weights;
-  float lowest, highest;  // over the leaves whose weights reach the point if widened by `margin` extents
+  float lowest, highest;  // range of the polynomials whose weights, widened by `margin`, reach the point
 };
 
-// Adds the leaf of cell index other.xyz and depth other.w to the sum.
+// Adds the polynomial of a leaf, with cell index other.xyz and depth other.w, to the weighted sum.
 void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int depth, vec3 local, float margin,
              bool withGradient) {
   bool own = other.w == depth && other.xyz == cellIndex;
@@ -87,7 +87,7 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   uint extents = texelFetch(zones, int(leaf.index)).x;
   vec3 t = rampPosition(extents, other.w, inOther);
   if (any(lessThanEqual(t, vec3(-1.0 - margin)))) return;
-  float scale = ldexp(1.0, other.w - depth);  // change of the leaf's local coordinates per change of the own leaf's
+  float scale = ldexp(1.0, other.w - depth);  // derivative of this leaf's local coordinates by the own leaf's
   vec4 polynomial;
   if (withGradient) {
     polynomial = evaluateWithGradient(leaf.offset, leaf.degree, inOther);
@@ -108,9 +108,8 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   total.sum += vec4(weight.xyz * difference.w + weight.w * difference.xyz, weight.w * difference.w);
 }
 
-// Finds the node of the candidate cell `cell` at the first level: a node of the same size as the cell, or a
-// larger leaf `up` levels above it. A larger leaf counts only for the first candidate cell that lies in it.
-// Returns true if the node counts.
+// Finds the node at the candidate cell `cell` on the search's first level: a node of the cell's size, or a larger leaf
+// `up` levels above it. Returns false if an earlier candidate cell lies in the same larger leaf, which must count once.
 bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int up) {
   up = level;
   node = fetchNode(baseCellIndex(uvec3(cell >> level)));
@@ -121,8 +120,8 @@ bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int 
   return !any(greaterThan(min(offset, cell - (cell >> up << up)), ivec3(0)));
 }
 
-// Finds the node of the candidate cell `cell` below the first level. `parents` holds the indices of the first
-// children of the nodes one level above. Returns true if there is such a node.
+// Finds the node at the candidate cell `cell` on a lower level. `parents` holds the indices of the first children of
+// the candidate nodes one level above. Returns false if there is no such node.
 bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell, out Node node) {
   ivec3 parent = (cell >> 1) - parentFirst;
   if (any(lessThan(parent, ivec3(0))) || any(greaterThan(parent, parentMore))) return false;
@@ -132,15 +131,15 @@ bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell,
   return true;
 }
 
-// Sums the polynomials of all leaves with a weight at a point. The search descends level by level. Its
-// candidates on each level are the nodes near the point, found from integers and the fraction within the own
-// leaf, so that single precision is enough. Only one place in the code evaluates leaves, and the leaves found
-// are not kept in an array: drivers would unroll loops over the array and take seconds to compile the result.
+// Sums the polynomials of all leaves whose weights reach a point. Descends level by level through the nodes near the
+// point, which are found from integer cell indices, so that single precision is enough. Leaves are evaluated in one
+// place and are not collected in an array, because drivers would unroll loops over the array and take seconds to
+// compile.
 LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margin, bool withGradient) {
   LeafSum total = LeafSum(vec4(0.0), vec4(0.0), vec4(0.0), 1e30, -1e30);
   vec3 fraction = 0.5 * local + 0.5;
   bool blended = isInBlendZone(local);
-  uint open[8];  // the first children of internal nodes, by the number of the candidate
+  uint open[8];  // index of the first child of each internal candidate node
   ivec3 first = cellIndex, more = ivec3(0);
   bool internal = true;
   for (int level = depth; internal && level <= kDeepest; ++level) {
@@ -173,8 +172,8 @@ LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margi
   return total;
 }
 
-// Returns the value of the field at a point, and the range of the polynomials of some leaves there: all leaves
-// whose weights reach the point if their extents are widened by the share `margin`.
+// Returns the value of the blended field at a point, and the range there of all leaf polynomials whose weights reach
+// the point if they extend farther by the share `margin`.
 FieldRange blendedRange(Node leaf, uint depth, uvec3 cellIndex, vec3 local, float margin) {
   LeafSum total = leafSumAt(leaf, ivec3(cellIndex), int(depth), local, margin, false);
   return FieldRange(total.first.w + total.sum.w / total.weights.w, total.lowest, total.highest);

@@ -1,5 +1,5 @@
-// Samples the field at one point of a slice for each pixel. Positions are computed in double precision and
-// rounded like those on the CPU, so that CPU and GPU find the same cells.
+// Samples the field at one point of a slice for each pixel. Positions are computed in double precision and rounded as
+// on the CPU, so that CPU and GPU find the same cells.
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 2) uniform ivec2 size;

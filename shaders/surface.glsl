@@ -1,23 +1,23 @@
-// Code that both passes of a surface share: the ray of a pixel, the lookup of nodes along the ray, and the
-// state of a pixel between the passes.
+// Code shared by the two passes that trace a surface (surface_march.frag, then surface_hit.frag): the ray of a pixel,
+// the lookup of octree nodes along the ray, and the state of a pixel between the passes.
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 2) uniform ivec2 size;
-layout(location = 3) uniform dvec3 eye;      // grid coordinates; see RayGeometry
-layout(location = 4) uniform dvec3 forward;  // world units
+layout(location = 3) uniform dvec3 eye;      // the camera's eye, grid coordinates
+layout(location = 4) uniform dvec3 forward;  // direction of view, world units
 layout(location = 5) uniform dvec3 right;
 layout(location = 6) uniform dvec3 up;
-layout(location = 7) uniform dvec3 scale;  // grid coordinates per world unit
+layout(location = 7) uniform dvec3 scale;  // change of the grid coordinates per world unit
 layout(location = 8) uniform dvec2 pixelStep;
 layout(location = 9) uniform float offset;
 layout(location = 10) uniform float diagonal;  // diagonal of the domain, world units
-layout(location = 15) uniform dvec3 shownLo;   // corners of the visible part of the domain, grid coordinates
+layout(location = 15) uniform dvec3 shownLo;   // lower corner of the domain's visible part, grid coordinates
 layout(location = 16) uniform dvec3 shownHi;
-layout(location = 17) uniform bool parallel;  // whether rays are parallel
+layout(location = 17) uniform bool parallel;  // whether the rays are parallel (orthographic camera)
 
-// The state of a pixel after the march. Its integers are the kind, t and side (floats stored as bits), and the
-// last leaf. Its floats are, for a bracketed root, the ends a and b of the bracket and a first guess of the
-// root. For a pixel still under way they are the last height and the longest step to try.
+// The state of a pixel after a march pass. The integers are the kind (kMiss to kBracketed), the bits of the floats t
+// and side, and the last leaf. The floats are the ends a, b of the root's bracket and a first guess of the root; or,
+// for a march that has not ended, the last height and the longest step to try.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 
@@ -27,14 +27,14 @@ const uint kOnFace = 2u;     // the ray crosses the surface at t, where it enter
 const uint kBracketed = 3u;  // the ray crosses the surface between a and b, within one leaf
 
 struct Ray {
-  dvec3 worldDirection;  // unit vector
+  dvec3 worldDirection;  // unit direction in world coordinates
   dvec3 origin;          // entry into the visible part of the domain, grid coordinates
-  dvec3 direction;       // grid coordinates per world unit
-  double fromEye;        // distance from the ray's start to the origin, world units
+  dvec3 direction;       // change of the grid coordinates per world unit along the ray
+  double fromEye;        // distance from the start of the pixel's ray to `origin`, world units
   double length;         // length within the visible part, world units; negative for a ray that misses it
 };
 
-// `middle` plus the vector from the middle of the picture to this pixel.
+// Adds to `middle` the vector from the centre of the picture to this pixel.
 dvec3 onPicture(dvec3 middle) {
   ivec2 pixel = firstPixel + ivec2(gl_FragCoord.xy);
   return middle + right * (double(2 * pixel.x + 1 - size.x) * pixelStep.x) +
@@ -70,7 +70,7 @@ Ray pixelRay() {
   return ray;
 }
 
-// A node and a point in it.
+// A point and an octree node that contains it.
 struct CellPoint {
   Node node;
   uint depth;
@@ -94,7 +94,7 @@ CellPoint baseCellAt(vec3 p) {
   return at;
 }
 
-// Replaces a node by its child at the point.
+// Replaces the node by its child that contains the point.
 void descend(inout CellPoint at) {
   vec3 doubled = 2.0 * at.fraction;
   uvec3 upper = uvec3(greaterThanEqual(doubled, vec3(1.0)));
@@ -105,5 +105,5 @@ void descend(inout CellPoint at) {
   at.scale *= 2.0;
 }
 
-// The index of a node among the nodes of its depth, counted from the domain's lower corner.
+// The integer coordinates of the node, in units of its own edge length from the domain's lower corner.
 uvec3 cellIndexOf(CellPoint at) { return (uvec3(at.base) << at.depth) + at.path; }

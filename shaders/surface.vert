@@ -1,13 +1,13 @@
-// Draws a block of pixels as one point (see SurfaceBlocks).
+// Draws a block of 8 x 8 pixels whose rays may hit the surface, as one point.
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 13) uniform ivec2 viewport;
 
-layout(location = 0) in vec3 block;  // x and y of its upper left pixel, and Block::start
+layout(location = 0) in vec3 block;  // x, y of the block's upper left pixel; distance at which its rays start
 
 flat out float start;
 
-const float kBlock = 8.0;  // pixels along each side; as in surface_blocks.h
+const float kBlock = 8.0;  // pixels along each side of a block; same value as in surface_blocks.h
 
 void main() {
   vec2 center = block.xy + 0.5 * kBlock - vec2(firstPixel);

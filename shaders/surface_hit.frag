@@ -1,32 +1,31 @@
-// Second pass of a surface: finds the hit in the bracket of the first crossing. Positions along the ray are in
-// double precision. A pixel whose march has not ended counts as a miss.
+// Second pass for a surface: refines the first root of f - offset along each ray within the bracket that the march has
+// found. Positions along the ray are in double precision. A pixel whose march has not ended counts as a miss.
 
 layout(location = 11) uniform int mostRefinements;
 
-// The members are cell, degree | depth << 8 | crack << 16, value and distance. The last two are the bits of
-// floats.
+// The components are the cell, degree | depth << 8 | crack << 16, and the bits of the floats value and distance.
 layout(location = 0) out uvec4 cellLevelsValueDistance;
 layout(location = 1) out vec4 normal;
 
-const float kTurned = 1e-4;     // angle in radians, roughly, by which the gradient may change in the last step
+const float kTurned = 1e-4;     // greatest turn of the gradient in the last step, roughly in radians
 const float kInfinity = 1e30;
-const float kConverged = 1e-8;  // change of the root that ends its refinement, in domain diagonals; as in trace.cpp
-const float kCrack = 4e-6;      // least jump that is a crack, in domain diagonals at slope 1; as in trace.h
+const float kConverged = 1e-8;  // refinement ends when the root changes by less, in domain diagonals; as in trace.cpp
+const float kCrack = 4e-6;      // least jump that counts as a crack at slope 1, in domain diagonals; as in trace.h
 
 vec3 localAt(CellPoint cell, Ray ray, double t) {
   dvec3 inBase = ray.origin - dvec3(cell.base) + t * ray.direction;
   return vec3(2.0lf * (inBase * double(cell.scale) - dvec3(cell.path)) - 1.0lf);
 }
 
-// The root of f - offset along a ray, with the field there.
+// The root of f - offset along a ray, with the field's value and gradient there.
 struct Root {
   float added;          // distance from the first guess, world units
-  vec4 gradientValue;  // gradient in local coordinates, and value, at the root
+  vec4 gradientValue;  // gradient in local coordinates (xyz) and value (w) at the root
 };
 
-// Refines the root in a bracket by Newton's method, and by bisection if Newton's method would leave the
-// bracket. Without a bracket, only evaluates the field. The bracket, from a to b, and the root are distances
-// along the ray from the point `local`, so that single precision is enough.
+// Refines the root in the bracket [a, b] by Newton's method, or by bisection where a Newton step would leave the
+// bracket. Without a bracket, only evaluates the field. Bracket and root are distances along the ray from the point
+// `local`, so that single precision is enough.
 Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool bracketed, float a, float b) {
   uvec3 cellIndex = cellIndexOf(at);
   bool blended = blendZoneAt(at.node.index, at.fraction).inside;
@@ -47,7 +46,7 @@ Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool brac
     change = -height / slope;
     bool newton = added + change >= a && added + change <= b;
     if (!newton) change = 0.5 * (a + b) - added;
-    // The distance of the root from the next point is at most curve / slope * change^2 / 2.
+    // After a Newton step, the distance to the root is at most curve / slope * change^2 / 2.
     float turned = newton ? abs(curve / slope * change) : kInfinity;
     bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
     if (close || abs(change) <= kConverged * diagonal) break;
@@ -67,7 +66,7 @@ void main() {
   float t = uintBitsToFloat(integers.y);
   float side = uintBitsToFloat(integers.z);
 
-  // Find the leaf in which the march ended. It contains the last point of the march.
+  // Find the leaf that contains the last point of the march.
   Ray ray = pixelRay();
   CellPoint at = baseCellAt(vec3(ray.origin) + t * vec3(ray.direction));
   while (!at.node.leaf) descend(at);

@@ -1,27 +1,27 @@
-// First pass of a surface: each pixel's ray marches to the leaf and the bracket of the first crossing of
-// f = offset (docs/rendering.md, "Tracing"). A height is f - offset, signed so that it is positive where the
+// First pass for a surface: each pixel's ray marches to the first crossing of f = offset and finds the leaf and a
+// bracket of the root (docs/rendering.md, "Tracing"). A height is f - offset, signed so that it is positive where the
 // ray starts. The functions for the stages have the same names as in trace.cpp.
 //
-// llvmpipe executes both sides of a branch. Therefore each expensive expression occurs once within the loops,
-// with cheap tests before it. llvmpipe also ends all loops of a shader silently once the sum of their
-// iterations is 65535. Therefore a pixel is left under way after `mostSteps`, and the pass is drawn again.
+// llvmpipe executes both sides of a branch. Therefore each expensive expression occurs once within the loops, with
+// cheap tests before it. llvmpipe also ends all loops of a shader silently once the sum of their iterations is 65535.
+// Therefore a march stops after `mostSteps`, and the pass is drawn again to continue it.
 
 layout(location = 11) uniform int mostSteps;
-layout(location = 12) uniform bool resume;       // continue the pixels under way, leave the others as they are
-layout(location = 19) uniform int blendedSteps;  // the steps that one evaluation in a blend zone counts for
-layout(location = 14) uniform float startSide;   // see SurfaceBlocks::side
+layout(location = 12) uniform bool resume;       // whether to continue only the pixels whose march has not ended
+layout(location = 19) uniform int blendedSteps;  // number of steps that one evaluation in a blend zone counts as
+layout(location = 14) uniform float startSide;   // sign of f - offset at the start of every ray
 
-layout(binding = 4) uniform samplerBuffer linearParts;  // leaves: slopes in local x, y, z, and value in the middle
+layout(binding = 4) uniform samplerBuffer linearParts;  // linear part of a leaf: slopes in x, y, z, value in the middle
 
-flat in float start;  // see Block::start
+flat in float start;  // distance along the ray at which the march starts (Block::start)
 
 layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
 
 // These constants have the same values as in trace.cpp.
-const float kNudge = 1e-6;     // distance by which steps end behind a face, in domain diagonals; also the shortest step
-const float kPastFace = 4e-7;  // greatest distance behind a face at which rays enter a node, in parts of the grid
-const float kGrain = 0.25;     // step where no bound excludes a zero, in parts of a blend zone's extent
+const float kNudge = 1e-6;     // overshoot of a step across a cell's face, and shortest step; in domain diagonals
+const float kPastFace = 4e-7;  // distance behind a face at which a ray leaves a node, as a share of the domain's extent
+const float kGrain = 0.25;     // step in a blend zone where no bound excludes a root, as a share of the blend extent
 
 const float kInfinity = 1e30;
 
@@ -29,37 +29,37 @@ struct MarchRay {
   vec3 origin, direction;
   vec3 inverse;  // 1 / |direction| for each axis; infinite for an axis along which the ray does not move
   float length;
-  float nudge;  // kNudge in world units
+  float nudge;  // the length kNudge in world units
 };
 
 struct March {
   uint kind;
   float t;
   float side;         // the sign of f - offset where the ray starts, or 0 while it is unknown
-  uint lastLeaf;      // the leaf in which the last step stayed, or kNoCell
-  float lastHeight;   // the height at t of the last leaf's polynomial, or an upper bound of it where it falls throughout
-  float longestStep;  // the longest step to try in the last leaf
+  uint lastLeaf;      // the leaf that the last step did not leave, or kNoCell
+  float lastHeight;   // height of lastLeaf's polynomial at t, or an upper bound if the height falls in the whole leaf
+  float longestStep;  // the longest step to try next in lastLeaf
   vec4 bracket;
   int steps;
-  uint zoneLeaf;   // the leaf for which zoneStep holds
-  float zoneStep;  // the next step in the blend zone
+  uint zoneLeaf;   // the leaf to which zoneStep applies
+  float zoneStep;  // length of the next step in the blend zone of zoneLeaf
 };
 
-// The node that contains the ray's point at parameter t, with bounds of the height along the ray.
+// The node that contains the ray's point at parameter t, with bounds along the ray for the height (f - offset, signed).
 struct LeafPoint {
   CellPoint at;
   BlendZone zone;
   vec3 localDirection;   // change of the local coordinates per world unit
-  float toLeave;         // length to the exit from the node
-  float middle, slope;   // the height of the linear part at t, and its slope
-  float lowest, highest;  // the range of the height at t
-  float slopeDeviation;   // greatest difference between the slope of the height and that of its linear part
+  float toLeave;         // length along the ray to the exit from the node
+  float middle, slope;   // height of the polynomial's linear part at t, and its slope along the ray
+  float lowest, highest;  // lower and upper bound of the height at t
+  float slopeDeviation;   // greatest difference between the slopes of the height and of its linear part
   bool known;             // whether lastHeight is the height of the leaf's polynomial at t
-  float steepestOfAll;    // least slope of the polynomial of any leaf with a weight
+  float steepestOfAll;    // lower bound of the slopes of all polynomials that are blended at t
 };
 
-// World length along the ray from a point to the exit from its node's box. With a margin, the faces of the box
-// lie `margin` node edges further inside. The length ends slightly behind the face (see trace.cpp).
+// The length along the ray, in world units, from a point to just behind the face where the ray leaves the point's node.
+// With a margin, the node is first shrunk on every side by `margin` times its edge length.
 float lengthToExit(CellPoint at, MarchRay ray, float margin) {
   vec3 ahead = mix(at.fraction, 1.0 - at.fraction, greaterThan(ray.direction, vec3(0.0))) - margin;
   vec3 exits = mix((ahead / at.scale + kPastFace * vec3(grid)) * ray.inverse, vec3(kInfinity),
@@ -67,12 +67,12 @@ float lengthToExit(CellPoint at, MarchRay ray, float margin) {
   return min(exits.x, min(exits.y, exits.z));
 }
 
-// Length of the step over which the height certainly stays positive, if its slope is at least `steepest`.
+// Length of a step over which the height is guaranteed to stay positive, if its slope is at least `steepest`.
 float certainlyAbove(float height, float steepest) {
   return height > 0.0 ? (steepest < 0.0 ? height / -steepest : kInfinity) : 0.0;
 }
 
-// The leaf at a point, or the first node on the descent to the leaf whose range of values excludes the offset.
+// Descends to the leaf at a point, but stops earlier at a node whose range of field values excludes the offset.
 CellPoint relevantNodeAt(vec3 p) {
   CellPoint at = baseCellAt(p);
   while (!at.node.leaf && at.node.lo <= offset && at.node.hi >= offset) descend(at);
@@ -104,8 +104,8 @@ March startMarch(Ray ray, MarchRay marchRay) {
   return march;
 }
 
-// Finds the node at parameter t of the ray and bounds the height there. Also sets march.side if it is unknown
-// and the bounds tell it.
+// Finds the node at parameter t of the ray and bounds the height there. Also sets march.side if it is unknown and the
+// bounds prove the sign.
 LeafPoint boundHeight(MarchRay ray, inout March march) {
   LeafPoint leaf;
   leaf.at = relevantNodeAt(ray.origin + march.t * ray.direction);
@@ -125,8 +125,8 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
     leaf.lowest = leaf.middle - leaf.at.node.valueDeviation - leaf.zone.valueDifference;
     leaf.highest = leaf.middle + leaf.at.node.valueDeviation + leaf.zone.valueDifference;
   }
-  // Find the sign of f - offset at the ray's start. If it is negative, negate the bounds, since heights are
-  // positive there.
+  // Find the sign of f - offset at the ray's start. If it is negative, negate the bounds, because a height is positive
+  // at the start of the ray.
   if (march.side == 0.0) march.side = leaf.lowest > 0.0 ? 1.0 : leaf.highest < 0.0 ? -1.0 : 0.0;
   if (march.side < 0.0) {
     float negated = -leaf.lowest;
@@ -141,9 +141,8 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
   return leaf;
 }
 
-// Moves t to the exit of a node if the ray cannot cross the surface in the node. If the node lies on the other
-// side of the surface, the ray hits the surface on the face where it enters the node. Returns true if neither
-// is the case.
+// Moves t to the exit of a node in which the ray cannot cross the surface. Records a hit on the face where the ray
+// enters the node if the node lies behind the surface. Returns true in all other cases.
 bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
   bool above = (leaf.lowest > 0.0 && leaf.lowest + leaf.slope * leaf.toLeave > 0.0) ||
                (leaf.known && march.lastHeight - leaf.zone.valueDifference +
@@ -162,8 +161,8 @@ bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
   return true;
 }
 
-// Stores the polynomial's value at t as the first height in a leaf. Returns true if the blended field must
-// decide on which side of the surface the ray starts.
+// Stores the polynomial's value at t as the first height in a leaf. Returns true if only the blended field can tell on
+// which side of the surface the ray starts.
 bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
   bool undecided = leaf.zone.inside && march.side == 0.0 && abs(value) <= lower;
   if (march.side == 0.0 && !undecided) march.side = value >= 0.0 ? 1.0 : -1.0;
@@ -174,9 +173,9 @@ bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
   return undecided;
 }
 
-// Handles a step of the march to a point with the height `ahead`. Moves t to this point if the ray provably
-// crosses nothing before it, brackets a crossing, or shortens the step. Over a step the height sags below its
-// chord by at most curve * length^2 / 8. The height is monotone if it falls by more than curve * length^2 / 2.
+// Tries a step to a point with the height `ahead`: moves t there if the ray provably does not cross the surface before
+// it, brackets a single crossing, or shortens the next step. Over a step, the height sags below its chord by at most
+// curve * length^2 / 8, and it is monotone if it falls by more than curve * length^2 / 2.
 void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float lower, float curve, bool certain,
              inout March march) {
   float clear = march.lastHeight - lower;
@@ -197,15 +196,14 @@ void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float 
   }
 }
 
-// Takes a step by the leaf's polynomial. Returns true if the weights of other leaves decide where the field is
-// zero.
+// Takes a step by the polynomial of one leaf. Returns true if the blended field has to be evaluated instead.
 bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   float curve = leaf.at.node.secondDerivative * dot(leaf.localDirection, leaf.localDirection);
   float steepest = leaf.slope - leaf.slopeDeviation;
   float shallowest = leaf.slope + leaf.slopeDeviation;
-  float toExit = leaf.toLeave;  // to the end of the part in which the polynomial is the field
+  float toExit = leaf.toLeave;  // length to the exit from the leaf, or from the leaf's part without blending
   if (kBlended && !leaf.zone.inside) toExit = lengthToExit(leaf.at, ray, leaf.zone.width);
-  bool falling = !leaf.zone.inside && shallowest < 0.0;  // throughout the leaf, so that there is one root at most
+  bool falling = !leaf.zone.inside && shallowest < 0.0;  // decreases in the whole leaf: at most one root
   if (march.side != 0.0 && falling && leaf.lowest > 0.0) {
     if (leaf.highest + leaf.slope * toExit < 0.0) {
       march.kind = kBracketed;
@@ -213,13 +211,13 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
       return false;
     }
     if (!leaf.known) {
-      // Use an upper bound of the height, which serves as well as the height itself.
+      // For a falling height, an upper bound serves as well as the height itself.
       leaf.known = true;
       march.lastHeight = leaf.highest;
       march.lastLeaf = leaf.at.node.index;
     }
   }
-  float lower = leaf.zone.inside ? leaf.zone.valueDifference : 0.0;  // greatest height of the polynomial above the field
+  float lower = leaf.zone.inside ? leaf.zone.valueDifference : 0.0;  // greatest excess of the polynomial over the field
   float clear = march.lastHeight - lower;
   float safe = certainlyAbove(clear, steepest) + ray.nudge;
   leaf.steepestOfAll = steepest - leaf.zone.gradientDifference * length(leaf.localDirection);
@@ -234,8 +232,8 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   return false;
 }
 
-// Marches by the polynomials of single leaves until the weights of other leaves matter. Returns true if the ray
-// reaches such a point, and sets `leaf` to the leaf there.
+// Marches by the polynomials of single leaves. Returns true if the ray reaches a point at which the blended field has
+// to be evaluated, and sets `leaf` to the leaf there.
 bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
   bool blended = false;
   while (!blended && march.kind == kUnderWay && march.steps < mostSteps) {
@@ -251,8 +249,8 @@ bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
   return blended;
 }
 
-// Takes a step by the blended field: as far as the height is certainly positive, or by a small part of the
-// blend zone's extent. The first evaluation in a leaf is at t itself, without a step.
+// Takes a step by the blended field: as far as the height is guaranteed to stay positive, but at least a small part of
+// the blend zone. The first evaluation in a leaf is at t itself, without a step.
 void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
   march.steps += blendedSteps;
   float stepLength = leaf.at.node.index == march.zoneLeaf ? min(leaf.toLeave, march.zoneStep) : 0.0;
@@ -271,8 +269,8 @@ void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
     march.t += stepLength == leaf.toLeave ? stepLength + ray.nudge : stepLength;
     if (!(march.t <= ray.length)) march.kind = kMiss;
   }
-  // Choose the next step so short that over it no polynomial falls to zero, among all leaves whose weight extends
-  // to within one extent of the point.
+  // Choose the next step so short that no polynomial that may be blended on it falls to zero, but not shorter than
+  // kGrain blend extents.
   float lowest = march.side > 0.0 ? ahead.lowest - offset : offset - ahead.highest;
   float extent = leaf.zone.extent / length(leaf.localDirection);
   march.zoneStep = max(kGrain * extent, min(extent, certainlyAbove(lowest, leaf.steepestOfAll))) + ray.nudge;

@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
   // reported like other failed writes.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-  std::signal(SIGCHLD, SIG_DFL);  // waitpid would fail where the caller ignores the signal
+  std::signal(SIGCHLD, SIG_DFL);  // waitpid would fail if the parent process ignored SIGCHLD
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
   const std::vector<std::string> words(argv + (argc > 0), argv + argc);

@@ -14,7 +14,7 @@
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kBlock = 8;  // pairs that one task handles
+constexpr std::size_t kBlock = 8;  // number of body pairs that one task handles
 
 /// Throws `Error` if the pair is invalid. The message starts with the pair's number if `number` is given.
 /// Allocates no memory if the pair is valid.
@@ -33,8 +33,8 @@ void requireValid(const ContactOptions& options) {
   if (options.deepest == std::size_t{0}) throw Error("contacts: the number of the deepest must be 1 or more");
 }
 
-/// The query of one body pair. It collects the samples that may be contacts and evaluates the field at
-/// these samples in batches.
+/// The query of one body pair. It collects the samples that may be contacts and evaluates the field at these
+/// samples in batches.
 class Search {
  public:
   Search(const BodyPair& pair, const ContactOptions& options, std::vector<Contact>& out)
@@ -45,7 +45,7 @@ class Search {
 
   QueryCost run() {
     const std::span<const Sphere> spheres = pair_.samples->spheres();
-    // Compute the tolerance of the sphere tests. Rounding, and the tolerance of rotations, may move a sample
+    // Compute the tolerance of the sphere tests. Rounding, and rotations that are not exact, may move a sample
     // out of its bounding sphere.
     const double size = fieldFromSamples_.translation().norm() + spheres[0].center.norm() + spheres[0].radius;
     const double slack = margin_ + 32 * std::numeric_limits<double>::epsilon() * size;

@@ -12,13 +12,13 @@ namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kMostCells = std::size_t{1} << 20;
-constexpr double kUnits = 32;        // units per shortest cell edge: 16 bits suffice for 2048 edges
-constexpr double kTolerance = 0.05;  // error of the polynomials' bounds, in shortest cell edges
-constexpr double kRounding = 1e-12;  // relative error of sums by rounding
+constexpr double kUnits = 32;        // units of stored bounds per shortest cell edge: 16 bits suffice for 2048 edges
+constexpr double kTolerance = 0.05;  // accepted error of bounds of polynomials, in shortest cell edges
+constexpr double kRounding = 1e-12;  // upper bound of the relative rounding error of sums
 
 /// A polynomial in the local coordinates [−1, 1]³ of a box.
 struct Piece {
-  std::array<double, 3> lower, upper;  ///< corners of the box, in grid cells
+  std::array<double, 3> lower, upper;  ///< corners of the box, in cells of the table
   int degree;                          ///< at least 1, so that linear terms exist
   std::vector<double> c;               ///< (degree + 1)³ coefficients, z fastest; 0 beyond the total degree
   double rest = 0;                     ///< bound of the sum of terms that were left out
@@ -35,7 +35,7 @@ struct Piece {
         for (int k = std::max(0, least - i - j); i + j + k <= most; ++k) f(i, j, k);
   }
 
-  /// Restricts the polynomial to a part of its box along one axis. `rows` describe this part.
+  /// Restricts the polynomial to a part of its box along one axis. `rows` comes from `legendreOfPart` for this part.
   void restrict(int axis, const detail::LegendreRows& rows) { detail::restrictToPart(c, degree, axis, rows); }
 
   /// Removes the terms of the highest degrees from the polynomial, as long as the magnitudes of all removed
@@ -192,10 +192,10 @@ std::vector<double> leastAround(std::vector<double> values, const std::array<std
   return values;
 }
 
-/// Returns the greatest ratio between the length of a path by steps to neighbouring cells and the distance
-/// between the path's ends. The length is a linear function of the end point for paths with steps along
-/// axis a, along both a and b, and along all three axes. The ratio is therefore at most the length of this
-/// function's gradient.
+/// Returns a bound of the ratio between the length of the shortest path by steps to neighbouring cells and the
+/// straight distance between its ends. For each order a, b, c of the axes, the path takes steps along axis a,
+/// along both a and b, and along all three axes. Its length is then a linear function of the end point, and the
+/// gradient of this function bounds the ratio.
 double worstDetour(const Vector3& cell) {
   double worst = 1;
   std::array<int, 3> order = {0, 1, 2};
@@ -275,9 +275,9 @@ FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
   wall_ = leastAtSides(within, size_);
   for (double& bound : within) bound = std::max(bound, 0.0);
 
-  // Compute the bounds around each cell. The distance between points of two cells is at least that between
-  // the centre of one cell and the nearest centre in the 3 × 3 × 3 neighbourhood of the other cell. Therefore
-  // the smallest value of each neighbourhood is taken first.
+  // Compute the bounds around each cell. Two points of two cells are at least as far apart as the centre of one
+  // cell and the nearest centre in the 3 × 3 × 3 neighbourhood of the other cell. Therefore the smallest value of
+  // each neighbourhood is taken first.
   std::vector<double> around = leastAround(within, size_);
   distanceTransform(around, size_, cell);
   if (wall_ > 0) wall_ = leastAtSides(around, size_);
@@ -291,7 +291,7 @@ const FieldCollider::Cell& FieldCollider::cellAt(const Vector3& inDomain) const 
   const double scale = double(std::uint32_t{1} << depth_);
   std::array<std::int64_t, 3> at;
   for (int axis = 0; axis < 3; ++axis) {
-    // This must be exactly the expression by which the field finds the cell of a point.
+    // This expression must be identical to the expression by which the field finds the cell of a point.
     const double coordinate = (inDomain[axis] - frame.lower[axis]) / frame.size[axis] * frame.cells[axis];
     at[axis] = std::min(static_cast<std::int64_t>(coordinate * scale), size_[axis] - 1);
   }
@@ -310,12 +310,11 @@ double FieldCollider::lowerBound(const Vector3& x) const {
   return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-// Let q be the point of the domain closest to x. Two lower bounds hold at x. The first is `around` at q,
-// because |q − q_y| ≤ |x − y| for every y and the point q_y of the domain closest to y. The second is
-// `wall_` + |x − q|. It holds for y outside the domain, because y is at most |x − y| nearer to the domain
-// than x. For y inside the domain it holds because the path from x to y crosses a side of the domain,
-// around which a `wall_` of 0 or more is a bound. If `wall_` is negative, the second bound is less than |x
-// − q| and concerns no y inside the domain.
+// Let q be the point of the domain closest to x. Two lower bounds hold at x. The first is `around` at q, because the
+// points of the domain closest to x and to y are at most |x − y| apart. The second is `wall_` + |x − q|. It holds for
+// points y outside the domain, because y is at most |x − y| nearer to the domain than x. It holds for points y inside
+// the domain, because the path from x to y crosses a side of the domain, around which a `wall_` of 0 or more is a
+// bound. If `wall_` is negative, the second bound is less than |x − q| and concerns no point inside the domain.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

@@ -21,7 +21,7 @@ struct Candidate {
   std::uint32_t triangle;
 };
 
-/// The areas and normals of a mesh's triangles. The data of the mesh has been checked.
+/// The areas and normals of a mesh's triangles. The constructor checks the mesh.
 struct Surface {
   std::vector<double> areasUpTo;  ///< total area of each triangle and all before it
   std::vector<Vector3> normals;

@@ -135,7 +135,7 @@ TEST_F(Accuracy, nothingStepsAcrossTheFacesOfABlendedField) {
               AllOf(HasSubstr("greatest steps across faces"), HasSubstr("20,000 points")));
 }
 
-/// Cancels when the task is reported first.
+/// A listener that cancels the work as soon as the given task is reported.
 struct Canceller : WorkListener {
   explicit Canceller(std::string task) : task_(std::move(task)) {}
   void report(std::string_view task, double) override { heard_ = heard_ || task == task_; }
@@ -179,7 +179,7 @@ TEST_F(Accuracy, aMeshThatIsNotKnownIsAskedFor) {
   ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("t.hpsdf"), "--target-error", "1e-2", "--grid", "2"}).status, 0);
   EXPECT_THAT(runHere({"verify", at("t.hpsdf")}).err, HasSubstr("give MESH, t.off"));
   EXPECT_EQ(runHere({"verify", at("t.hpsdf"), at("t.off"), "--points", "1000"}).status, kExitDone);
-  // A normalized field is compared with the normalized mesh.
+  // A field of a normalized mesh is compared with the normalized mesh.
   ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("n.hpsdf"), "--target-error", "1e-2", "--grid", "2", "--normalize"})
                 .status,
             0);
@@ -213,7 +213,7 @@ TEST_F(Accuracy, theScriptFliesToTheWorstPoints) {
     std::getline(numbers, number, ',');
     EXPECT_EQ(std::stod(number), point[axis].get<double>());
   }
-  // The script's lines run without errors; its pictures are left out.
+  // The script's lines run without errors; lines that save pictures are omitted here.
   std::string lookOnly;
   for (std::istringstream all(script); std::getline(all, found);)
     if (!found.starts_with("shot")) lookOnly += found + "\n";
@@ -267,7 +267,7 @@ TEST_F(Accuracy, convergenceOfATorusFallsAndHpIsAhead) {
   EXPECT_GT(equal["h2"]["over_hp"], 1);
   EXPECT_GT(equal["h1"]["over_hp"], equal["h2"]["over_hp"].get<double>());
   EXPECT_LT(2 * std::stod(curves["hp"].back()[6]), std::stod(curves["h2"].back()[6]));
-  // By default the strategies are compared at the error that all of them reach.
+  // By default the strategies are compared at the smallest error that all of them reach.
   EXPECT_NEAR(equal["measured_rms"], std::stod(curves["h1"].back()[6]), 1e-12);
   EXPECT_EQ(json["meshes"][0]["curves"]["h1"].size(), curves["h1"].size());
   EXPECT_EQ(Json::parse(readTextFile(at("out/convergence.json"))), json);
@@ -317,7 +317,7 @@ TEST_F(Accuracy, convergenceIsDrawnByGnuplot) {
   const Outcome broken = study("echo 'no such terminal' ; exit 3\n");
   EXPECT_THAT(broken.err, HasSubstr("gnuplot failed with status 3 (no such terminal)"));
   EXPECT_FALSE(fs::exists(at("plots"))) << "nothing is left behind";
-  // The script sets scales and labels and draws a curve for each strategy and measure.
+  // The gnuplot script sets scales and labels and draws a curve for each strategy and error measure.
   const Outcome drawn = study("while read -r line; do echo \"$line\"; done < plot.gp > plot.png\n");
   ASSERT_EQ(drawn.status, kExitDone) << drawn.err;
   const std::string script = readTextFile(at("plots/convergence-torus.png"));
@@ -397,7 +397,7 @@ TEST_F(Accuracy, theTableIsWrittenThreeWays) {
                           testing::Not(HasSubstr("src=\"http")), testing::Not(HasSubstr("src=\"torus"))));
   EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("![degrees](torus-2-degree.svg)"),
                            HasSubstr("Degree ![](degree-legend.svg)"), HasSubstr("Depth ![](depth-legend.svg)")));
-  // Every row has as many cells as the head.
+  // Every row of the table has as many cells as the header row.
   const auto count = [](const std::string& text, const std::string& what) {
     std::size_t found = 0;
     for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
@@ -409,7 +409,7 @@ TEST_F(Accuracy, theTableIsWrittenThreeWays) {
   std::istringstream lines(table);
   for (std::string line; std::getline(lines, line) && !line.empty();)
     EXPECT_EQ(std::ranges::count(line, '|'), 16) << line;
-  // The legend has all levels, in the colours of the bars.
+  // The legend lists all degrees, in the colours of the bars.
   const std::string legend = readTextFile(at("out/degree-legend.svg"));
   std::set<std::string> levels;
   for (const Json& mesh : json["meshes"])
@@ -422,7 +422,7 @@ TEST_F(Accuracy, theTableIsWrittenThreeWays) {
   for (const char* name : {"torus", "torus-2", "box"})
     for (const char* ending : {"-degree.png", "-depth.png", "-degree.svg", "-depth.svg"})
       EXPECT_GT(fs::file_size(at(std::string("out/") + name + ending)), 100u) << name << ending;
-  // The parts of a bar are as long as the shares of the volume and have the legend's colours.
+  // The parts of a bar are as long as each degree's share of the volume and have the legend's colours.
   const std::string bar = readTextFile(at("out/torus-degree.svg"));
   EXPECT_EQ(std::size_t(std::ranges::count(bar, '%')), torus["degree_volume"].size());
 }

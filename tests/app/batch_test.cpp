@@ -1,4 +1,4 @@
-// Batches of meshes, built by one process, by several, and by some that are killed.
+// Tests batches of meshes, built by one process, by several processes, and by processes that are killed.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -31,7 +31,7 @@ namespace hpsdf::app {
 namespace batch_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using testing::Contains;
 using testing::Each;
 using testing::SizeIs;
@@ -55,7 +55,7 @@ TEST(BatchLists, holdOneMeshALine) {
   EXPECT_THAT(surfacesIn(" \n\r\n# \n"), IsEmpty());
 }
 
-/// `find -print0` and some editors write such files.
+/// `find -print0` and some editors write lists that contain zero bytes.
 TEST(BatchLists, withZeroBytesAreRefused) {
   const auto complaint = [](std::string_view list) {
     try {
@@ -107,7 +107,7 @@ class Batches : public testing::Test {
  protected:
   std::string at(const std::string& name) const { return (folder_ / name).string(); }
   fs::path fields() const { return folder_ / "fields"; }
-  /// Returns the file of the field for a line of the list.
+  /// Returns the file of the field that is built for a line of the list.
   fs::path fieldOf(const std::string& surface) const { return fields() / (nameOf(surface) + ".hpsdf"); }
 
   /// Returns a call that builds the given list with options.
@@ -118,7 +118,7 @@ class Batches : public testing::Test {
     return call;
   }
 
-  /// Returns the bytes of the field that a single construction gives.
+  /// Returns the bytes of the field that `hpsdf build` gives for this mesh without a batch.
   std::string loneBytes(const std::string& surface, const std::vector<std::string>& options) const {
     Call call{.words = {"build", surface, "-o", "lone.hpsdf"}, .folder = folder_.path()};
     call.words.insert(call.words.end(), options.begin(), options.end());
@@ -127,7 +127,7 @@ class Batches : public testing::Test {
     return readFile(folder_ / "lone.hpsdf");
   }
 
-  /// Returns the names of the fields, without the batch's own folder.
+  /// Returns the names of the field files, without the folder in which the batch keeps its own records.
   std::set<std::string> fieldNames() const {
     std::set<std::string> names = namesIn(fields());
     EXPECT_EQ(names.erase(".batch"), 1u);
@@ -199,7 +199,7 @@ TEST_F(Batches, finishedFieldsAreSkipped) {
   for (const auto& entry : fs::recursive_directory_iterator(fields()))
     EXPECT_EQ(entry.last_write_time(), written.at(entry.path())) << entry.path();
   EXPECT_TRUE(readFile(fieldOf("t.obj")) == before);
-  // The field depends neither on threads nor on the rest of the list nor on checkpoints.
+  // The field is independent of the number of threads, of the rest of the list and of checkpoints.
   EXPECT_THAT(
       statusesOf(run(batch("builtin:box\nt.obj", coarseAnd({"--normalize", "--threads", "1", "--checkpoint"})))),
       ElementsAre("skipped", "skipped"));
@@ -211,13 +211,13 @@ TEST_F(Batches, changedMeshesAndOptionsAreBuiltAgain) {
   const std::string list = "t.obj\nother.obj\n";
   const auto statuses = [&](const std::vector<std::string>& options) { return statusesOf(run(batch(list, options))); };
   EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "built"));
-  // The mesh changes; its size and its time stay.
+  // The mesh's content changes, but its file size and modification time stay the same.
   const auto time = fs::last_write_time(folder_ / "t.obj");
   writeFile(folder_ / "t.obj", tetrahedron(2));
   fs::last_write_time(folder_ / "t.obj", time);
   EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "skipped"));
   EXPECT_TRUE(readFile(fieldOf("t.obj")) == loneBytes("t.obj", kCoarse));
-  // An option changes.
+  // A changed option causes another construction.
   for (const char* option : {"--bounds", "--normalize"}) {
     EXPECT_THAT(statuses(coarseAnd({option})), ElementsAre("built", "built")) << option;
     EXPECT_TRUE(readFile(fieldOf("t.obj")) == loneBytes("t.obj", coarseAnd({option})));
@@ -227,7 +227,7 @@ TEST_F(Batches, changedMeshesAndOptionsAreBuiltAgain) {
       << "the default, which is not what --paper takes";
   EXPECT_THAT(statuses(coarseAnd({"--paper", "--quadrature", "3"})), ElementsAre("skipped", "skipped"));
   EXPECT_THAT(statuses(kCoarse), ElementsAre("built", "built"));
-  // The mesh is removed; its field stays.
+  // After the mesh file is removed, the batch reports a failure and keeps the old field.
   fs::remove(folder_ / "t.obj");
   EXPECT_THAT(statuses(kCoarse), ElementsAre("failed", "skipped"));
   EXPECT_TRUE(fs::exists(fieldOf("t.obj")));
@@ -252,13 +252,13 @@ TEST_F(Batches, damagedFieldsAreBuiltAgain) {
       EXPECT_THAT(outcome.err, AllOf(HasSubstr("hpsdf: note: "), HasSubstr("; building it again\n")));
     }
   }
-  // The record of the options is missing.
+  // A field without the record of its options is built again.
   fs::remove(fields() / ".batch" / (nameOf("builtin:box") + ".json"));
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "skipped"));
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
 }
 
-/// Returns a binary glTF file: its header, and JSON and the first buffer as chunks.
+/// Returns a binary glTF file: a header, a JSON chunk and a chunk with the first buffer.
 std::string binaryGltf(std::string json, const std::string& buffer) {
   const auto words = [](const std::vector<std::uint32_t>& numbers) {
     return std::string(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof numbers[0]);
@@ -353,7 +353,7 @@ TEST_F(Batches, listsThatAreNotTextAreRefused) {
   expectRefused(call, "list: is longer than 67108864 bytes");
 }
 
-/// The error appears before the mesh is read, which would take time and fail too.
+/// The error appears before the mesh is read: reading would take time, and this mesh does not exist.
 TEST_F(Batches, unwritableFieldsAreNotBuilt) {
   const auto errorOf = [&](const char* surface) {
     const Outcome outcome = run(batch(surface, kCoarse));
@@ -363,7 +363,7 @@ TEST_F(Batches, unwritableFieldsAreNotBuilt) {
   };
   fs::create_directories(fieldOf("none.obj"));
   EXPECT_THAT(errorOf("none.obj"), EndsWith(".hpsdf: is a folder; give a file name"));
-  // A folder replaces the mark, which can be neither removed nor written then.
+  // A folder replaces the file that marks an unfinished construction; it can be neither removed nor overwritten.
   const fs::path mark = fields() / ".batch" / (nameOf("analytic:box") + ".begun");
   fs::create_directories(mark / "full");
   EXPECT_EQ(errorOf("analytic:box"), "fields/.batch/" + mark.filename().string() +
@@ -399,7 +399,7 @@ TEST_F(Batches, interruptKeepsFinishedFields) {
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf("analytic:sphere") + ".hpsdf"));
 }
 
-/// True where a process holds the lock of some mesh of the folder.
+/// Returns true if a process holds the file lock of any mesh in this output folder.
 bool isAtWork(const fs::path& fields) {
   const int file = open((fields / ".batch" / "claims").c_str(), O_RDWR | O_CLOEXEC);
   if (file < 0) return false;
@@ -411,10 +411,10 @@ bool isAtWork(const fs::path& fields) {
   return range.l_type != F_UNLCK;
 }
 
-/// The first process holds a mesh and is stopped; the second one waits for it.
+/// The first process holds the lock of a mesh and is stopped by a signal; the second process waits for that mesh.
 class TwoProcesses : public Batches {
  protected:
-  /// A mesh whose construction takes some tenths of a second.
+  /// Options with which the construction takes some tenths of a second.
   const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
   const std::string kShape = "builtin:gear";
 
@@ -447,10 +447,10 @@ TEST_F(TwoProcesses, oneWaitsForTheOther) {
   EXPECT_TRUE(fs::exists(fieldOf(kShape)));
 }
 
-/// The first process is stopped in the middle of its work and has lost its lock.
+/// The first process is stopped by a signal during its construction, and its lock file is deleted.
 class LostLocks : public Batches {
  protected:
-  /// A mesh whose construction takes some tenths of a second.
+  /// Options with which the construction takes some tenths of a second.
   const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
   const std::string kShape = "builtin:gear";
 
@@ -461,7 +461,7 @@ class LostLocks : public Batches {
     fs::remove(fields() / ".batch" / "claims");
   }
 
-  /// Returns the outcome of the first process after it continues.
+  /// Lets the stopped process continue, and expects that it reports `status` and that the field is complete.
   void expectGoesOn(const char* status) {
     process_->send(SIGCONT);
     const Outcome outcome = process_->finish();
@@ -475,13 +475,13 @@ class LostLocks : public Batches {
 
 TEST_F(LostLocks, fieldOfTheOtherProcessIsAccepted) {
   EXPECT_THAT(statusesOf(run(batch(kShape, kOptions))), ElementsAre("built"));
-  const rlimit none = {16, 16};  // limits the size of files, so that writing fails
+  const rlimit none = {16, 16};  // limits the size of files to 16 bytes, so that writing a field fails
   ASSERT_EQ(prlimit(process_->id(), RLIMIT_FSIZE, &none, nullptr), 0);
   expectGoesOn("elsewhere");
 }
 
 TEST_F(LostLocks, removedFilesAreWrittenAgain) {
-  // Other files have the first 100 temporary names, so that the first attempt to write fails.
+  // The first 100 temporary file names are taken, so that the first attempt to write the field fails.
   for (int n = 0; n <= 100; ++n)
     writeFile(fmt::format("{}.part-{}-{}", fieldOf(kShape).string(), process_->id(), n), "");
   expectGoesOn("built");
@@ -499,7 +499,7 @@ TEST_F(TwoProcesses, waitingProcessCanBeInterrupted) {
   first_->finish();
 }
 
-/// Checkpoints of a killed process are continued; its unfinished files are removed.
+/// A batch continues the checkpoint of a killed process and removes that process's unfinished files.
 TEST_F(Batches, checkpointIsTakenOver) {
   const std::string shape = "builtin:gear";
   const auto options = [](const char* target) {
@@ -514,7 +514,7 @@ TEST_F(Batches, checkpointIsTakenOver) {
     ASSERT_FALSE(fs::exists(fieldOf(shape)));
   };
   kill();
-  // A process of this number runs here, but the writer ran on another machine: nobody is building the mesh.
+  // Process 1 runs here, but these files are from process 1 of another machine: nobody is building the mesh.
   for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
   const Outcome other = run(batch(shape, options("1e-3")));
   EXPECT_EQ(other.status, 3);
@@ -526,7 +526,7 @@ TEST_F(Batches, checkpointIsTakenOver) {
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf(shape) + ".hpsdf"));
 }
 
-/// Searching a folder of many fields takes long.
+/// The search for files of killed processes is slow in a folder of many fields, so that it must be rare.
 TEST_F(Batches, folderIsSearchedOnlyAfterAProcessDied) {
   const std::string shape = "analytic:box";
   const fs::path mark = fields() / ".batch" / (nameOf(shape) + ".begun"), half = fieldOf(shape).string() + ".part-1-0";
@@ -566,7 +566,7 @@ TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
 
   std::vector<std::unique_ptr<Process>> processes;
   processes.push_back(std::make_unique<Process>(call));
-  processes[0]->waitForLines(1);  // the first process alone has built this field
+  processes[0]->waitForLines(1);  // the first process has built this field before the other processes start
   for (int i = 1; i < 4; ++i) processes.push_back(std::make_unique<Process>(call));
   processes[0]->waitForLines(2);
   processes[0]->send(SIGKILL);
@@ -586,7 +586,7 @@ TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
     }
   }
   EXPECT_GE(builtByVictim, 1) << "it was in the middle of its work";
-  // Nobody reports a field whose process was killed after writing it and before reporting it.
+  // One field may be missing in the reports: a process may be killed after writing it and before reporting it.
   EXPECT_GE(timesBuilt.size(), std::size_t{kShapes - 1});
   for (const auto& [shape, times] : timesBuilt) EXPECT_EQ(times, 1) << shape;
   EXPECT_THAT(fieldNames(), SizeIs(kShapes)) << "and nothing half-written";

@@ -44,7 +44,7 @@ void writeFile(const fs::path& file, const std::string& text) {
 const std::string kBuild = "build analytic:sphere target-error=1e-2 grid=2\n";
 const std::string kLook = "slice cpu=true size=96x64 ";
 
-/// True if the elements of an XML or HTML text are closed in the right order.
+/// Returns true if the elements of an XML or HTML text are closed in the right order.
 bool isWellFormed(const std::string& xml) {
   static const std::regex tag(R"(<(/?)([a-z]+)((?:\s+[a-z]+="[^"<>]*")*)\s*(/?)>)");
   std::vector<std::string> open;
@@ -61,7 +61,7 @@ bool isWellFormed(const std::string& xml) {
   return open.empty() && rest.starts_with("<?xml ") && std::ranges::count(rest, '<') == 1;
 }
 
-/// A folder with the script `looks`, and a folder for its results.
+/// A test folder for scripts and baseline pictures, and a folder for the results.
 class Check : public testing::Test {
  protected:
   void script(const std::string& text, const std::string& name = "looks") {
@@ -77,7 +77,7 @@ class Check : public testing::Test {
     words.insert(words.end(), names.begin(), names.end());
     return runHere(words);
   }
-  /// The lines "SCRIPT/PICTURE: RESULT" in order; a ! marks the picture of a negative control.
+  /// Returns lines "SCRIPT/PICTURE: RESULT" in order; "!" marks a negative control, an intentionally wrong picture.
   std::vector<std::string> results(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = {"--json"};
     words.insert(words.end(), more.begin(), more.end());
@@ -88,7 +88,7 @@ class Check : public testing::Test {
                       (item.at("control_line").is_null() ? "" : "!") + ": " + item.at("result").get<std::string>());
     return found;
   }
-  /// Runs the script once and accepts its pictures.
+  /// Runs the scripts once and accepts the named pictures as baselines.
   void take(const std::vector<std::string>& names) const {
     EXPECT_EQ(check().status, 1);
     const Outcome accepted = accept(names);

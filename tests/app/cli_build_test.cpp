@@ -1,4 +1,4 @@
-// `hpsdf build`: meshes, domains, memory, inside tests, warnings.
+// Tests `hpsdf build`: meshes, domains, memory limits, inside tests and warnings.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace hpsdf::app {
 namespace cli_build_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using BuildCommand = Cli;
 
 TEST_F(BuildCommand, buildWritesAFieldThatLoads) {
@@ -75,7 +75,7 @@ TEST_F(BuildCommand, warnsOfOpenMeshes) {
 }
 
 TEST_F(BuildCommand, memoryIsLimitedWithoutATarget) {
-  std::string soup;  // triangles here and there, which surround nothing
+  std::string soup;  // random triangles that enclose no volume
   std::uint32_t random = 1;
   const auto number = [&] { return double((random = random * 1664525 + 1013904223) >> 8) / 0x1p24; };
   for (int v = 0; v < 300; ++v) {
@@ -112,7 +112,7 @@ TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
   EXPECT_EQ(built("builtin:torus,segments=700,sides=700", {}).status, 0) << "untold, the limit is for what grows";
 }
 
-/// The importer stores coordinates as floats; a warning reports a coarse resolution.
+/// The importer stores coordinates as floats; a warning reports that they are too coarse far from the origin.
 TEST_F(BuildCommand, warnsOfCoordinatesFarFromTheOrigin) {
   const auto tetrahedron = [&](double x) {
     return fmt::format("v {0} 0 0\nv {1} 0 0\nv {0} 2 0\nv {0} 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", x, x + 2);
@@ -204,7 +204,7 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   refused({"--continuity", "weak", "--blend-width", "0.1"}, "blend-width belongs to continuity exact");
   refused({"--near-distance", "0.1"}, "near-distance belongs to near-error");
   refused({"--max-bytes", "1e3"}, "the base grid alone takes more than 1000 bytes");
-  // Studies refuse options that would have no effect or another meaning there.
+  // `hpsdf study` refuses options that would have no effect or another meaning than in `hpsdf build`.
   for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
     expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");
   for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})

@@ -1,4 +1,4 @@
-// `hpsdf build --checkpoint`.
+// Tests `hpsdf build --checkpoint`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -15,9 +15,9 @@ namespace hpsdf::app {
 namespace cli_checkpoint_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 
-/// Identifies one version of a file, which is replaced at each write; nothing where the file does not exist.
+/// Returns the file's inode number, which changes with each write; nothing if the file does not exist.
 std::optional<ino_t> identityOf(const fs::path& file) {
   struct stat status {};
   return stat(file.c_str(), &status) == 0 ? std::optional(status.st_ino) : std::nullopt;
@@ -25,7 +25,7 @@ std::optional<ino_t> identityOf(const fs::path& file) {
 
 class Checkpoints : public Cli {
  protected:
-  /// Returns a construction of about one second that writes its checkpoint as often as its share of the time allows.
+  /// Returns a call whose construction takes about a second and writes its checkpoint as often as it may.
   Call build(std::vector<std::string> more = {}) const {
     std::vector<std::string> words = {"build",          "builtin:gear", "-o",          at("f.hpsdf"),
                                       "--target-error", "1e-6",         "--checkpoint"};
@@ -108,7 +108,7 @@ TEST_F(Checkpoints, checkpointsNeedAnOutput) {
                 "belongs to checkpoint");
 }
 
-/// The limit admits the field in single precision but not the checkpoint in double precision.
+/// The file-size limit admits the field in single precision, but not the checkpoint in double precision.
 TEST_F(Checkpoints, warnsWhereACheckpointCannotBeWritten) {
   Call call{
       {"build", "builtin:torus", "-o", at("f.hpsdf"), "--grid", "10", "--max-steps", "0", "--coefficients", "float"}};

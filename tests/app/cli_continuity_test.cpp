@@ -1,4 +1,4 @@
-// `hpsdf smooth`, `blend`, `bounds` and `study continuity`.
+// Tests `hpsdf smooth`, `blend`, `bounds` and `study continuity`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@ namespace hpsdf::app {
 namespace cli_continuity_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using Continuity = Cli;
 
 TEST_F(Continuity, smoothEqualsBuildWithWeakContinuity) {
@@ -58,7 +58,7 @@ TEST_F(Continuity, blendEqualsBuildWithExactContinuity) {
   EXPECT_GT(jump("plain.hpsdf"), 1e-3);
   EXPECT_LT(jump("blended.hpsdf"), 1e-14);
   EXPECT_THAT(run({{"info", at("blended.hpsdf")}}).out, HasSubstr("exact: blended within 0.1 of an edge from faces"));
-  // Weak and exact continuity can be combined, in two commands or in one.
+  // Weak continuity and blending can be combined, in two commands or in one.
   ASSERT_EQ(run({{"smooth", at("plain.hpsdf"), "-o", at("smooth.hpsdf")}}).status, 0);
   const Outcome text = run({{"blend", at("smooth.hpsdf"), "-o", at("both.hpsdf")}});
   ASSERT_EQ(text.status, 0) << text.err;
@@ -89,10 +89,10 @@ TEST_F(Continuity, boundsAreStoredReportedAndHold) {
   EXPECT_THAT(verified.out, HasSubstr("no point is beyond its bound"));
   expectRefused({{"verify", at("plain.hpsdf"), "--max-violations", "0", "--script", at("worst.hps")}},
                 "max-violations: " + at("plain.hpsdf") + " keeps no bounds");
-  // Blending changes the errors, so that bounds are removed.
+  // Blending changes the errors, so that it removes the stored error bounds.
   ASSERT_EQ(run({{"blend", at("bounds.hpsdf"), "-o", at("blended.hpsdf")}}).status, 0);
   EXPECT_TRUE(load(at("blended.hpsdf")).data().bounds.empty());
-  // A warning reports the open mesh.
+  // Bounds of an open mesh's field cause a warning.
   writeFile(at("open.off"), "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n");
   const Outcome open =
       run({{"build", at("open.off"), "--bounds", "-o", at("open.hpsdf"), "--target-error", "1e-1", "--grid", "2"}});
@@ -119,7 +119,7 @@ TEST_F(Continuity, boundsOfAnExistingFieldEqualThoseOfBuild) {
   ASSERT_EQ(run({{"blend", at("plain.hpsdf"), "-o", at("blended.hpsdf")}}).status, 0);
   ASSERT_EQ(run({{"bounds", at("blended.hpsdf"), "-o", at("certain.hpsdf")}}).status, 0) << "a shape's name is known";
   EXPECT_EQ(readFile(at("certain.hpsdf")), readFile(at("exact.hpsdf")));
-  // Existing bounds are computed again.
+  // Bounds that the field already has are computed again, with the same result.
   const Outcome again = run({{"bounds", at("found.hpsdf"), "-o", at("again.hpsdf"), "--threads", "1"}});
   EXPECT_THAT(again.out, AllOf(HasSubstr("again.hpsdf: nowhere wrong by more than"), HasSubstr("in the median cell")));
   const auto errorsOf = [&](const std::string& name) {
@@ -161,7 +161,7 @@ TEST_F(Continuity, continuityIsStudied) {
   ASSERT_EQ(rows.size(), 16u) << "two meshes, with and without enrichment, three weights and none";
   const auto figure = [&](std::size_t row, const char* name) { return rows[row].at(name).get<double>(); };
   for (std::size_t first = 0; first < 16; first += 4)
-    for (std::size_t row = first + 1; row < first + 4; ++row) {  // each weight smaller than the one before
+    for (std::size_t row = first + 1; row < first + 4; ++row) {  // each row has a smaller weight than the previous row
       EXPECT_LT(figure(row, "jump_rms"), figure(row - 1, "jump_rms")) << row;
       EXPECT_GT(figure(row, "rms"), figure(row - 1, "rms")) << row;
       EXPECT_EQ(figure(row, "bytes"), figure(first, "bytes")) << row;

@@ -1,4 +1,4 @@
-// `hpsdf info` and `hpsdf query`, and files that are not fields.
+// Tests `hpsdf info` and `hpsdf query`, and files that are not fields.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace hpsdf::app {
 namespace cli_field_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using FieldFile = Cli;
 
 TEST_F(FieldFile, infoDescribesTheField) {
@@ -68,7 +68,7 @@ TEST_F(FieldFile, damagedFieldsAreRefused) {
   }
 }
 
-/// The field has figures that are not numbers, and a name that would clear the screen.
+/// The field's metadata contain NaN, infinity, and a name with control characters that would clear the screen.
 TEST_F(FieldFile, infoDescribesAnyFieldThatLoads) {
   FieldData data = oneLeafField(1, 2).data();
   data.metadata.source.name = "evil\n\x1b[2J\xff.obj";
@@ -130,7 +130,7 @@ TEST_F(FieldFile, badPointsAreRefusedByLine) {
   expectRefused({{"query", field(), folder_.path().string()}}, "is a folder");
 }
 
-/// A program that sends one point at a time gets each answer before the next point.
+/// A program that sends one point at a time gets each answer before it sends the next point.
 TEST_F(FieldFile, queriesOnAPipeAreAnsweredAtOnce) {
   Process process({.words = {"query", field()}, .keepInputOpen = true});
   process.type("0 0 0\n");
@@ -196,7 +196,7 @@ TEST_F(FieldFile, badFieldFilesAreRefused) {
   expectRefused({{"info", at("missing.hpsdf")}}, "missing.hpsdf", before);
 }
 
-/// Another thread creates and removes the file; the program prints its content or one line of error.
+/// Another thread creates and removes the file; the program must print the file's content or one line of error.
 TEST_F(FieldFile, fileThatAppearsAndDisappearsIsReadOrRefused) {
   std::atomic<bool> over = false;
   std::thread other([&] {

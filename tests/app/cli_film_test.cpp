@@ -1,4 +1,4 @@
-// `hpsdf turntable`, `frames` and `report`.
+// Tests `hpsdf turntable`, `frames` and `report`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace hpsdf::app {
 namespace cli_film_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using Films = Cli;
 
 TEST_F(Films, turntableEqualsRenderFromAllDirections) {
@@ -31,7 +31,7 @@ TEST_F(Films, turntableEqualsRenderFromAllDirections) {
     EXPECT_TRUE(readFile(at("turn/frame-000" + std::to_string(frame) + ".png")) == readFile(at("one.png"))) << camera;
   }
 
-  // A shorter film replaces all frames of a longer one.
+  // A shorter film in the same folder replaces all frames of a longer one.
   const Outcome again = with({"turntable", field(), "-o", at("turn"), "--frames", "2", "--view", "left", "--json"});
   ASSERT_EQ(again.status, 0) << again.err;
   EXPECT_THAT(namesIn(at("turn")), ElementsAre("frame-0000.png", "frame-0001.png", "frames.json"));
@@ -83,7 +83,7 @@ TEST_F(Films, framesShowTheRefinement) {
     EXPECT_TRUE(readFile(at("f/frame-000" + std::to_string(frame) + ".png")) == readFile(at("s.png"))) << frame;
   }
 
-  // All frames have the scale of the last one.
+  // All frames have the colour scale of the last frame.
   ASSERT_EQ(frames("d", "slice color=distance axis=x").status, 0);
   ASSERT_EQ(
       run({{"slice", field(), "-o", at("s.png"), "--size", "160x120", "--cpu", "--color", "distance", "--axis", "x"}})
@@ -94,7 +94,7 @@ TEST_F(Films, framesShowTheRefinement) {
   ASSERT_EQ(run({{"render", field(), "-o", at("s.png"), "--size", "160x120", "--cpu", "--color", "error"}}).status, 0);
   EXPECT_TRUE(readFile(at("e/frame-0004.png")) == readFile(at("s.png")));
 
-  // Fewer steps than frames give one frame a step.
+  // With fewer construction steps than frames, there is one frame for each step.
   const Outcome few = run({{"frames", "builtin:torus", "--max-steps", "2", "-o", at("few"), "--of", "slice cpu=true"}});
   EXPECT_THAT(few.out, HasSubstr("few: 3 frames"));
 

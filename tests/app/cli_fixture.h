@@ -1,5 +1,5 @@
 #pragma once
-// The fixture of tests that start the program as a user does.
+// The test fixture for tests that start the program as a user does.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,10 +41,10 @@ inline constexpr std::string_view kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
     "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
-/// assimp's JSON reader recurses at each bracket until its stack overflows.
+/// An input on which assimp crashes: its JSON reader recurses at each bracket until its stack overflows.
 inline const std::string kBringsAssimpDown(200'000, '[');
 
-/// Triangulating this face, whose corners lie on one line, takes quadratic time: tens of seconds.
+/// Returns an OBJ file with one polygon of collinear corners, whose triangulation takes tens of seconds.
 inline std::string slowPolygon() {
   constexpr int kCorners = 100'000;
   std::ostringstream file;

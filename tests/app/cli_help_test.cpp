@@ -1,4 +1,4 @@
-// Help texts, the reference page and mistakes in the words of a call.
+// Tests help texts, the reference page and misspelled words in a call.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@ namespace hpsdf::app {
 namespace cli_help_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using HelpCommand = Cli;
 
 TEST_F(HelpCommand, helpAndVersionArePrinted) {

@@ -1,4 +1,4 @@
-// `hpsdf mesh`, and meshes that cannot be used.
+// Tests `hpsdf mesh`, and meshes that cannot be used.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace hpsdf::app {
 namespace cli_mesh_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using MeshCommand = Cli;
 
 TEST_F(MeshCommand, reportsSelfIntersectionsAndInsideTest) {
@@ -156,7 +156,7 @@ TEST_F(MeshCommand, importerEndsWithTheProgram) {
   };
   for (const auto& [signal, status] : {std::pair{SIGINT, 130}, {SIGKILL, -SIGKILL}}) {
     Process process({{"mesh", at("slow.obj")}});
-    process.waitForErrorLine();  // of its progress
+    process.waitForErrorLine();  // waits for the first report of progress
     EXPECT_EQ(readers(), 1u);
     process.send(signal);
     const Outcome outcome = process.finish();

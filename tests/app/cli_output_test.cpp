@@ -1,4 +1,4 @@
-// Outputs that cannot be written, and interrupts.
+// Tests outputs that cannot be written, and interrupts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -13,7 +13,7 @@ namespace hpsdf::app {
 namespace cli_output_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using Outputs = Cli;
 
 TEST_F(Outputs, unwritableOutputsAreRefusedBeforeTheWork) {
@@ -21,7 +21,7 @@ TEST_F(Outputs, unwritableOutputsAreRefusedBeforeTheWork) {
   for (const std::string& output :
        {at("none/f.hpsdf"), at("file/f.hpsdf"), folder_.path().string(), std::string("/dev/null")}) {
     const auto start = Clock::now();
-    // The construction would take minutes, so that this test fails where the file is opened after it.
+    // The construction would take minutes, so that the test fails if the output is opened only afterwards.
     expectRefused({{"build", "builtin:gear", "-o", output, "--target-error", "1e-12"}}, output);
     EXPECT_LT(Clock::now() - start, std::chrono::seconds(10));
   }
@@ -41,7 +41,7 @@ TEST_F(Outputs, closedStandardOutputIsAnError) {
   EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
 }
 
-/// Writing fails as on a full disk; older files stay and no unfinished ones remain.
+/// Writing fails as on a full disk; older files must stay, and no unfinished files may remain.
 TEST_F(Outputs, outputsThatDoNotFitLeaveOlderFiles) {
   const std::vector<std::vector<std::string>> calls = {
       {"build", "builtin:torus", "--target-error", "1e-4", "-o"},
@@ -133,7 +133,7 @@ TEST_F(Outputs, interruptStopsTheConstruction) {
   }
 }
 
-/// A full pipe makes the process wait in the middle of writing its temporary file.
+/// The program waits for more points on standard input and has already opened its temporary file.
 TEST_F(Outputs, interruptOutsideAConstructionLeavesNothing) {
   Process process({.words = {"query", field(), "-o", at("q.csv")}, .keepInputOpen = true});
   for (int i = 0; i < 1000 && namesIn(folder_.path()).empty(); ++i) usleep(10000);

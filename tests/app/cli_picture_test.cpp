@@ -1,4 +1,4 @@
-// `hpsdf slice` and `hpsdf render`.
+// Tests `hpsdf slice` and `hpsdf render`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ namespace hpsdf::app {
 namespace cli_picture_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using Pictures = Cli;
 
 TEST_F(Pictures, drawsOnTheCpu) {
@@ -43,7 +43,7 @@ TEST_F(Pictures, rawSlicesHoldTheFieldsValues) {
   std::size_t count = 0;
   std::vector<float> values;
   std::vector<Vector3> points;
-  std::set<long> across, down;  // steps from pixel to pixel
+  std::set<long> across, down;  // distances between neighbouring pixels along x and y
   while (std::getline(rows, row)) {
     Vector3 x;
     double value = 0;
@@ -69,7 +69,7 @@ TEST_F(Pictures, rawSlicesHoldTheFieldsValues) {
   const std::string header = "Pf\n40 20\n-1.0\n";
   ASSERT_THAT(pfm, StartsWith(header));
   ASSERT_EQ(pfm.size(), header.size() + 40 * 20 * sizeof(float));
-  std::vector<float> inside;  // in the order of the CSV: rows top to bottom
+  std::vector<float> inside;  // values in the order of the CSV file, with the top row first
   for (int y = 20; y-- > 0;)
     for (int x = 0; x < 40; ++x) {
       float value = 0;
@@ -86,7 +86,7 @@ TEST_F(Pictures, quantitiesColourSlicesAndSurfaces) {
     EXPECT_EQ(run({{"render", field(), "-o", at("r.png"), "--color", color, "--cpu", "--size", "200x150"}}).status, 0);
     EXPECT_GT(render::loadPng(at("s.png")).width, 0);
   }
-  // Raw values equal those of the field.
+  // The raw values of a slice are the errors themselves.
   ASSERT_EQ(run({{"slice", field(), "-o", at("e.pfm"), "--color", "error", "--cpu", "--size", "16x16"}}).status, 0);
   const std::string pfm = readFile(at("e.pfm"));
   std::array<float, 256> values{};
@@ -125,7 +125,7 @@ TEST_F(Pictures, twoFieldsAreCompared) {
     return values;
   };
   EXPECT_THAT(differences("small"), testing::Each(0.0F));
-  // The neighbourhood of the centre is excluded, which no polynomial follows.
+  // The median excludes the points near the centre, where no polynomial approximates the kink of the distance.
   std::vector<float> sorted = differences("large");
   std::ranges::sort(sorted);
   EXPECT_NEAR(sorted[128], 0.1, 1e-3);

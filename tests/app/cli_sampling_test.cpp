@@ -1,4 +1,4 @@
-// `hpsdf jumps`, `export` and `probe`.
+// Tests `hpsdf jumps`, `export` and `probe`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace hpsdf::app {
 namespace cli_sampling_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using Sampling = Cli;
 
 TEST_F(Sampling, jumpsAreReportedAndListed) {
@@ -85,7 +85,7 @@ TEST_F(Sampling, cubicGridsAreExportedAndMeasured) {
   expectRefused({{"export", field(), "-o", at("none/x.cdf")}}, "none/x.cdf", before);
 }
 
-/// Returns the rows of a CSV file, the header first.
+/// Returns the rows of a CSV file, beginning with the header.
 std::vector<std::vector<std::string>> tableOf(const std::string& text) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream lines(text);

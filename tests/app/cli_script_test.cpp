@@ -1,4 +1,4 @@
-// Scripts and the commands that only scripts have.
+// Tests scripts and the commands that exist in scripts only.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace hpsdf::app {
 namespace cli_script_test {
 
 using namespace cli;
-using cli::Call;  // a script has calls too
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
 using Scripts = Cli;
 
 TEST_F(Scripts, scriptsWorkOnTheCurrentField) {
@@ -94,7 +94,7 @@ TEST_F(Scripts, expectationsHoldOrEndTheScript) {
   EXPECT_FALSE(fs::exists(at("unseen.png")));
 }
 
-/// A pixel of a picture shows the value of the field at its point.
+/// `pick` must report the value of the field at the point that the pixel shows.
 TEST_F(Scripts, picksAgreeWithQueries) {
   HPSDF_REQUIRE_GL();
   const Field torus = load(field());
@@ -122,7 +122,7 @@ TEST_F(Scripts, picksAgreeWithQueries) {
       odd += pick["cell"] != cell.id || pick["degree"] != cell.degree || pick["depth"] != cell.depth;
     }
     EXPECT_GT(hits, 60) << look;
-    // Hits of rays are rounded and may lie beyond a face; points of a slice are exact.
+    // Hit points of rays are rounded and may lie in the neighbouring cell; points of a slice are exact.
     EXPECT_LE(odd, std::string(look).starts_with("render") ? hits / 50 : 0) << look;
   }
 }

@@ -24,7 +24,7 @@ namespace explorer_test {
 
 using ::testing::HasSubstr;
 
-/// An explorer with a session of its own and no terminal.
+/// An explorer with its own session and without a terminal.
 struct Bench {
   Registry registry = makeRegistry();
   std::istringstream in;
@@ -74,7 +74,7 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
   EXPECT_TRUE(same(other.explorer().frame(), bench.explorer().frame()));
   EXPECT_FALSE(same(other.explorer().frame(), before));
 
-  // The lines set every part of the state, so that the state before does not matter.
+  // A copied view sets every part of the state, so that the previous state does not matter.
   other.run(
       "camera target=center ; plane axis=x offset=0.2 target=center ; surface clip=none ; color degree range=auto");
   other.run(script);
@@ -116,7 +116,7 @@ TEST(Explorer, undoAndRedoChangeTheStateStepByStep) {
   EXPECT_TRUE(bench.view() == second);
   bench.run("show surface");
   EXPECT_THAT(bench.failure("redo"), HasSubstr("nothing to redo"));
-  bench.run("undo; undo");  // undo never changes the frame's size
+  bench.run("undo; undo");  // undo never changes the size of the frame
   EXPECT_THAT(bench.failure("undo"), HasSubstr("test:1:1: there is nothing to undo"));
 }
 
@@ -230,7 +230,7 @@ TEST(Explorer, theReadoutAgreesWithQueries) {
   EXPECT_NEAR(readout->pick.value, readout->value, 1e-5);
   ASSERT_TRUE(readout->exact);
   EXPECT_NEAR(*readout->exact, 0.7 - 0.3, 0.01) << "in the middle of the torus";
-  // No interface of the cell is nearer than the one that the readout names.
+  // The readout reports the distance to the nearest face of the cell.
   const Cell cell = field.cellAt(x);
   double nearest = 1e30;
   for (int axis = 0; axis < 3; ++axis)
@@ -268,7 +268,7 @@ TEST(Explorer, picksOfAShotAgreeWithTheField) {
   bench.run("expect pick(450,200).jump.value < 1");
 }
 
-/// The point in the middle of the explorer's picture after a script.
+/// Runs a script and returns the point in the middle of the explorer's picture.
 std::optional<render::Pick> middleAfter(Bench& bench, const std::string& kind, const std::string& script) {
   bench.run(kTorus + ("show " + kind + "; " + script));
   bench.explorer().frame();
@@ -363,7 +363,7 @@ TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
   EXPECT_EQ(current().metadata().settings.continuityWeight, 0.7);
   EXPECT_EQ(current().data().blend, 0.1);
   EXPECT_FALSE(current().data().bounds.empty());
-  // A weight that was set earlier is ignored without weak continuity.
+  // Without weak continuity, a continuity weight that was set earlier is ignored.
   bench.run("ui click build/continuity ; ui click build/continuity/none ; ui click build/bounds");
   EXPECT_FALSE(offers("build/continuity-weight"));
   EXPECT_FALSE(offers("build/blend-width"));
@@ -372,7 +372,7 @@ TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
   EXPECT_EQ(current().data().blend, 0);
   EXPECT_TRUE(current().data().bounds.empty());
   EXPECT_EQ(current().metadata().settings.criterion, Criterion::optimal);
-  // The panel shows the parameters of the current field.
+  // The panel shows the settings of the current field.
   bench.run("build analytic:torus target-error=1e-2 continuity=exact blend-width=0.05 bounds=true");
   EXPECT_TRUE(offers("build/blend-width"));
   EXPECT_FALSE(offers("build/continuity-weight"));
@@ -390,7 +390,7 @@ TEST(Explorer, aFieldBesideHasTheSameView) {
   const auto halves = [&] {
     const render::Image frame = bench.explorer().frame();
     std::size_t differing = 0;
-    for (int y = 40; y < frame.height; ++y)  // below the names of the fields
+    for (int y = 40; y < frame.height; ++y)  // the rows above show the names of the fields
       for (int x = 1; x < 400; ++x) differing += frame.at(x, y) != frame.at(400 + x, y);
     return differing;
   };
@@ -425,7 +425,7 @@ TEST(Explorer, theFieldBesideMayDifferFromTheFieldOfColorDifference) {
     bench.run(view);
     const render::Image frame = bench.explorer().frame();
     std::size_t differing = 0;
-    for (int y = 40; y < frame.height; ++y)  // below the names of the fields
+    for (int y = 40; y < frame.height; ++y)  // the rows above show the names of the fields
       for (int x = 1; x < 400; ++x) differing += frame.at(x, y) != frame.at(400 + x, y);
     EXPECT_EQ(differing, 0u) << "left the field, right its twin, both against the sphere";
   }
@@ -444,7 +444,7 @@ TEST(Explorer, aChangedFileBesideIsReadAgain) {
   EXPECT_FALSE(same(bench.explorer().frame(), before));
   std::filesystem::remove(other);
   bench.run("color depth");
-  bench.explorer().frame();  // draws the file as it was read first
+  bench.explorer().frame();  // draws the field that was read before the file was removed
 }
 
 TEST(Explorer, aViewThatCannotBeDrawnIsReportedAndUndone) {
@@ -565,7 +565,7 @@ TEST(Explorer, framesAreTheSameOnAGraphicsDevice) {
   EXPECT_LT(differing, cpu.pixels.size() / 500);
 }
 
-/// Adds a polygon as a fan of triangles, in a draw command of its own.
+/// Adds a polygon as a triangle fan with its own draw command.
 void addFan(ImDrawList& list, const std::vector<ImVec2>& corners, ImU32 color, const ImVec4& clip) {
   ImDrawCmd command;
   command.ClipRect = clip;
@@ -581,7 +581,7 @@ void addFan(ImDrawList& list, const std::vector<ImVec2>& corners, ImU32 color, c
 
 TEST(Raster, aPixelBelongsToOneOfTheTrianglesThatShareAnEdge) {
   ImDrawList list(nullptr);
-  // The colour is half transparent, so that a pixel that is drawn twice is too dark.
+  // The colour is half transparent, so that pixels that are drawn twice become too dark.
   addFan(list, {{4, 4}, {60, 4}, {60, 60}, {4, 60}}, IM_COL32(0, 0, 0, 128), {0, 0, 64, 64});
   addFan(list, {{1, 1}, {20, 1}, {20, 20}}, IM_COL32(255, 0, 0, 255), {0, 0, 10, 64});
   ImDrawList* lists[] = {&list};
@@ -595,7 +595,7 @@ TEST(Raster, aPixelBelongsToOneOfTheTrianglesThatShareAnEdge) {
     for (int x = 0; x < 64; ++x) {
       const bool inSquare = x >= 4 && x < 60 && y >= 4 && y < 60;
       const bool inTriangle = x >= 1 && x < 10 && y >= 1 && y < x;  // below the diagonal and within the clip rectangle
-      if (y == x && x < 10) continue;  // the edge passes through these centres, so that both results are right
+      if (y == x && x < 10) continue;  // the edge passes through these pixel centres: either result is right
       const render::Color expected = inTriangle ? render::Color{255, 0, 0}
                                      : inSquare ? render::Color{100, 100, 100}
                                                 : render::Color{200, 200, 200};

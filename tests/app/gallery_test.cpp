@@ -1,4 +1,4 @@
-// The pictures that README and docs show are what their scripts make today, and slightly wrong ones are noticed.
+// Tests that the pictures in README and docs equal what their scripts draw; slightly wrong pictures must fail.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace gallery_test {
 
 constexpr const char* kBunny = "/usr/share/glmark2/models/bunny.obj";
 
-TEST(Gallery, PicturesAreWhatTheirScriptsMake) {
+TEST(Gallery, picturesAreWhatTheirScriptsMake) {
   HPSDF_REQUIRE_GL();
   if (!std::filesystem::exists(kBunny)) GTEST_SKIP() << kBunny << " is not installed (package glmark2-data)";
   const support::TemporaryDirectory folder;

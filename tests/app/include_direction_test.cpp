@@ -1,5 +1,5 @@
-// Reads the #include lines of every room and holds them against the tables of docs/design.md: which room may know
-// which, which folder of a room may know which, and that neither folders nor units include each other in a circle.
+// Compares all #include lines with the tables of docs/design.md: which top-level folder and which subfolder may include
+// which. Neither folders nor units (a header with its .cpp) may include each other in a cycle.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ constexpr std::size_t kMostFilesInAppItself = 4;
 
 bool isRoom(std::string_view name) { return std::find(kRooms.begin(), kRooms.end(), name) != kRooms.end(); }
 
-/// Whether a file of room `from` may include one of room `to`.
+/// Returns true if a file in the top-level folder `from` may include a file in the top-level folder `to`.
 bool mayInclude(std::string_view from, std::string_view to) { return from == to || to == "core" || from == "app"; }
 
 struct Include {
@@ -49,8 +49,8 @@ std::vector<std::string> parts(const fs::path& path) {
   return result;
 }
 
-/// The file that an include of ours means, relative to the repository: "hpsdf/…" are public headers, "../…" is relative
-/// to the file itself, ROOM/… starts at the root, and all else is a private header of the file's own room.
+/// Returns the included file's path in the repository: "hpsdf/…" is a public header, "../…" is relative to `file`,
+/// "core/…" and the like start at the root, and any other path is a private header in the top-level folder of `file`.
 fs::path target(const fs::path& file, const std::string& include) {
   const auto names = parts(include);
   if (names[0] == "hpsdf") {
@@ -76,7 +76,7 @@ bool isGraphics(const std::string& include) {
                      [&](std::string_view name) { return include.starts_with(name); });
 }
 
-/// The fault of an include of `file` (relative to the repository, in a room); empty if there is none.
+/// Returns why `file` (a path in the repository) must not contain this #include; empty if it may.
 std::string fault(const fs::path& file, const Include& include) {
   const std::string room = *parts(file).begin();
   const bool isPublic = parts(file).at(1) == "include";
@@ -101,7 +101,7 @@ void forEachInclude(const std::string& text, const std::function<void(int, const
     if (const auto include = parseInclude(line)) visit(number, *include);
 }
 
-/// The faults of a file's text, a line each: "path:line: include: fault".
+/// Returns the forbidden #include lines of a file's text as "path:line: include: fault".
 Lines faults(const fs::path& file, const std::string& text) {
   Lines result;
   forEachInclude(text, [&](int number, const Include& include) {
@@ -131,7 +131,7 @@ std::string read(const fs::path& file) {
   return text.str();
 }
 
-/// Files by their paths relative to the repository, with their texts.
+/// Maps the paths of source files, relative to the repository, to their texts.
 using Sources = std::map<fs::path, std::string>;
 
 Sources readSources(const fs::path& root) {
@@ -140,14 +140,14 @@ Sources readSources(const fs::path& root) {
   return sources;
 }
 
-/// A row of the folder tables of docs/design.md.
+/// A row of the tables of folders in docs/design.md.
 struct Folder {
-  std::set<std::string> mayInclude;  ///< folders of the same room, as in the table
-  std::set<std::string> headers;     ///< public headers that have no .cpp and belong to this folder
+  std::set<std::string> mayInclude;  ///< folders with the same top-level folder that this folder may include
+  std::set<std::string> headers;     ///< public headers that belong to this folder and have no .cpp
 };
 using Folders = std::map<std::string, Folder>;
 
-/// The words of a table's cell that stand in backticks.
+/// Returns the words in backticks in a cell of a Markdown table.
 std::set<std::string> quotedWords(const std::string& cell) {
   static const std::regex word("`([^`]+)`");
   std::set<std::string> words;
@@ -155,7 +155,7 @@ std::set<std::string> quotedWords(const std::string& cell) {
   return words;
 }
 
-/// Rows "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
+/// Reads table rows of the form "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
 Folders parseFolders(const std::string& design) {
   static const std::regex row(R"(^\| `((?:core|render|physics|app)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
   Folders folders;
@@ -168,7 +168,7 @@ Folders parseFolders(const std::string& design) {
   return folders;
 }
 
-/// Units: a header and the .cpp of the same name in the same room are one, named after the .cpp without its extension.
+/// Maps files to units. A header and the .cpp of the same name form a unit, named after the .cpp without extension.
 class Units {
  public:
   Units(const Sources& sources, const Folders& folders) : folders_(folders) {
@@ -184,7 +184,7 @@ class Units {
     return (found == implementations_.end() ? bare : found->second).string();
   }
 
-  /// The folder that a unit belongs to; empty for a public header that neither has a .cpp nor stands in the tables.
+  /// Returns the folder of a file's unit; empty for a public header without a .cpp that no table lists.
   std::string folderOf(const fs::path& file) const {
     const fs::path unit = unitOf(file);
     if (!isInInterface(unit)) return unit.parent_path().string();
@@ -204,7 +204,7 @@ class Units {
 
 using Graph = std::map<std::string, std::set<std::string>>;
 
-/// A circle of the graph as "a -> b -> a"; empty if there is none. Depth-first search.
+/// Finds a cycle of the graph by depth-first search and returns it as "a -> b -> a"; empty if there is none.
 std::string findCircle(const Graph& graph) {
   std::set<std::string> finished;
   Lines path;
@@ -229,10 +229,10 @@ std::string findCircle(const Graph& graph) {
   return circle;
 }
 
-/// The umbrella header includes all public headers, and nothing of ours includes it.
+/// The umbrella header hpsdf.h includes all public headers, and no other file of the library includes it.
 bool isUmbrella(const fs::path& file) { return file.filename() == "hpsdf.h"; }
 
-/// Which faults the structure of these sources has, held against the tables.
+/// Returns the violations of the design's tables: forbidden includes, cycles, and files in no listed folder.
 Lines structureFaults(const Sources& sources, const Folders& folders) {
   Lines result;
   const Units units(sources, folders);
@@ -259,7 +259,7 @@ Lines structureFaults(const Sources& sources, const Folders& folders) {
   return result;
 }
 
-/// Folders with more files than a reader takes in at a glance.
+/// Returns the folders that have too many files for a reader to survey.
 Lines crowdedFolders(const Sources& sources) {
   std::map<std::string, std::size_t> counts;
   for (const auto& [file, text] : sources) ++counts[file.parent_path().string()];
@@ -270,10 +270,10 @@ Lines crowdedFolders(const Sources& sources) {
   return result;
 }
 
-/// The units of each folder by their names.
+/// Maps each folder to the names of its units.
 using UnitsOfFolders = std::map<std::string, std::set<std::string>>;
 
-/// The lists below lines "**core/src/mesh**", whose items are "* `patches`: contents".
+/// Reads the Markdown lists below lines like "**core/src/mesh**", with items like "* `patches`: contents".
 UnitsOfFolders parseUnits(const std::string& design) {
   static const std::regex heading(R"(^\*\*([^*]+)\*\*$)"), item(R"(^\* `([^`]+)`: .*)");
   UnitsOfFolders units;
@@ -291,7 +291,7 @@ UnitsOfFolders parseUnits(const std::string& design) {
   return units;
 }
 
-/// The units that the lists lack, and those that they have too many.
+/// Returns the units that are missing in the lists, and the listed units that do not exist.
 Lines listFaults(const Sources& sources, const Folders& folders, const UnitsOfFolders& listed) {
   const Units units(sources, folders);
   UnitsOfFolders found;
@@ -376,7 +376,7 @@ TEST(IncludeDirection, acceptsASoundStructure) {
   Sources sound = sources;
   sound["core/src/mesh/mesh.cpp"] = "#include \"hpsdf/mesh.h\"\n";
   EXPECT_EQ(structureFaults(sound, parseFolders(kSampleTables)), Lines{});
-  // mesh.cpp and mesh.h are one unit, which parts.h must not be included by and include
+  // mesh.cpp and mesh.h form one unit; together with parts.h it forms a cycle.
   EXPECT_EQ(structureFaults(sources, parseFolders(kSampleTables)),
             Lines{"circle of units: core/src/mesh/mesh -> core/src/mesh/parts -> core/src/mesh/mesh"});
 }

@@ -1,4 +1,4 @@
-// Tests the explorer as the window uses it, but without a window: recordings repeat a session, and long work shows its
+// Tests the explorer's mouse and key input without a window: recordings repeat a session, and long work shows its
 // progress and can be cancelled.
 
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ using testing::HasSubstr;
 constexpr const char* kField = "build analytic:torus target-error=1e-4";
 constexpr const char* kFirst = "show size=900x560 cpu=true";
 
-/// A session with its explorer.
+/// A session and its explorer.
 class Desk {
  public:
   Desk() { run(kField); }
@@ -60,7 +60,7 @@ class Desk {
   Session session_{registry_, {in_, out_, err_}};
 };
 
-/// The scripts of the present state and all states before, the most recent first. Undoes every change.
+/// Undoes every change and returns the scripts of all states, the most recent first.
 std::vector<std::string> history(Explorer& explorer) {
   std::vector<std::string> states = {scriptOf(explorer.view())};
   while (explorer.undo()) states.push_back(scriptOf(explorer.view()));
@@ -78,7 +78,7 @@ TEST(Recording, holdsOneLinePerGesture) {
   EXPECT_EQ(recording.lines(), 2u) << recording.script();
   desk.press(1);
   desk.move(470, 300);
-  desk.explorer().input({.kind = Input::Kind::wheel, .turn = 1});  // a line of another kind within the same gesture
+  desk.explorer().input({.kind = Input::Kind::wheel, .turn = 1});  // another command within the gesture
   desk.move(480, 300);
   desk.release(1);
   EXPECT_EQ(recording.lines(), 5u) << recording.script();
@@ -117,7 +117,7 @@ TEST(Recording, theFramesSizeIsNotUndone) {
   EXPECT_FALSE(desk.explorer().canUndo());
 }
 
-/// Moves the mouse to a random widget and uses it.
+/// Moves the mouse to a random widget and clicks, drags or types there.
 void doAnything(Desk& desk, std::mt19937& random) {
   const auto below = [&](int n) { return int(random() % unsigned(n)); };
   std::vector<std::string> targets;
@@ -166,7 +166,7 @@ TEST(Recording, randomInputReplaysToTheSameFrameAndHistory) {
     std::mt19937 random(seed);
     for (int i = 0; i < 60; ++i) try {
         doAnything(desk, random);
-      } catch (const Error&) {  // a value out of range, which a window shows as an error
+      } catch (const Error&) {  // a value out of range; the window would show this error
       }
     desk.explorer().releaseInput();
     for (bool drawn = false; !drawn;) try {
@@ -185,7 +185,7 @@ TEST(Recording, randomInputReplaysToTheSameFrameAndHistory) {
     EXPECT_EQ(history(desk.explorer()), history(again.explorer())) << recording.script();
     lines += recording.lines();
   }
-  EXPECT_GT(lines, 100u);  // otherwise the test has tested nothing
+  EXPECT_GT(lines, 100u);  // ensures that the random gestures had effects
 }
 
 TEST(Recording, anotherScriptGivesAnotherFrame) {
@@ -224,7 +224,7 @@ TEST(LiveWork, showsAConstructionAndCancelsIt) {
       for (const auto& [path, widget] : widgets)
         EXPECT_EQ(widget.enabled, path == "build/cancel" || path == "canvas") << path;
       furthest = std::max(furthest, explorer.work->fraction);
-      // No other widget may have an effect during the work.
+      // During the work, no other widget has an effect.
       const ViewState before = explorer.view();
       desk.click("bar/slice");
       desk.moveTo("canvas");
@@ -248,7 +248,7 @@ TEST(LiveWork, escapeCancelsWhileThePanelIsClosed) {
   desk.explorer().frame();
   LiveWork work(desk.explorer(), [&] { desk.key(Key::escape); });
   EXPECT_THROW(desk.explorer().run("rebuild"), Cancelled);
-  // The next construction runs to its end.
+  // After the cancelled construction, the next one runs to its end.
   desk.run("settings target-error=1e-3");
   EXPECT_NO_THROW(desk.explorer().run("rebuild"));
 }

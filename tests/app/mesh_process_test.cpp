@@ -1,4 +1,4 @@
-// Mesh files from strangers: what the process that reads them answers, and what becomes of it.
+// Tests the separate process that reads untrusted mesh files: its replies, its limits and its end.
 #include "construction/mesh_process.h"
 
 #include <gmock/gmock.h>
@@ -58,7 +58,7 @@ Bytes refusalOf(std::string_view reason) {
   return bytes;
 }
 
-/// A tetrahedron, and a report in which no two numbers are the same.
+/// Returns a tetrahedron and a report whose numbers are all different, so that exchanged fields are noticed.
 ImportedMesh tetrahedron() {
   TriangleMesh mesh;
   mesh.vertices = {{5, 6, 7}, {6, 6, 7}, {5, 8, 7}, {5, 6, -0.0}};
@@ -183,11 +183,11 @@ TEST(MeshReplies, areNotBelievedForTheirChecksum) {
 TEST(MeshReplies, bringTextWithRefusalsAlone) {
   Bytes bytes = refusalOf("t.off: no mesh");
   const auto outOfMemory = std::uint64_t(MeshReply::Kind::outOfMemory);
-  std::memcpy(bytes.data() + 16, &outOfMemory, 8);  // behind magic and checksum
+  std::memcpy(bytes.data() + 16, &outOfMemory, 8);  // writes the kind, which follows the magic number and the checksum
   EXPECT_EQ(damageOf(bytes), "its counts do not fit its kind");
 }
 
-/// Counts stand where `mesh_reply.cpp` puts them: behind magic, checksum and kind.
+/// The counts of vertices and triangles follow the magic number, the checksum and the kind of the reply.
 TEST(MeshReplies, takeNoMemoryForWhatTheyPromise) {
   const auto promising = [](std::uint64_t vertices, std::uint64_t triangles) {
     Bytes bytes = replyOf(tetrahedron());
@@ -214,14 +214,14 @@ class MeshProcess : public testing::Test {
     return folder_ / name;
   }
 
-  /// A program of the shell, to be started in place of ours.
+  /// Writes a shell script that is started instead of the program that reads meshes.
   fs::path script(const std::string& lines) const {
     const fs::path file = write("reader", "#!/bin/sh\n" + lines + "\n");
     fs::permissions(file, fs::perms::owner_all);
     return file;
   }
 
-  /// "" where a mesh is read.
+  /// Returns the message of the error with which reading fails; empty if the mesh is read.
   static std::string errorOf(const fs::path& file, const ReadingLimits& limits = kPlenty,
                              const fs::path& program = HPSDF_PROGRAM) {
     try {
@@ -246,7 +246,7 @@ class MeshProcess : public testing::Test {
 constexpr std::string_view kObj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 constexpr std::string_view kOff = "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
 
-/// So many corners to and fro on a line, one face: cutting it into triangles takes the square of their number.
+/// Returns a polygon with its corners back and forth on a line: triangulating it takes quadratic time.
 std::string polygon(int corners) {
   std::ostringstream file;
   for (int i = 0; i < corners; ++i) file << "v " << (i % 2 == 0 ? corners - i : i) << " 0 0\n";
@@ -286,7 +286,7 @@ TEST_F(MeshProcess, refusesInTheSameWords) {
 }
 
 TEST_F(MeshProcess, outlivesWhatBringsAssimpDown) {
-  // its reader of JSON calls itself at each bracket, until its stack is used up
+  // assimp's JSON reader recurses at each bracket until its stack overflows.
   EXPECT_THAT(errorOf(write("t.gltf", std::string(200'000, '['))), HasSubstr("came down ("));
 }
 
@@ -309,7 +309,7 @@ TEST_F(MeshProcess, keepsItsMemory) {
               AllOf(HasSubstr("takes more than 20"), HasSubstr("HPSDF_IMPORT_BYTES")));
 }
 
-/// Wherever it runs out of it: before an allocation of assimp's, or one of Eigen's.
+/// The limit is exceeded in allocations of assimp as well as in allocations of Eigen.
 TEST_F(MeshProcess, keepsAnyLimitOfMemory) {
 #ifdef HPSDF_SANITIZED
   GTEST_SKIP() << "sanitizers take terabytes of addresses: no limit is set";
@@ -363,7 +363,7 @@ TEST_F(MeshProcess, isCancelled) {
   expectNoChild();
 }
 
-/// Programs that are not ours, as one would be that a file has had its way with.
+/// Shell scripts stand in for a reader process that a malicious mesh file has taken over.
 TEST_F(MeshProcess, believesNoAnswer) {
   const fs::path file = write("t.obj", kObj);
   const auto answer = [&](const std::string& lines, double seconds = 60) {
@@ -481,7 +481,7 @@ std::vector<Original> originals() {
           {"glb", glb()}};
 }
 
-/// One to four changes: a flipped bit, another byte, bytes left out, doubled or put in, the end cut off.
+/// Makes one to four random changes: flips a bit, or replaces, removes, duplicates, inserts or cuts off bytes.
 std::string mutated(std::string file, std::mt19937& random) {
   const auto below = [&](std::size_t end) { return std::size_t(random() % end); };
   constexpr std::string_view kOdd = "0123456789-.e \n#/,{}[]\"\xff";
@@ -510,7 +510,7 @@ std::string mutated(std::string file, std::mt19937& random) {
   return file;
 }
 
-/// HPSDF_MUTATIONS asks for another number of files, HPSDF_MUTATION_SEED for others.
+/// The environment variables HPSDF_MUTATIONS and HPSDF_MUTATION_SEED set the number of files and the random seed.
 TEST_F(MeshProcess, mutatedFilesAreMeshesOrErrorsOfOneLine) {
   const auto asked = [](const char* name, std::size_t otherwise) {
     const char* text = std::getenv(name);

@@ -1,5 +1,5 @@
 #pragma once
-// What a run of the program came to.
+// The result of a run of the program.
 
 #include <sstream>
 #include <string>
@@ -10,12 +10,12 @@
 namespace hpsdf::app {
 
 struct Outcome {
-  int status = -1;  ///< exit status; of a process of its own -signal where one ended it
+  int status = -1;  ///< exit status, or minus the number of the signal that ended the process
   std::string out;
   std::string err;
 };
 
-/// Within this process, with nothing on standard input.
+/// Runs the program's main function in this process, with empty standard input.
 inline Outcome runHere(const std::vector<std::string>& words) {
   std::istringstream in;
   std::ostringstream out, err;

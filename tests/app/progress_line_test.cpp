@@ -1,4 +1,4 @@
-// Progress on terminals and in logs, and numbers in texts.
+// Tests progress on terminals and in log files, and numbers in texts.
 #include "console/progress_line.h"
 
 #include <gmock/gmock.h>
@@ -52,7 +52,7 @@ TEST(Progress, terminalGetsOneLineThatIsErased) {
     for (int i = 0; i <= 1000; ++i) line.report("refining", i / 1000.0, start + std::chrono::milliseconds(i));
   }
   EXPECT_EQ(lineCount(out.str()), 0u);
-  EXPECT_LE(std::ranges::count(out.str(), '['), 2 * 12);  // a bar and an escape sequence each: at most 10 a second
+  EXPECT_LE(std::ranges::count(out.str(), '['), 2 * 12);  // two '[' per update, at most 10 updates a second
   EXPECT_THAT(out.str(), EndsWith("\r\x1b[K"));
 }
 

@@ -1,4 +1,4 @@
-// README shows programs and pictures that are built and compared elsewhere; here they are held to be the same ones.
+// Tests that README shows the program that the consumer test builds, and that its links lead to existing files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

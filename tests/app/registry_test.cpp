@@ -91,7 +91,7 @@ TEST(Registry, examplesAreValid) {
   std::size_t checked = 0;
   for (const Command& command : registry.commands())
     for (const std::string& example : command.examples) {
-      // Examples with quotes and pipes need a shell.
+      // Examples with quotes and pipes need a shell and are not checked.
       if (example.find_first_of("'|") != std::string::npos) continue;
       ++checked;
       if (command.includesScript) {  // the example names a file that does not exist
@@ -104,7 +104,7 @@ TEST(Registry, examplesAreValid) {
         continue;
       }
       auto words = wordsOf(example);
-      words.erase(words.begin());  // hpsdf
+      words.erase(words.begin());  // removes the program's name
       const Command& called = registry.command(words.front().text);
       words.erase(words.begin());
       EXPECT_NO_THROW(parseArguments(called, words, Origin::commandLine)) << example;
@@ -176,7 +176,7 @@ TEST(BuildArguments, targetErrorAndErrorsByDistanceExcludeEachOther) {
                Error);
 }
 
-/// Where nothing says how fine the field is to be, some memory must do.
+/// If no option limits the size of the field, a default memory limit applies.
 TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
   const auto limit = [](const std::string& more) {
     return buildOptions(parse("build", "m.obj -o f" + more)).memoryLimit;

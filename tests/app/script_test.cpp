@@ -18,7 +18,7 @@ namespace script_test {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A registry of two small commands that record their arguments.
+/// Registers a few small test commands that record their arguments.
 class Script : public testing::Test {
  protected:
   Script() {
@@ -150,7 +150,7 @@ TEST_F(Script, stopsAtTheFirstCommandThatFails) {
   EXPECT_THAT(said_, ElementsAre("[a]"));
 }
 
-/// Scripts in a folder other than the current one.
+/// The fixture for scripts that lie in another folder than the current one.
 class Include : public Script {
  protected:
   std::string at(const std::string& name) const { return (folder_ / name).string(); }
@@ -164,7 +164,7 @@ class Include : public Script {
 };
 
 TEST_F(Include, insertsTheLinesOfAnotherScript) {
-  write("b.hps", "say b $n\nset n=2 m=3");  // the file does not end in a newline
+  write("b.hps", "say b $n\nset n=2 m=3");  // the last line has no newline at its end
   EXPECT_THAT(runNamed(at("a.hps"), "say a\nset n=1\ninclude b.hps; say c $n $m\ninclude b.hps"),
               ElementsAre("[a]", "[b][1]", "[c][2][3]", "[b][2]"));
   write("empty.hps", "# nothing\n");
@@ -226,7 +226,7 @@ TEST_F(Include, hugeNumbersOfCommandsAreRefused) {
   EXPECT_EQ(complaintNamed(at("a.hps"), "include d2.hps"), "no complaint");
 }
 
-/// A truncated script or list would be taken for a complete one.
+/// Files that cannot be read to their end are refused, because a truncated script would look complete.
 TEST_F(Include, filesAreReadCompletely) {
   write("long", "");
   std::filesystem::resize_file(at("long"), kMostTextBytes + 1);
@@ -242,7 +242,7 @@ TEST_F(Include, filesAreReadCompletely) {
   std::filesystem::resize_file(at("long"), kMostTextBytes);
   EXPECT_EQ(complaintOf(at("long")), "no complaint");
   EXPECT_EQ(complaintOf("/dev/zero"), "/dev/zero: is a device; give a file");
-  // No memory is mapped at address 0 of a process.
+  // Reading /proc/self/mem fails, because no memory is mapped at address 0.
   EXPECT_EQ(complaintOf("/proc/self/mem"), "/proc/self/mem: cannot be read to its end; check where it lies");
 }
 

@@ -1,4 +1,4 @@
-// Tests the scenes of `simulate` with few bodies and short durations.
+// Tests the scenes of `hpsdf simulate` with few bodies and short durations.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -117,7 +117,7 @@ TEST(Simulate, aFilmShowsItAndChangesNothing) {
     }
     EXPECT_EQ(different.size(), 7u) << "what moves is seen to move";
 
-    // A still of the last frame, simulated on one thread, has the same pixels.
+    // The same film, simulated on one thread, has the same pixels.
     ASSERT_EQ(runHere(joined(joined(words, look), {"--fps", "8", "-o", at("again"), "--threads", "1"})).status, 0);
     for (int frame = 0; frame < 7; ++frame) {
       const std::string name = "/frame-000" + std::to_string(frame) + ".png";
@@ -177,7 +177,7 @@ TEST(Simulate, anInterruptedFilmLeavesNoPictures) {
   EXPECT_FALSE(std::filesystem::exists(output));
 }
 
-/// A cube around the origin. It is open without its last two triangles.
+/// Writes an OBJ file with a cube around the origin. An open cube lacks the last two triangles.
 std::string cubeFile(const support::TemporaryDirectory& folder, const std::string& name, double side, bool open) {
   const std::string file = (folder / name).string();
   std::ofstream out(file);
@@ -197,7 +197,7 @@ TEST(Simulate, lostAndWaitingBodiesAreReported) {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return Json::parse(outcome.out);
   };
-  // With steps of one second the cloth passes through the ground and the table.
+  // With time steps of one second, the cloth passes through the ground and the table.
   std::vector<std::string> words = {"simulate",  "cloth", "--nodes",        "16",   "--rate",   "1",
                                     "--seconds", "20",    "--target-error", "1e-3", "--points", "100"};
   EXPECT_EQ(figures(words)["lost"], 1);
@@ -238,7 +238,7 @@ void refused(const std::vector<std::string>& words, const std::string& message) 
   std::istringstream lines(outcome.err);
   int errors = 0;
   for (std::string line; std::getline(lines, line);)
-    if (line.find(" %, ") == std::string::npos) ++errors;  // lines with % report progress
+    if (line.find(" %, ") == std::string::npos) ++errors;  // lines with a percentage report progress
   EXPECT_EQ(errors, 1) << outcome.err;
 }
 
@@ -252,8 +252,8 @@ TEST(Simulate, aCacheWithAnotherFieldIsRefused) {
   ASSERT_EQ(runHere(words(cache, "1e-2")).status, 0);
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(cache)) files.push_back(entry.path());
-  ASSERT_EQ(files.size(), 2u);  // ground and table
-  // Any other target error needs another field.
+  ASSERT_EQ(files.size(), 2u);  // the fields of the ground and the table
+  // Each target error has its own field in the cache, however small the difference.
   ASSERT_EQ(runHere(words(cache, "1.0000001e-2")).status, 0);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(cache), {}), 4);
 
@@ -279,7 +279,7 @@ TEST(Simulate, aCacheWithAnotherFieldIsRefused) {
   refused(words("/sys", "1e-2"), "cannot be written");
 }
 
-/// Cancels the work when it reports the given task.
+/// A listener that cancels the work when it reports the given task.
 struct CancelsWhile final : WorkListener {
   explicit CancelsWhile(std::string of) : task(std::move(of)) {}
   void report(std::string_view now, double) override { reached = reached || now == task; }
@@ -321,7 +321,7 @@ TEST(Simulate, mistakesAreReportedInOneLine) {
   refused({"simulate", "poles", "-o", "x", "--seconds", "3600"}, "more than 10000 frames");
   refused({"simulate", "poles", "-o", "x.png", "--camera", "0,99,1"}, "elevation");
   refused({"simulate", "poles", "-o", "x.gif"}, "x.gif");
-  // Arguments are checked before the mesh is read, which does not exist here.
+  // Arguments are checked before the mesh is read: this mesh does not exist.
   refused({"simulate", "poles", "-o", "none/x.png", "--body", "none.obj"}, "none/x.png");
   refused({"simulate", "helix", "--ground", "builtin:torus,major=0.3,minor=0.1", "--target-error", "1e-3"},
           "builtin:torus,major=0.3,minor=0.1: nothing lies below");

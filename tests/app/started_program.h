@@ -1,5 +1,5 @@
 #pragma once
-// The program as its user meets it: started as a process of its own.
+// Starts the program as a separate process, as a user does.
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -35,17 +35,17 @@ struct Call {
   std::vector<std::string> words;
   std::string input = {};
   std::map<std::string, std::string> environment = {};
-  fs::path folder = {};        ///< to run in; the caller's when empty
-  fs::path output = {};        ///< a file that takes standard output, instead of the test
-  bool stdoutClosed = false;   ///< the reader of standard output has gone away
-  bool keepInputOpen = false;  ///< standard input is not at its end: see `Process::type`
+  fs::path folder = {};        ///< working folder; if empty, the folder of the caller
+  fs::path output = {};        ///< file to which standard output is redirected; if empty, the test reads the output
+  bool stdoutClosed = false;   ///< true if the reading end of the standard output pipe is closed
+  bool keepInputOpen = false;  ///< true if standard input stays open for `Process::type`
 };
 
 inline std::size_t lineCount(const std::string& text) {
   return static_cast<std::size_t>(std::ranges::count(text, '\n'));
 }
 
-/// The program at work. Its output is read while it runs, so that it never waits for us.
+/// A running process of the program. Its output is read continuously, so that it never blocks on a full pipe.
 class Process {
  public:
   explicit Process(const Call& call) {
@@ -66,7 +66,7 @@ class Process {
     posix_spawnattr_init(&attributes);
     sigset_t defaults;
     sigemptyset(&defaults);
-    sigaddset(&defaults, SIGINT);  // a test run in the background inherits an ignored one
+    sigaddset(&defaults, SIGINT);  // a test that runs in the background inherits an ignored SIGINT
     sigaddset(&defaults, SIGPIPE);
     posix_spawnattr_setsigdefault(&attributes, &defaults);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
@@ -99,27 +99,27 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  /// Until the first line on standard error is whole, or it has ended.
+  /// Waits for the first complete line on standard error, or for the end of the process.
   void waitForErrorLine() {
     while (outcome_.err.find('\n') == std::string::npos && readSome()) {
     }
   }
 
-  /// Until standard error holds this, or it has ended; whether it does.
+  /// Waits until standard error contains `text`; returns false if the process ends before.
   bool waitForError(const std::string& text) {
     while (outcome_.err.find(text) == std::string::npos)
       if (!readSome()) return false;
     return true;
   }
 
-  /// Until so many lines have come out, or it has ended.
+  /// Waits until `count` lines were written to standard output, or until the process ends.
   void waitForLines(std::size_t count) {
     while (lineCount(outcome_.out) < count && readSome()) {
     }
   }
 
-  /// Inputs of these tests fit into a pipe, so that this does not wait. A program that refuses its files first may
-  /// be gone before it reads any.
+  /// Writes to the program's standard input. The inputs of these tests fit into a pipe's buffer, so that this never
+  /// blocks. A program that has already ended with an error causes EPIPE, which is ignored.
   void type(const std::string& input) {
     std::signal(SIGPIPE, SIG_IGN);
     if (!input.empty() && write(in_, input.data(), input.size()) < 0 && errno != EPIPE)
@@ -141,7 +141,7 @@ class Process {
     return info.si_pid != 0;
   }
 
-  /// Sends the signal as soon as `now` is true; whether that came before its end.
+  /// Sends the signal as soon as `now` returns true; returns false if the process ended before.
   bool sendWhen(const std::function<bool()>& now, int signal) {
     while (!now()) {
       if (hasEnded()) return false;
@@ -178,7 +178,7 @@ class Process {
     return posix_spawn(&id_, HPSDF_PROGRAM, &actions, &attributes, pointers(words).data(), pointers(variables).data());
   }
 
-  /// Reads what is there; false once both streams have ended.
+  /// Reads available output; returns false if both output streams have ended.
   bool readSome() {
     pollfd streams[] = {{out_, POLLIN, 0}, {err_, POLLIN, 0}};
     if (out_ < 0 && err_ < 0) return false;

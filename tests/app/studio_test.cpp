@@ -15,7 +15,7 @@
 namespace hpsdf::app {
 namespace studio_test {
 
-constexpr double kFieldsAreGood = 1e-5;  // τ
+constexpr double kFieldsAreGood = 1e-5;  // target error τ
 
 SceneRequest inSmall(const std::string& name) {
   SceneRequest request = std::ranges::find(scenes(), name, &SceneKind::name)->defaults;
@@ -55,7 +55,7 @@ Eigen::Isometry3d meshFromWorld(const Scene& scene, std::size_t body) {
   return shape != nullptr ? shape->bodyFromMesh().inverse() * bodyFromWorld : bodyFromWorld;
 }
 
-/// Distance of a point in the world from the surface of a rigid body's collision shape.
+/// Returns the distance of a point in world coordinates from the surface of a rigid body's collision shape.
 double distanceTo(const Scene& scene, std::size_t n, const Vector3& x) {
   const btRigidBody& body = scene.world().body(n);
   if (const auto* shape = fieldShape(body)) return std::abs(shape->field().field().value(meshFromWorld(scene, n) * x));
@@ -74,10 +74,10 @@ double distanceToNodes(const btSoftBody& body, const Vector3& x) {
 
 struct Seen {
   std::set<std::size_t> bodies = {};       // indices of the rigid bodies, followed by those of the soft bodies
-  double ground = 0, rigid = 0, soft = 0;  // greatest distance of a pixel from the body that it shows
+  double ground = 0, rigid = 0, soft = 0;  // greatest distance of a pixel's point from its body
 };
 
-/// Compares the points that a picture shows with the bodies of the scene `truth`.
+/// Draws `scene` and measures how far the pixels' points are from the surfaces of the bodies in `truth`.
 Seen look(const Scene& scene, const Scene& truth) {
   render::SurfacePicture picture{.camera = {}, .width = 320, .height = 240};
   picture.camera.elevationDegrees = 50;
@@ -85,7 +85,7 @@ Seen look(const Scene& scene, const Scene& truth) {
   Studio studio(scene, "scene", picture, {.cpu = true});
   const SimulationShot shot = studio.shot();
   const physics::World& world = truth.world();
-  std::size_t ground = 0;  // index of the body whose field is traced
+  std::size_t ground = 0;  // index of the body whose field the picture traces
   while (fieldShape(scene.world().body(ground)) == nullptr ||
          &fieldShape(scene.world().body(ground))->field().field() != &shot.field ||
          !(meshFromWorld(scene, ground).linear().isIdentity(1e-9)))
@@ -97,7 +97,7 @@ Seen look(const Scene& scene, const Scene& truth) {
   for (int y = 0; y < buffers.height; ++y)
     for (int x = 0; x < buffers.width; ++x) {
       const std::size_t pixel = std::size_t(y) * buffers.width + x;
-      if (!buffers.covered(pixel) || buffers.crack[pixel] != 0) continue;  // the field has two values in a crack
+      if (!buffers.covered(pixel) || buffers.crack[pixel] != 0) continue;  // pixels at jumps of the field are skipped
       const Vector3 point = worldFromField * (render::pixelEye(view.camera, x, y, buffers.width, buffers.height) +
                                               double(buffers.distance[pixel]) *
                                                   render::pixelRay(view.camera, x, y, buffers.width, buffers.height));
@@ -121,7 +121,7 @@ TEST(Studio, everyPixelShowsTheBodyAtItsPoint) {
     const physics::World& world = scene->world();
     const Seen seen = look(*scene, *scene);
     const double pixel = kind.name == "poles" || kind.name == "slope" ? 0.08 : 0.03;
-    EXPECT_LT(seen.ground, 5e-3) << kind.name;  // the jumps of the fields are as large as this
+    EXPECT_LT(seen.ground, 5e-3) << kind.name;  // about the size of the fields' jumps
     EXPECT_LT(seen.rigid, pixel) << kind.name;
     EXPECT_LT(seen.soft, 0.15) << kind.name;
     for (std::size_t n = 0; n < world.bodies(); ++n)
@@ -156,7 +156,7 @@ TEST(CoarseMesh, removesSmallDetailOnly) {
     for (const auto& [a, b, c] : less.triangles) EXPECT_TRUE(a != b && b != c && c != a);
   }
   const TriangleMesh box = shapes::mesh("box");
-  for (const double size : {0.0, 0.5, 100.0}) {  // a box has no detail to remove, and must not lose all triangles
+  for (const double size : {0.0, 0.5, 100.0}) {  // no size may remove all of a box's triangles
     const TriangleMesh same = coarse(box, size);
     EXPECT_EQ(same.triangles.size(), box.triangles.size()) << size;
     EXPECT_EQ(signedVolume(same), signedVolume(box)) << size;

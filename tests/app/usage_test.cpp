@@ -1,4 +1,4 @@
-// Scripts that `check` runs must use every command and every control of the explorer.
+// Tests that the scripts run by `hpsdf check` use every command and every control of the explorer.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -40,7 +40,7 @@ std::vector<fs::path> scripts() {
   return found;
 }
 
-/// Maps a control to its kind: all entries of a list count as one control, and so do the rows of a table.
+/// Maps a control's path to its kind: all entries of a list count as one control, and so do all rows of a table.
 std::string controlOf(const std::string& path) {
   const std::size_t panel = path.find('/');
   if (panel == std::string::npos) return path;
@@ -53,9 +53,8 @@ std::string controlOf(const std::string& path) {
 TEST(Usage, everyCommandIsInACheckedScript) {
   const Registry registry = makeRegistry();
   const support::TemporaryDirectory folder;
-  // Scripts of `check` cannot run `check`, open a window or depend on a library that may be missing (simulate_test.cpp
-  // covers that). Commands of included scripts are checked with the including one; `include` itself is searched as
-  // text.
+  // Scripts of `check` cannot run `check` or open a window, and `simulate` needs a library that may be missing. The
+  // calls of a script contain those of included scripts, but not `include` itself; so it is searched for in the text.
   std::set<std::string> unused;
   for (const Command& command : registry.commands()) unused.insert(command.name);
   for (const char* exempt : {"check", "accept", "view", "simulate"}) unused.erase(exempt);
@@ -81,8 +80,8 @@ TEST(Usage, everyControlOfTheExplorerIsInACheckedScript) {
   }
   std::set<std::string> unused;
   std::ranges::set_difference(seen, used, std::inserter(unused, unused.end()));
-  unused.erase("build/progress");  // has no input
-  unused.erase("build/cancel");    // exists during a construction only; the tests of the window cover it
+  unused.erase("build/progress");  // shows progress and takes no input
+  unused.erase("build/cancel");    // exists only during a construction; window_test.cpp covers it
   EXPECT_THAT(unused, IsEmpty());
   EXPECT_GT(seen.size(), 60u);
   for (const char* control : {"view/cells/…", "worst/…", "build/rebuild", "canvas", "beside"})

@@ -1,4 +1,4 @@
-// Tests the window on a display of its own (Xvfb), with the mouse and keyboard events of xdotool.
+// Tests the window on a separate virtual display (Xvfb) with mouse and keyboard events from xdotool.
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -52,7 +52,7 @@ bool comesTrue(const Condition& condition) {
   return false;
 }
 
-/// Another program that runs in `folder`. Its output goes to out.txt and err.txt there.
+/// Runs another program in `folder`, with its output in out.txt and err.txt in that folder.
 class Child {
  public:
   Child(std::vector<std::string> words, const fs::path& folder, const std::string& display) : folder_(folder) {
@@ -101,7 +101,7 @@ class Child {
     status_ = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
     return true;
   }
-  /// Waits for the end. Returns the exit status, or the negative number of the signal that ended it.
+  /// Waits for the end of the process. Returns its exit status, or minus the number of the signal that ended it.
   int wait() {
     if (!comesTrue([&] { return ended(); })) ADD_FAILURE() << "does not end; it said: " << err();
     return status_.value_or(-SIGKILL);
@@ -125,7 +125,7 @@ std::string problem() {
   return support::glProblem();
 }
 
-/// An explorer that repeats the window's session step by step, in order to know the positions of its widgets.
+/// An explorer that repeats the window's session step by step, so that the positions of the widgets are known.
 class Follower {
  public:
   explicit Follower(const std::string& field) {
@@ -166,7 +166,7 @@ class WindowTest : public testing::Test {
 
   fs::path file(const std::string& name) const { return folder_ / name; }
 
-  /// Runs the program in the folder to its end.
+  /// Runs the program in the test's folder to its end and returns its exit status.
   int program(std::vector<std::string> words, const std::string& display = "") {
     words.insert(words.begin(), HPSDF_PROGRAM);
     Child child(std::move(words), folder_.path(), display);
@@ -217,7 +217,7 @@ class WindowTest : public testing::Test {
     desktop({"key", "Return"});
   }
 
-  /// Compares the display's pixels with a part of a frame, at the window's position.
+  /// Returns true if the display shows this part of a frame, pixel by pixel, at the window's position.
   bool screenShows(const render::Image& frame, const UiRect& part) {
     const std::string screen =
         contents(folder_ / "x" / "Xvfb_screen0");  // an xwd file, which begins with big-endian words
@@ -230,7 +230,7 @@ class WindowTest : public testing::Test {
     const std::size_t pixels = word(0) + 12 * word(19), line = word(12);
     for (int y = int(part.y0); y < int(part.y1); ++y)
       for (int x = int(part.x0); x < int(part.x1); ++x)
-        for (std::size_t channel = 0; channel < 3; ++channel) {  // the display stores blue first
+        for (std::size_t channel = 0; channel < 3; ++channel) {  // the display stores the blue channel first
           const char shown = screen[pixels + std::size_t(y) * line + 4 * std::size_t(x) + 2 - channel];
           if (static_cast<std::uint8_t>(shown) != frame.at(x, y)[channel]) return false;
         }
@@ -271,7 +271,7 @@ TEST_F(WindowTest, aSessionOfMouseAndKeyboardReplaysToTheSamePixels) {
   const render::Image shot = render::loadPng(file("hpsdf-0001.png"));
   EXPECT_TRUE(comesTrue([&] { return screenShows(shot, follower.canvas()); }));
   move(canvas);
-  click(follower.middleOf("view/axis"));  // opens a list, which stays open
+  click(follower.middleOf("view/axis"));  // opens a list that stays open
   ASSERT_EQ(close(), 0) << window_->err();
 
   const std::string script = contents(file("session.hps"));
@@ -321,7 +321,7 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
 TEST_F(WindowTest, anotherSizeIsRecorded) {
   ASSERT_NO_FATAL_FAILURE(open("analytic:torus"));
   desktop({"windowsize", id_, "700", "500"});
-  desktop({"key", "F12"});  // a window that is closed before its first frame has no last frame
+  desktop({"key", "F12"});  // takes a screenshot, so that the window has drawn a frame before it is closed
   ASSERT_TRUE(comesTrue([&] { return fs::exists(file("hpsdf-0001.png")); })) << window_->err();
   ASSERT_EQ(close(), 0) << window_->err();
   EXPECT_THAT(contents(file("session.hps")), HasSubstr("show size=960x640 gl=software\nshow size=700x500\n"));

@@ -7,7 +7,7 @@
 constexpr double kMajorRadius = 0.7;
 constexpr double kMinorRadius = 0.3;
 
-/// The field of a torus about the z axis, from a callable and not a mesh.
+/// Returns the field of a torus about the z axis, built from a distance function instead of a mesh.
 inline hpsdf::Field torusField() {
   const auto torus = [](const hpsdf::Vector3& x) {
     return std::hypot(std::hypot(x.x(), x.y()) - kMajorRadius, x.z()) - kMinorRadius;

@@ -9,7 +9,7 @@
 
 namespace physics = hpsdf::physics;
 
-// A ball falls into the hole of a torus that lies still, and stays there.
+// A ball falls into the hole of a fixed torus and must come to rest there.
 int main() {
   const hpsdf::Field field = torusField();
   const hpsdf::TriangleMesh mesh = hpsdf::shapes::mesh("torus,major=0.7,minor=0.3");
@@ -25,7 +25,7 @@ int main() {
                                        {.friction = 0.3, .linearDamping = 0.2, .angularDamping = 0.2});
   for (int step = 0; step < 720; ++step) world.step();
 
-  // its centre is as far from the ring's circle as both radii together
+  // The ball's centre has the distance 0.5 + kMinorRadius from the centre circle of the torus's tube.
   const hpsdf::Vector3 at = world.worldFromBody(number).translation();
   const double high = std::sqrt(std::pow(0.5 + kMinorRadius, 2) - kMajorRadius * kMajorRadius);
   if (std::hypot(at.x(), at.y()) < 0.03 && std::abs(at.z() - high) < 0.01) return 0;

@@ -9,7 +9,7 @@
 
 namespace physics = hpsdf::physics;
 
-// A ball on the ring of a torus: it touches where the ring is highest, and sinks in by a hundredth.
+// A ball touches the top of a torus and penetrates it by 0.01.
 int main() {
   const hpsdf::Field field = torusField();
   const physics::FieldCollider collider(field);

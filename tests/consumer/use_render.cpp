@@ -5,7 +5,7 @@
 
 #include "torus_field.h"
 
-// Without OpenGL, so that it runs on every machine.
+// Renders on the CPU, so that the test runs on machines without OpenGL.
 int main() {
   constexpr int kSize = 32;
   const hpsdf::Field field = torusField();
@@ -13,7 +13,7 @@ int main() {
   const auto buffers = hpsdf::render::makeCpuRenderer(field)->surface(
       {.camera = hpsdf::render::cameraOf(camera, field.domain(), kSize, kSize)}, kSize, kSize);
 
-  // along the axis of the torus: through its hole, but not past its ring
+  // The central ray runs along the axis of the torus and passes through its hole.
   const bool hole = !buffers.hit(kSize / 2 * kSize + kSize / 2);
   const auto hits = std::count_if(buffers.cell.begin(), buffers.cell.end(),
                                   [](std::uint32_t cell) { return cell != hpsdf::render::kNoCell; });

@@ -1,4 +1,4 @@
-// Queries take no memory: counted by replacing the global operator new of this program.
+// Tests that queries allocate no memory, by replacing the global operator new of this program.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ TEST(Allocations, queriesMakeNone) {
   const ExactDistance distance(mesh);
   const Field field = build(distance, domainAround(mesh), {.targetError = 1e-5}), smooth = blended(field, 0.2);
   std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> coordinate(-1.5, 1.5);  // some outside
+  std::uniform_real_distribution<double> coordinate(-1.5, 1.5);  // some points lie outside the domain
   std::vector<Vector3> points(1000);
   for (Vector3& x : points) x = {coordinate(random), coordinate(random), coordinate(random)};
   std::vector<double> values(points.size());

@@ -26,7 +26,7 @@ std::vector<Cell> cellsOf(const Field& field) {
   return cells;
 }
 
-/// Makes a random field with leaves of several depths side by side, whose cells are not cubes.
+/// Returns a random field with non-cubic cells, in which leaves of different depths are neighbours.
 Field irregular(unsigned seed) {
   return randomField(seed, {.domain = Box(Vector3(-1, -0.5, -2), Vector3(1, 1, 1)),
                             .grid = {2, 1, 3},
@@ -36,7 +36,7 @@ Field irregular(unsigned seed) {
                             .maxDegree = 5});
 }
 
-/// Draws points inside leaves and points on or close to their faces, edges and corners.
+/// Returns random points inside leaves and on or near their faces, edges and corners.
 std::vector<Vector3> pointsNearFaces(const Field& field, std::size_t count, unsigned seed) {
   const std::vector<Cell> cells = cellsOf(field);
   std::mt19937 random(seed);
@@ -55,7 +55,7 @@ std::vector<Vector3> pointsNearFaces(const Field& field, std::size_t count, unsi
   return points;
 }
 
-/// Evaluates the definition of blending over all leaves of a field. Slow and simple.
+/// Evaluates the definition of blending as a sum over all leaves of a field, slowly and simply.
 class Definition {
  public:
   Definition(const Field& field, double width) : field_(field), width_(width), cells_(cellsOf(field)) {
@@ -72,7 +72,7 @@ class Definition {
       for (int axis = 0; axis < 3 && w > 0; ++axis)
         for (int side = 0; side < 2; ++side) {
           const double delta = deltas_[n][axis][side];
-          if (delta == 0) continue;  // The face lies on the domain's boundary.
+          if (delta == 0) continue;  // faces on the domain's boundary are not blended
           const double t =
               (side == 0 ? x[axis] - cells_[n].box.min()[axis] : cells_[n].box.max()[axis] - x[axis]) / delta;
           const double s = t <= -1 ? 0 : t >= 1 ? 1 : (2 + 3 * t - t * t * t) / 4;
@@ -132,7 +132,7 @@ class Definition {
   std::vector<Deltas> deltas_;
 };
 
-/// Makes a field with so many coefficients that its lookup grid lies deeper than some leaves.
+/// Returns a random field with a lookup grid that is deeper than some of its leaves.
 Field irregularWithLookupGrid(unsigned seed) {
   return randomField(seed, {.grid = {1, 2, 1},
                             .refinement = 0.5,
@@ -163,7 +163,7 @@ TEST(Blend, equalsItsDefinition) {
   EXPECT_EQ(most, 8u) << "corners at which eight leaves meet are among the points";
 }
 
-/// The greatest differences of value and gradient between the eight neighbours of a point in floating point.
+/// The greatest differences of value and gradient among eight points that surround a point at rounding distance.
 struct Step {
   double value = 0, gradient = 0;
 };
@@ -176,7 +176,7 @@ Step greatestStep(const Field& field, const std::vector<Vector3>& points) {
     for (int corner = 0; corner < 8; ++corner) {
       Vector3 neighbour;
       for (int axis = 0; axis < 3; ++axis) {
-        // A few units in the last place, because a face may lie between two representable numbers.
+        // The offset is a few units in the last place, because a face may lie between two representable numbers.
         const double by = 1e-15 * field.domain().sizes()[axis];
         neighbour[axis] = std::clamp(x[axis] + (corner >> axis & 1 ? by : -by), field.domain().min()[axis],
                                      field.domain().max()[axis]);
@@ -186,7 +186,7 @@ Step greatestStep(const Field& field, const std::vector<Vector3>& points) {
         first = result;
         firstAt = neighbour;
       }
-      const double slope = first->gradient.dot(neighbour - firstAt);  // A steep field is not a jump.
+      const double slope = first->gradient.dot(neighbour - firstAt);  // not counted as a jump
       step.value = std::max(step.value, std::abs(result.value - first->value - slope));
       step.gradient = std::max(step.gradient, (result.gradient - first->gradient).norm());
     }
@@ -304,7 +304,7 @@ TEST(Blend, removesJumpsOutsideTheDomain) {
   const auto outside = [&] {
     std::vector<Vector3> points = pointsNearFaces(field, 5000, 13);
     for (Vector3& x : points) x.z() = -2.5;
-    std::erase_if(points, [&](const Vector3& x) {  // The gradient jumps at the domain's boundary.
+    std::erase_if(points, [&](const Vector3& x) {  // the gradient is discontinuous at the boundary of the domain
       return std::min({x.x() + 1, 1 - x.x(), x.y() + 0.5, 1 - x.y()}) < 1e-9;
     });
     return points;
@@ -355,7 +355,7 @@ TEST(Blend, worksInVeryDeepCells) {
   for (const Vector3& x : points) ASSERT_TRUE(smooth.valueAndGradient(x).gradient.allFinite());
 }
 
-/// The zones are so narrow that their width is lost in rounding at the domain's far end.
+/// The blend zones are so narrow that rounding removes their width far from the origin.
 TEST(Blend, worksInZonesWithoutWidth) {
   const Field field = irregular(20);
   for (const double width : {1e-300, 1e-17, 1e-16, 1e-15, 1e-12}) {
@@ -395,7 +395,7 @@ TEST(Blend, refusesWidthsOutOfRange) {
   for (const double width : {-0.01, 0.26, double(NAN)}) EXPECT_THROW(blended(field, width), Error) << width;
 }
 
-/// docs/accuracy.md has these figures for larger meshes.
+/// docs/accuracy.md lists the errors of blended fields of larger meshes.
 TEST(Blend, keepsTheErrorOfAMeshsField) {
   const ExactDistance distance(shapes::mesh("torus"));
   const Field field =

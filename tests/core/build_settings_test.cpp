@@ -1,4 +1,4 @@
-// The table of settings agrees with `BuildOptions` and with itself.
+// Tests that the table of settings agrees with `BuildOptions` and is consistent.
 #include "hpsdf/detail/build_settings.h"
 
 #include <gtest/gtest.h>

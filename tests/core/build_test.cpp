@@ -29,7 +29,7 @@ Box cube(double half = 1.1) { return Box(Vector3::Constant(-half), Vector3::Cons
 struct Measured {
   double rms = 0;
   double largest = 0;
-  double weightedSquare = 0;  ///< ∫ κ(Φ) (f − Φ)², at θ = 4
+  double weightedSquare = 0;  ///< ∫ κ(Φ) (f − Φ)² over the domain, with the nearness exponent θ = 4
 };
 
 template <typename Phi>
@@ -66,10 +66,8 @@ TEST(Build, sphereAndTorusAreAccurate) {
   }
 }
 
-/// The paper's variants (figs. 3 and 4): own trial samples at order 4p, and octree alone. The shell of degree 1 is the
-/// whole slope, so that h1 counts far more error than is there: a coarser target keeps it small.
-/// The decisions of the construction as counts, by the default settings and by the paper's, on a box, whose kinks want
-/// depth and whose faces want degree.
+/// The numbers of leaves, coefficients and distance evaluations must not change, with default settings and with the
+/// paper's. A box needs small cells at its edges and high degrees at its faces.
 TEST(Build, countsOfAKnownBox) {
   struct Known {
     BuildOptions options;
@@ -88,7 +86,7 @@ TEST(Build, countsOfAKnownBox) {
   }
 }
 
-/// Smooth enough for degree 30 to reach the end of double precision: the running total of the error must not.
+/// At degree 30 the fit is exact up to rounding; rounding of the running error sum must not delay the end.
 TEST(Build, roundingEndsNoConstructionLate) {
   const auto smooth = [](const Vector3& x) { return std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()) + 5; };
   const auto coefficients = [&](double target) {
@@ -118,6 +116,7 @@ TEST(Build, octreeAloneNeedsMoreCoefficients) {
     return double(s.coefficients);
   };
   EXPECT_GT(coefficients(Strategy::h2, 1e-5), 3 * coefficients(Strategy::hp, 1e-5));
+  // The estimated error of a polynomial of degree 1 is its whole slope: too large, hence the larger target error.
   EXPECT_GT(coefficients(Strategy::h1, 1e-2), 3 * coefficients(Strategy::hp, 1e-2));
 }
 
@@ -142,7 +141,7 @@ std::string fileBytes(const Field& field, const std::filesystem::path& file) {
 TEST(Build, sameBytesForAnyNumberOfThreads) {
   support::TemporaryDirectory folder;
   std::string first;
-  const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 8);  // more than there are cores
+  const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 8);
   for (const int threads : {1, 2, 3, 8}) {
     const Field field = build(torus, cube(), {.targetError = 1e-7, .threads = threads});
     const std::string bytes = fileBytes(field, folder.path() / "field.hpsdf");
@@ -153,7 +152,7 @@ TEST(Build, sameBytesForAnyNumberOfThreads) {
 
 struct Counts {
   std::size_t leaves = 0;
-  int degrees = 0;  ///< their sum
+  int degrees = 0;  ///< sum of the degrees of all leaves
   bool operator==(const Counts&) const = default;
 };
 Counts countsOf(const Field& field) {
@@ -165,7 +164,7 @@ Counts countsOf(const Field& field) {
   return counts;
 }
 
-/// The box of each leaf, and its degree and coefficients.
+/// Maps the box of each leaf to the leaf's coefficients.
 std::map<std::vector<double>, std::vector<double>> leavesOf(const Field& field) {
   std::map<std::vector<double>, std::vector<double>> leaves;
   const auto& coefficients = std::get<std::vector<double>>(field.data().coefficients);
@@ -177,7 +176,7 @@ std::map<std::vector<double>, std::vector<double>> leavesOf(const Field& field) 
   return leaves;
 }
 
-/// A construction that is ended early has taken the first steps of one that is not, whatever round they fall into.
+/// A construction with a step limit takes the same first steps as one without, even if the limit ends a parallel round.
 TEST(Build, stepsAreCountedAndLimited) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "field.hpsdf";
@@ -239,7 +238,7 @@ TEST(Build, stagesAreTheFieldsOfLimitedConstructions) {
   EXPECT_THROW(buildStages(torus, cube(), options, descending, [](const Field&) {}), Error);
 }
 
-/// The same τ gives the same cells in any unit; powers of two change no rounding, so that the match is exact.
+/// τ refers to a mesh scaled to the paper's size: scaling the shape by a power of two gives exactly the same cells.
 TEST(Build, targetErrorIsMeantAtThePapersScale) {
   const Field one = build(DistanceFunction(sphere, Source{.box = cube(1)}), cube(), {.targetError = 1e-6});
   const auto large = [](const Vector3& x) { return x.norm() - 1024; };
@@ -248,7 +247,7 @@ TEST(Build, targetErrorIsMeantAtThePapersScale) {
   EXPECT_EQ(one.data().nodes, other.data().nodes);
   EXPECT_DOUBLE_EQ(one.metadata().totalError, other.metadata().totalError);
   EXPECT_NEAR(other.metadata().rmsEstimate(other.domain()), 1024 * one.metadata().rmsEstimate(one.domain()), 1e-9);
-  // a callable that tells no box is scaled by its domain
+  // A callable without a bounding box is scaled by the size of the domain.
   const Field bare = build(large, cube(1024 * 1.1), {.targetError = 1e-6});
   EXPECT_DOUBLE_EQ(bare.metadata().referenceLength, 2048);
 }
@@ -267,12 +266,12 @@ TEST(Build, floatCoefficientsChangeTheFieldByWhatIsStated) {
 
 TEST(Build, automaticPrecisionFollowsTheTarget) {
   EXPECT_TRUE(build(sphere, cube(), {.targetError = 1e-6}).singlePrecision());
-  // RMS 1e-9 asked for: float would round by more than 1 % of that
+  // An RMS error of 1e-9 is requested; rounding coefficients to float would add more than 1 % of it.
   const auto smooth = [](const Vector3& x) { return 0.1 * x.x() * x.y() * x.z() + std::sin(x.x()) + 10; };
   EXPECT_FALSE(build(smooth, cube(), {.targetError = 1e-17, .nearness = 0}).singlePrecision());
 }
 
-/// Float where its rounding stays below a hundredth of the estimate, double from there on.
+/// Coefficients are stored as floats if the rounding error is below 1 % of the estimated error, otherwise as doubles.
 TEST(Build, automaticPrecisionComparesRoundingWithTheEstimate) {
   const auto smooth = [](const Vector3& x) { return std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()); };
   int floats = 0, doubles = 0;
@@ -290,7 +289,7 @@ TEST(Build, automaticPrecisionComparesRoundingWithTheEstimate) {
   EXPECT_GT(doubles, 0);
 }
 
-/// By the estimate of build.h: 250 bytes a node, 8 a coefficient.
+/// The memory estimate of build.h is 250 bytes per node and 8 bytes per coefficient.
 TEST(Build, saysEarlyThatMemoryWillNotDo) {
   std::atomic<std::uint64_t> taken = 0;
   const auto counted = [&](const Vector3& x) {
@@ -321,8 +320,8 @@ TEST(Build, limitsHold) {
   const Field shallow = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 6, .maxDepth = 1});
   const FieldStatistics s = statistics(shallow);
   EXPECT_LE(s.depthLeaves.rbegin()->first, 1);
-  EXPECT_EQ(s.degreeLeaves.rbegin()->first, 6);    // at the depth limit only the degree can rise
-  EXPECT_GT(shallow.metadata().totalError, 1e-9);  // and it ended because nothing was left to refine
+  EXPECT_EQ(s.degreeLeaves.rbegin()->first, 6);    // at the maximum depth only the degree can increase
+  EXPECT_GT(shallow.metadata().totalError, 1e-9);  // the construction ended because no leaf could be refined further
   const Field flat = build(torus, cube(), {.targetError = 1e-6, .maxDegree = 2});
   EXPECT_EQ(statistics(flat).degreeLeaves.size(), 1u);
   const Field linear = build(torus, cube(), {.targetError = 1e-3, .strategy = Strategy::h1});
@@ -332,8 +331,8 @@ TEST(Build, limitsHold) {
   EXPECT_EQ(statistics(base).leaves, 216u);
 }
 
-/// Φ even about the centre of a single base cell: every odd shell is empty, and the embedded estimate alone would take
-/// the first one for convergence.
+/// Φ is even about the centre of the single base cell, so that coefficients of odd degree vanish; the estimator must
+/// not mistake the first vanishing degree for convergence.
 TEST(Build, symmetryDoesNotLookLikeConvergence) {
   const Field field = build(sphere, cube(), {.targetError = 1e-8, .grid = {1, 1, 1}});
   EXPECT_GT(statistics(field).leaves, 50u);
@@ -369,7 +368,7 @@ TEST(Build, bandLeavesFarCellsAlone) {
   EXPECT_LT(std::sqrt(square / count), 1e-4);
 }
 
-/// A higher θ moves the error away from the surface: at equal τ fewer coefficients, lost far away.
+/// A higher nearness exponent θ increases the error far from the surface relative to the error near it.
 TEST(Build, nearnessFavoursTheSurface) {
   const auto farOverNear = [](double nearness) {
     const Field field = build(torus, cube(), {.targetError = 1e-6, .nearness = nearness});
@@ -427,7 +426,7 @@ TEST(Build, progressRisesAndCancelStops) {
   EXPECT_THROW(build(torus, cube(), {.targetError = 1e-9}, progress), Cancelled);
 }
 
-/// One cell of a high degree has many batches of samples: cancelling does not wait for the last.
+/// A cell of high degree has many batches of samples; cancelling must not wait for the last batch.
 TEST(Build, cancelStopsWithinACell) {
   std::atomic<std::size_t> taken = 0, takenLate = 0;
   std::atomic<bool> cancel = false;

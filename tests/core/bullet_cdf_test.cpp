@@ -1,4 +1,4 @@
-// The files of writeCubicGrid as Bullet itself reads them. Built twice: Bullet comes with float and with double
+// Tests that Bullet reads the files of writeCubicGrid. Built twice, because Bullet exists with float and with double
 // scalars.
 #include <BulletCollision/CollisionShapes/btMiniSDF.h>
 #include <BulletCollision/CollisionShapes/btSdfCollisionShape.h>
@@ -19,7 +19,7 @@ namespace hpsdf {
 namespace bullet_cdf_test {
 
 constexpr bool kDouble = sizeof(btScalar) == 8;
-constexpr double kRounding = kDouble ? 1e-12 : 1e-4;  // of values and gradients of some tens
+constexpr double kRounding = kDouble ? 1e-12 : 1e-4;  // tolerance for values and gradients of some tens
 constexpr int kPoints = 5000;
 
 bool load(btMiniSDF& sdf, const std::string& bytes) { return sdf.load(bytes.data(), static_cast<int>(bytes.size())); }
@@ -28,11 +28,11 @@ btVector3 bulletVector(const Vector3& v) { return {btScalar(v.x()), btScalar(v.y
 Vector3 vector(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 
 struct Differences {
-  double value = 0, gradient = 0;  ///< RMS
+  double value = 0, gradient = 0;  ///< RMS differences
   double greatestValue = 0, greatestGradient = 0;
 };
 
-/// How far Bullet is from the field at random points, which are representable as Bullet's scalars.
+/// Returns the differences between Bullet and the field at random points that Bullet's scalar type represents exactly.
 Differences differences(const btMiniSDF& sdf, const Field& field) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(0.001, 0.999);
@@ -68,7 +68,7 @@ TEST(BulletCdf, cubicPolynomialsComeBackWithTheirGradients) {
   EXPECT_LT(found.greatestGradient, 10 * kRounding);
 }
 
-/// The test above on wrong files.
+/// Checks that the previous test detects wrong files.
 TEST(BulletCdf, wrongFilesAreSeen) {
   const Field field = oneLeafField(1, 3);
   const CubicGrid grid = sampleCubicGrid(field, {2, 3, 4});
@@ -82,7 +82,7 @@ TEST(BulletCdf, wrongFilesAreSeen) {
     std::swap_ranges(wrong.begin() + long(at), wrong.begin() + long(at + size), wrong.begin() + long(at + size));
     return wrong;
   };
-  // two nodes' distances, two nodes of the first cell, the resolution along x and y, a cell's size along them
+  // Swaps two distances, two nodes of the first cell, the resolutions in x and y, or the cell sizes in x and y.
   for (const std::string& wrong : {swapped(nodes, 8), swapped(cells + 8 * 4, 4), swapped(48, 4), swapped(60, 8)})
     EXPECT_GT(differencesOfFile(wrong, field).greatestValue, 1e-2);
 }
@@ -103,14 +103,14 @@ TEST(BulletCdf, itIsTheInterpolationThatTheCommandMeasures) {
   }
 }
 
-/// Twice as many cells an axis: a sixteenth for values, an eighth for gradients.
+/// Doubling the cells along each axis divides the error of values by 16 and the error of gradients by 8.
 TEST(BulletCdf, differencesShrinkWithTheFourthOrder) {
   const Field field = oneLeafField(3, 5);
   const auto found = [&](std::uint32_t n) {
     return differencesOfFile(fileOf(sampleCubicGrid(field, {n, n, n})), field);
   };
   std::vector<Differences> finer = {found(4), found(8)};
-  if (kDouble) finer.push_back(found(16));  // float's rounding is greater than what is left there
+  if (kDouble) finer.push_back(found(16));  // in single precision rounding would dominate
   for (std::size_t n = 1; n < finer.size(); ++n) {
     EXPECT_NEAR(finer[n - 1].value / finer[n].value, 16, 2);
     EXPECT_NEAR(finer[n - 1].gradient / finer[n].gradient, 8, 1);

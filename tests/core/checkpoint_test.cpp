@@ -1,4 +1,4 @@
-// Constructions that are interrupted and taken up again.
+// Tests constructions that are interrupted and resumed from a checkpoint.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -30,7 +30,7 @@ namespace checkpoint_test {
 
 namespace fs = std::filesystem;
 
-/// Two spheres, between which the distance has a kink.
+/// Signed distance to two spheres; it has a kink halfway between them.
 double spheres(const Vector3& x) {
   return std::min((x - Vector3(0.5, 0.1, 0)).norm() - 0.4, (x + Vector3(0.5, 0, 0.2)).norm() - 0.35);
 }
@@ -54,15 +54,15 @@ std::string bytesOf(const Field& field, const fs::path& folder) {
   return readAll(folder / "field");
 }
 
-/// As often as the construction can.
+/// Returns settings with which the construction writes a checkpoint as often as it can.
 Checkpoint alwaysAt(const fs::path& file) { return {.file = file, .seconds = 0, .share = 1}; }
 
-/// Ends a construction once it has asked so many times whether to.
+/// Cancels a construction after it has asked `questions` times whether to end.
 Progress endingAfter(std::atomic<int>& questions) {
   return {.report = {}, .cancelled = [&questions] { return --questions < 0; }};
 }
 
-constexpr int kProbes = 4096;  // by which a distance without a fingerprint is told from another
+constexpr int kProbes = 4096;  // points at which distances without a fingerprint are compared
 
 std::vector<BuildOptions> everyWay() {
   BuildOptions paper = paperOptions();
@@ -79,19 +79,19 @@ std::vector<BuildOptions> everyWay() {
        .enrich = true,
        .coefficients = CoefficientType::float64},
       {.targetError = NearFarError{3e-4, 3e-3}, .band = 0.3},
-      {.targetError = NearFarError{3e-4, 3e-4}, .criterion = Criterion::optimal},  // puts cells aside
+      {.targetError = NearFarError{3e-4, 3e-4}, .criterion = Criterion::optimal},  // defers refinement of some leaves
       {.targetError = 0, .maxError = 0.02},
       {.targetError = 1e-5, .maxError = 0.02, .band = 0.2},
       {.targetError = 0, .grid = {3, 3, 3}, .maxError = 0.01, .maxBytes = 150000},
       {.targetError = 0, .maxBytes = 200000, .criterion = Criterion::optimal},
       {.targetError = 1e-5, .nearnessKind = NearnessKind::exponential, .estimator = Estimator::residual},
       {.targetError = 1e-5, .continuityWeight = 0.1, .blend = 0.1, .bounds = true},
-      {.targetError = 1e-6, .grid = {17, 17, 17}, .maxSteps = 40},  // base cells in two parts
+      {.targetError = 1e-6, .grid = {17, 17, 17}, .maxSteps = 40},  // base cells in two batches
   };
 }
 
-/// From the first state to the end, at random moments and with random numbers of threads; more than once. Every state
-/// on the way is, to the byte, one of those of a construction in one go: running sums and lists too.
+/// Interrupts a construction at random moments and resumes it with random numbers of threads until it ends. Each of its
+/// checkpoints equals, byte by byte, a checkpoint of the construction without interruption.
 TEST(Checkpoint, whateverIsInterruptedEndsWithTheSameBytes) {
   support::TemporaryDirectory folder;
   std::mt19937_64 random(7);
@@ -130,7 +130,7 @@ TEST(Checkpoint, whateverIsInterruptedEndsWithTheSameBytes) {
   }
 }
 
-/// Once more after the end: the last state gives the field without a step.
+/// The checkpoint of a finished construction gives the field without another step.
 TEST(Checkpoint, whatWasDoneIsNotDoneAgain) {
   support::TemporaryDirectory folder;
   std::atomic<int> calls = 0;
@@ -151,7 +151,7 @@ TEST(Checkpoint, whatWasDoneIsNotDoneAgain) {
   EXPECT_TRUE(bytesOf(again, folder.path()) == bytesOf(first, folder.path()));
 }
 
-/// What a construction is, and how it is refused when it is not the one that was interrupted.
+/// Fixture: an interrupted construction, whose checkpoint is then altered or resumed with other inputs.
 class Refused : public testing::Test {
  protected:
   void SetUp() override {
@@ -171,7 +171,7 @@ class Refused : public testing::Test {
   }
   fs::path file() const { return folder_ / "state"; }
 
-  /// The message of the error that ends it before anything is built; empty where the construction goes on.
+  /// Returns the error that refuses the checkpoint before anything is built; empty if the construction resumes.
   std::string refusal(const DistanceFunction& phi, const Box& domain, const BuildOptions& options,
                       const std::string& about = "") {
     Checkpoint checkpoint = alwaysAt(file());
@@ -235,10 +235,10 @@ TEST_F(Refused, areFilesThatAreNoStates) {
   EXPECT_TRUE(holds(refusalOf("solid cube\nfacet normal 0 0 1\n"), "is no checkpoint"));
   EXPECT_TRUE(holds(refusalOf(""), "is no checkpoint"));
   std::string bytes = state_;
-  bytes[8] = 9;  // after the magic
+  bytes[8] = 9;  // follows the magic number
   EXPECT_TRUE(holds(refusalOf(bytes), "version 9"));
   bytes = state_;
-  bytes[16] = '7';  // the program's version follows the length of its text
+  bytes[16] = '7';  // the version text follows its length
   EXPECT_TRUE(holds(refusalOf(bytes), "of hpsdf 7"));
   fs::remove(file());
   fs::create_directory(file());
@@ -261,14 +261,14 @@ TEST_F(Refused, areTruncatedAndAlteredStates) {
   EXPECT_EQ(refusalOf(state_), "");
 }
 
-/// With a right checksum whatever is in it: refused, or a construction that ends in one of the known ways.
+/// Random changes with a corrected checksum are refused, or the construction ends as usual; it must not crash.
 TEST_F(Refused, forgedStatesDoNoHarm) {
   std::mt19937_64 random(3);
   int refused = 0;
   constexpr int kForged = 200;
   for (int n = 0; n < kForged; ++n) {
     std::string bytes = state_;
-    const std::size_t from = n < kForged / 2 ? 80 : bytes.size() - 300;  // numbers and first cells; lists of cells
+    const std::size_t from = n < kForged / 2 ? 80 : bytes.size() - 300;  // settings and first cells, or lists of cells
     for (int changes = 1 + static_cast<int>(random() % 3); changes-- > 0;)
       bytes[from + random() % 200] = char(random() % 2 == 0 ? random() : random() % 9);
     const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
@@ -295,13 +295,13 @@ TEST(Checkpoint, timesOutOfRangeAreRefused) {
   EXPECT_THROW(buildResumably(spheres, cube(), {.targetError = 1e-3}, {.file = folder / "none" / "state"}), Error);
 }
 
-/// Core leaves the signal to its caller.
+/// Limits the size of files, like a full disk, and ignores SIGXFSZ, which the library leaves to the program.
 support::ShortFiles shortFiles(rlim_t bytes) {
   std::signal(SIGXFSZ, SIG_IGN);
   return support::ShortFiles(bytes);
 }
 
-/// How often it is tried to keep the state of one and the same construction.
+/// Returns how often the construction tries to write a checkpoint; every attempt fails because of the size limit.
 int attempts(const Checkpoint& checkpoint) {
   const support::ShortFiles limit = shortFiles(1000);
   int failures = 0;
@@ -348,7 +348,7 @@ TEST(Checkpoint, aFullDiskLeavesTheOlderStateAndTheConstruction) {
   EXPECT_TRUE(bytesOf(field, folder.path()) == bytesOf(build(spheres, cube(), options), folder.path()));
 }
 
-/// The number of a process that is no more.
+/// Returns the id of a process that has ended.
 pid_t pastProcess() {
   const pid_t child = fork();
   if (child == 0) _exit(0);
@@ -366,7 +366,7 @@ TEST(OutputFile, leftoversOfKilledProcessesAreRemoved) {
   const pid_t past = pastProcess();
   leftover("out", past, "-0");
   leftover("out", past, "-17");
-  leftover("out", getpid(), "-999999");  // of one that had our number
+  leftover("out", getpid(), "-999999");  // from an earlier process with our id
   const std::string running = leftover("out", getppid(), "-0"), other = leftover("out.txt", past, "-0"),
                     foreign = leftover("out", past, "x");
   OutputFile ours(folder / "out");
@@ -379,11 +379,11 @@ TEST(OutputFile, leftoversOfKilledProcessesAreRemoved) {
   EXPECT_NO_THROW(OutputFile::removeAbandoned(folder / "none" / "out"));
 }
 
-/// A name may have 255 bytes, and leaves no room for more.
+/// A file name has at most 255 bytes, so that a suffix does not fit behind the longest names.
 TEST(OutputFile, longNamesHaveShortTemporaryOnes) {
   support::TemporaryDirectory folder;
   std::string letters;
-  for (int i = 0; i < 127; ++i) letters += "\u00e4";  // two bytes each
+  for (int i = 0; i < 127; ++i) letters += "\u00e4";  // "ä" has two bytes in UTF-8
   for (const std::string& name : {std::string(255, 'n'), letters}) {
     OutputFile whole(folder / name);
     whole.write("whole");
@@ -406,7 +406,7 @@ TEST(OutputFile, longNamesHaveShortTemporaryOnes) {
   }
 }
 
-/// In a container the next process often has the number of the one that was killed.
+/// In a container, the next process often has the same id as the process that was killed.
 TEST(OutputFile, aTakenTemporaryNameIsNoObstacle) {
   support::TemporaryDirectory folder;
   unsigned next = 0;

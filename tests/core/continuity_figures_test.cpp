@@ -1,4 +1,4 @@
-// Jumps, errors and bytes of weakly continuous fields of a scanned mesh.
+// Tests jumps, errors and sizes of weakly continuous fields of a scanned mesh.
 
 #include <gtest/gtest.h>
 

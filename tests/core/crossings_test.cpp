@@ -1,4 +1,4 @@
-// Tests of self-intersections: against separating axes in integer arithmetic, and on meshes with known crossings.
+// Tests of self-intersections: compared with the separating-axis theorem in integer arithmetic, and on known meshes.
 
 #include "hpsdf/detail/crossings.h"
 
@@ -30,8 +30,8 @@ IntegerPoint cross(const IntegerPoint& a, const IntegerPoint& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// Returns true if a plane separates two convex sets, which are triangles or segments. Only the normals that the
-/// separating-axis theorem names have to be tried.
+/// Returns true if a plane separates two convex sets, each a triangle or a segment. By the separating-axis theorem only
+/// finitely many normals have to be tried.
 bool areSeparate(const std::vector<IntegerPoint>& one, const std::vector<IntegerPoint>& other) {
   std::vector<IntegerPoint> normals, edges, directions;
   for (const auto* set : {&one, &other}) {
@@ -78,7 +78,7 @@ class GridPairs {
     return {x, y, z};
   }
 
-  /// Different grid points, of which the first three and those that `second` selects form triangles with an area.
+  /// Returns different grid points. The first three, and the three with the indices `second`, form proper triangles.
   std::vector<IntegerPoint> points(std::size_t count, std::array<std::uint32_t, 3> second) {
     for (;;) {
       std::vector<IntegerPoint> all;
@@ -99,8 +99,8 @@ class GridPairs {
 
 bool intersects(const TriangleMesh& mesh) { return !findCrossings(mesh).found.empty(); }
 
-/// Compares `findCrossings` with expected(corners) on random pairs of triangles: the first three of `count` points, and
-/// those that `second` selects. Returns the number of pairs that intersect.
+/// Compares `findCrossings` with `expected` on random pairs of triangles: one has the first three of `count` points as
+/// corners, the other one the points with the indices `second`. Returns the number of pairs that intersect.
 template <typename Expected>
 int countIntersecting(std::size_t count, std::array<std::uint32_t, 3> second, const Expected& expected) {
   GridPairs pairs;
@@ -140,9 +140,9 @@ TEST(Crossings, ofNeighboursAtAnEdgeAreFoldedFlat) {
 }
 
 TEST(Crossings, areDecidedWithoutRounding) {
-  // Points far from the origin lie one unit in the last place above a plane, in it and below it.
+  // Three points far from the origin span a plane; points are tested one unit in the last place above, in and below it.
   const Vector3 a(1e6, 1e6 + 1, 1e6), b(1e6 + 3, 1e6, 1e6 + 1), c(1e6 + 1, 1e6 + 5, 1e6 + 2);
-  const Vector3 inPlane = a + 0.5 * (b - a) + 0.25 * (c - a);  // a multiple of 1/4 in each coordinate
+  const Vector3 inPlane = a + 0.5 * (b - a) + 0.25 * (c - a);  // exact, because each coordinate is a multiple of 1/4
   EXPECT_EQ(surface::orientation(a, b, c, inPlane), 0);
   for (int k = 0; k < 3; ++k) {
     Vector3 above = inPlane, below = inPlane;

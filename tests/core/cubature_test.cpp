@@ -16,7 +16,7 @@ double integral(const basis::Cubature& rule, int i, int j, int k) {
   return sum;
 }
 
-/// ∫ x^i over [-1, 1]
+/// Returns ∫ x^i dx over [-1, 1].
 double exact(int i) { return i % 2 == 0 ? 2.0 / (i + 1) : 0; }
 
 TEST(CompactCubature, integratesUpToItsOrderAndNoFurther) {

@@ -16,7 +16,7 @@
 namespace hpsdf {
 namespace cubic_grid_test {
 
-/// Reads numbers from the bytes of a file.
+/// Reads numbers one after the other from the bytes of a file.
 class Reader {
  public:
   explicit Reader(const std::string& bytes) : rest_(bytes) {}
@@ -46,12 +46,12 @@ class Reader {
   std::string_view rest_;
 };
 
-/// Positions of a cell's nodes in thirds of its edges, in the order that the loaders of the files expect.
+/// Positions of a cell's nodes in thirds of its edges, in the order of the file format.
 constexpr int kNodePositions[32][3] = {
     {0, 0, 0}, {3, 0, 0}, {0, 3, 0}, {3, 3, 0}, {0, 0, 3}, {3, 0, 3}, {0, 3, 3}, {3, 3, 3},   // corners
-    {1, 0, 0}, {2, 0, 0}, {1, 0, 3}, {2, 0, 3}, {1, 3, 0}, {2, 3, 0}, {1, 3, 3}, {2, 3, 3},   // along x
-    {0, 1, 0}, {0, 2, 0}, {3, 1, 0}, {3, 2, 0}, {0, 1, 3}, {0, 2, 3}, {3, 1, 3}, {3, 2, 3},   // along y
-    {0, 0, 1}, {0, 0, 2}, {0, 3, 1}, {0, 3, 2}, {3, 0, 1}, {3, 0, 2}, {3, 3, 1}, {3, 3, 2}};  // along z
+    {1, 0, 0}, {2, 0, 0}, {1, 0, 3}, {2, 0, 3}, {1, 3, 0}, {2, 3, 0}, {1, 3, 3}, {2, 3, 3},   // on edges along x
+    {0, 1, 0}, {0, 2, 0}, {3, 1, 0}, {3, 2, 0}, {0, 1, 3}, {0, 2, 3}, {3, 1, 3}, {3, 2, 3},   // on edges along y
+    {0, 0, 1}, {0, 0, 2}, {0, 3, 1}, {0, 3, 2}, {3, 0, 1}, {3, 0, 2}, {3, 3, 1}, {3, 3, 2}};  // on edges along z
 
 TEST(CubicGrid, writesTheNodesOfEachCellInTheOrderOfTheFormat) {
   const Field field = oneLeafField(1, 2);
@@ -115,7 +115,7 @@ TEST(CubicGrid, convergesWithFourthOrder) {
 }
 
 TEST(CubicGrid, convergesWithFirstOrderAtACrease) {
-  FieldData data;  // |x|; with odd numbers of cells the crease lies inside a cell
+  FieldData data;  // the function |x|; for odd n its crease lies inside a cell
   data.domain = Box(Vector3(-1, 0, 0), Vector3(1, 1, 1));
   data.grid = {2, 1, 1};
   data.nodes = {node::leaf(1, 0), node::leaf(1, 4)};

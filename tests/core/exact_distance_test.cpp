@@ -57,8 +57,8 @@ Triangle cornersOf(const TriangleMesh& mesh, std::size_t triangle) {
   return {mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]};
 }
 
-// --- Reference for one triangle: the normal equations of the plane, or the nearest edge, in 113 bits, so that the
-// --- determinant of a sliver of thickness 1e-12 keeps enough digits.
+// --- Reference distance to one triangle: by the normal equations of its plane, or to its nearest edge, with 113-bit
+// --- mantissas, so that the determinant of a sliver of thickness 1e-12 keeps enough digits.
 
 __extension__ using Quad = __float128;
 using QuadVector = std::array<Quad, 3>;
@@ -86,7 +86,7 @@ double triangleReference(const Vector3& point, const Triangle& corners) {
   if (determinant > 0) {
     Quad u = 0, v = 0;
     QuadVector rest = from;
-    for (int step = 0; step < 3; ++step) {  // iterative refinement: one solution is inexact on a thin triangle
+    for (int step = 0; step < 3; ++step) {  // iterative refinement, because one solution is inexact for thin triangles
       u += (ff * dot(rest, e) - ef * dot(rest, f)) / determinant;
       v += (ee * dot(rest, f) - ef * dot(rest, e)) / determinant;
       rest = plus(plus(from, -u, e), -v, f);
@@ -129,7 +129,7 @@ TEST(TriangleFrame, measuresDistancesToSlivers) {
   for (const double thickness : {1e-3, 1e-5, 1e-7, 1e-9, 1e-12})
     for (int i = 0; i < 100; ++i) {
       const Vector3 a = random.inCube(1), b = random.inCube(1);
-      // The apex lies beside any position on the long side, including its ends.
+      // The apex of the sliver lies beside any position on its long side, including the ends.
       const double t = i % 4 == 0 ? 0.0 : i % 4 == 1 ? 1.0 : random.between(0, 1);
       const Vector3 c = a + t * (b - a) + thickness * random.inCube(1);
       ASSERT_NO_FATAL_FAILURE(expectDistancesAround({a, b, c}, random));
@@ -187,7 +187,7 @@ TriangleMesh sphere(int subdivisions) {
   return mesh;
 }
 
-/// A box around the origin with these half sizes. The index of a vertex is x + 2y + 4z with x, y, z in {0, 1}.
+/// Returns a box around the origin with half edge lengths `half`; a vertex's index has one bit per axis, x first.
 TriangleMesh box(const Vector3& half) {
   TriangleMesh mesh;
   mesh.name = "box";
@@ -248,7 +248,7 @@ void inTwoThreads(std::size_t count, Function function) {
   other.join();
 }
 
-/// Options for meshes that are not closed: distances to triangles only, without surfaces that close holes.
+/// Uses pseudonormals as the inside test, so that meshes may be open: holes are not closed by additional surfaces.
 const DistanceOptions kByNormals{.insideTest = InsideTest::pseudonormal};
 
 void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& points) {
@@ -265,7 +265,7 @@ void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& poin
     const double expected = std::sqrt(nearest[i].first);
     ASSERT_NEAR(std::abs(closest.signedDistance), expected, 1e-12 * expected + rounding) << points[i].transpose();
     ASSERT_EQ(std::bit_cast<std::uint64_t>(batch[i]), std::bit_cast<std::uint64_t>(closest.signedDistance));
-    // The distances to the reported triangle and to the reported point do not depend on frames.
+    // The reference is computed from the triangle's corners, independently of TriangleFrame.
     const double reference = triangleReference(points[i], cornersOf(mesh, closest.triangle));
     const double coordinates = rounding + 1e-15 * points[i].cwiseAbs().maxCoeff();
     ASSERT_NEAR(std::abs(closest.signedDistance), reference, 1e-12 * reference + coordinates) << points[i].transpose();
@@ -273,7 +273,7 @@ void expectBruteForce(const TriangleMesh& mesh, const std::vector<Vector3>& poin
   }
 }
 
-/// Points in and around the domain, near the surface at several distances, and on faces, edges and vertices.
+/// Returns points in and around the domain, at several distances from the surface, and on faces, edges and vertices.
 std::vector<Vector3> probes(const TriangleMesh& mesh, std::size_t count, std::uint64_t seed) {
   Random random(seed);
   const Box bounds = boundingBox(mesh);
@@ -335,7 +335,7 @@ TEST(ExactDistance, equalsBruteForceFarFromTheOrigin) {
   const std::vector<Vector3> points = probes(mesh, 2000, 14);
   expectBruteForce(mesh, points);
   const ExactDistance moved(mesh);
-  // Coordinates of 2e4 are spaced by 4e-12: the sign is undefined within that distance of the surface.
+  // Coordinates of 2e4 are spaced by 4e-12: rounding decides the sign within that distance of the surface.
   for (const Vector3& x : points) EXPECT_NEAR(moved(x), atOrigin(x - shift), 2e-11);
 }
 
@@ -359,14 +359,14 @@ TEST(ExactDistance, equalsBruteForceFarAway) {
   for (const double far : {1e2, 1e5, 1e8, 1e20, 1e60})
     for (int i = 0; i < 50; ++i) {
       const Vector3 x = random.inCube(1).normalized() * far;
-      // Beyond about 1e15 times the size all triangles are equally near, and the sign is that of any of them.
+      // Beyond about 1e15 mesh sizes, rounding makes all triangles equally near, and the sign is arbitrary.
       EXPECT_NEAR(far < 1e10 ? distance(x) : std::abs(distance(x)), far - 1, 1e-14 * far + 0.06);
       EXPECT_EQ(distance.closestPoint(x).triangle, bruteForce(framesOf(mesh), x).second);
     }
 }
 
-// Boxes that overlap completely, or shrink by a factor from triangle to triangle, have no good splitting plane. The
-// depth of the hierarchy must stay bounded.
+// Triangles with equal boxes, or each smaller than the previous one by a constant factor, have no good splitting plane.
+// The depth of the hierarchy must stay bounded.
 TEST(ExactDistance, handlesStacksOfEqualTriangles) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -388,9 +388,7 @@ TEST(ExactDistance, handlesTrianglesThatShrinkByAFactor) {
   expectBruteForce(mesh, probes(mesh, 2000, 17));
 }
 
-// --- Signs
-
-/// The centers of many triangles differ by less than the smallest divisor in single precision.
+/// The centers of many triangles are so close together that dividing by their extent overflows in single precision.
 TEST(ExactDistance, handlesClustersTooSmallForBinning) {
   for (const double size : {1e-37, 1e-38, 1e-39, 1e-41, 1e-44}) {
     TriangleMesh mesh;
@@ -416,6 +414,8 @@ TEST(ExactDistance, acceptsAnyFiniteCoordinates) {
       EXPECT_EQ(ExactDistance(mesh).source().faces, mesh.triangles.size());
     }
 }
+
+// --- Signs
 
 TEST(ExactDistance, equalsTheSignedDistanceOfABox) {
   const Vector3 half(1, 0.5, 0.25);
@@ -451,12 +451,12 @@ TEST(ExactDistance, reportsFeatureAndLowestTriangle) {
   const ClosestPoint edge = distance.closestPoint({0.5, 2, 2});
   EXPECT_EQ(edge.feature, Feature::edge);
   EXPECT_EQ(edge.point, Vector3(0.5, 1, 1));
-  EXPECT_EQ(edge.triangle, 3u);  // triangles 3 and 6 share the edge
+  EXPECT_EQ(edge.triangle, 3u);  // the lower index of the edge's triangles, 3 and 6
   const ClosestPoint vertex = distance.closestPoint({-2, -2, -2});
   EXPECT_EQ(vertex.feature, Feature::vertex);
   EXPECT_EQ(vertex.point, Vector3(-1, -1, -1));
   EXPECT_EQ(vertex.triangle, 0u);
-  const ClosestPoint center = distance.closestPoint({0, 0, 0});  // all twelve triangles are equally near
+  const ClosestPoint center = distance.closestPoint({0, 0, 0});  // equally far from all twelve triangles
   EXPECT_EQ(center.triangle, 0u);
   EXPECT_EQ(center.signedDistance, -1);
 }
@@ -476,7 +476,7 @@ TEST(ExactDistance, hasTheRightSignForRandomTetrahedra) {
   }
 }
 
-/// The prism over a triangle whose first corner, on the z axis, has this angle.
+/// Returns a prism over a triangle. Its edge on the z axis has the dihedral angle `angle`, in radians.
 TriangleMesh wedge(double angle) {
   TriangleMesh mesh;
   mesh.name = "wedge";
@@ -490,7 +490,7 @@ TEST(ExactDistance, hasTheRightSignAtDihedralWedges) {
   Random random(23);
   for (const double angleDegrees : {2.0, 10.0, 45.0, 90.0, 135.0, 175.0}) {
     const TriangleMesh solid = wedge(angleDegrees * std::numbers::pi / 180);
-    TriangleMesh hollow = solid;  // in the reversed prism the same edges are reentrant
+    TriangleMesh hollow = solid;  // reversing the triangles makes the convex edges reentrant
     for (auto& triangle : hollow.triangles) std::swap(triangle[0], triangle[1]);
     const ExactDistance distance(solid), outside(hollow);
     for (int i = 0; i < 3000; ++i) {
@@ -505,7 +505,7 @@ TEST(ExactDistance, hasTheRightSignAtDihedralWedges) {
   }
 }
 
-// The apex of a deep notch is reentrant, and its boundary has saddle points. Face normals give wrong signs here.
+// A deep notch has a reentrant apex and saddle-shaped corners, where normals of single faces give wrong signs.
 TEST(ExactDistance, hasTheRightSignAtANotch) {
   TriangleMesh mesh = box(Vector3(1, 1, 1));
   mesh.vertices.push_back({0.7, 0.6, -0.9});
@@ -552,7 +552,7 @@ TEST(ExactDistance, isPositiveZeroOnTheSurface) {
   }
 }
 
-// A degenerate triangle closes a T-junction, so that the mesh is closed. The triangle must not affect any sign.
+// A degenerate triangle closes the mesh at a T-junction; the triangle must not affect any sign.
 TEST(ExactDistance, ignoresDegenerateTrianglesForSigns) {
   const Vector3 half(1, 1, 1);
   TriangleMesh mesh = box(half);
@@ -561,9 +561,9 @@ TEST(ExactDistance, ignoresDegenerateTrianglesForSigns) {
   mesh.triangles.push_back({4, 7, 8});
   mesh.triangles.push_back({4, 8, 6});
   mesh.triangles.push_back({8, 7, 6});
-  mesh.triangles.push_back({0, 0, 5});  // two equal corners
+  mesh.triangles.push_back({0, 0, 5});  // degenerate: two equal corners
   std::rotate(mesh.triangles.begin(), mesh.triangles.end() - 4,
-              mesh.triangles.end());  // the lowest indices win every tie
+              mesh.triangles.end());  // lowest indices for the new triangles, so that they win every tie
   const ExactDistance distance(mesh);
   Random random(25);
   for (int i = 0; i < 4000; ++i) {
@@ -580,7 +580,7 @@ TEST(ExactDistance, hasBothSignsAroundOneTriangle) {
   EXPECT_EQ(distance(Vector3(3, 0, 0)), 2);
 }
 
-// --- Independence of the kind of query
+// --- Results do not depend on how points are queried
 
 void expectSameBits(const std::vector<double>& a, const std::vector<double>& b) {
   ASSERT_EQ(a.size(), b.size());
@@ -592,7 +592,7 @@ TEST(ExactDistance, singleBatchedShuffledAndThreadedAgreeBitForBit) {
   const TriangleMesh mesh = sphere(4);
   const ExactDistance distance(mesh);
   std::vector<Vector3> points = probes(mesh, 6000, 30);
-  points.push_back(Vector3::Zero());  // nearly all triangles are equally near
+  points.push_back(Vector3::Zero());  // nearly all triangles are equally near to the sphere's center
   std::vector<double> single;
   for (const Vector3& x : points) single.push_back(distance(x));
 
@@ -621,7 +621,7 @@ TEST(ExactDistance, singleBatchedShuffledAndThreadedAgreeBitForBit) {
   expectSameBits(single, threaded);
 }
 
-/// Tries every instruction set of this processor, down to the scalar fallback.
+/// Tests every instruction set of this processor, down to the scalar fallback.
 TEST(ExactDistance, instructionSetsAgreeBitForBit) {
   const TriangleMesh mesh = sphere(4);
   const ExactDistance distance(mesh);
@@ -675,7 +675,7 @@ TEST(ExactDistance, acceptsNonFinitePoints) {
     }
 }
 
-/// Points near the mesh, far away and beyond single precision share packets with points that are not finite.
+/// Each SIMD packet of eight points contains a NaN and a point that is very near, far or beyond single precision.
 TEST(ExactDistance, nonFinitePointsDoNotAffectTheirPacket) {
   const ExactDistance distance(sphere(2));
   std::vector<Vector3> points;
@@ -693,7 +693,7 @@ TEST(ExactDistance, nonFinitePointsDoNotAffectTheirPacket) {
   }
 }
 
-// --- The object
+// --- Properties of the ExactDistance object
 
 TEST(ExactDistance, knowsItsSourceAndSizeAndCanBeMoved) {
   TriangleMesh mesh = sphere(2);
@@ -705,7 +705,7 @@ TEST(ExactDistance, knowsItsSourceAndSizeAndCanBeMoved) {
   EXPECT_EQ(distance.source().box.min(), Vector3(-1, -1, -1));
   EXPECT_EQ(distance.source().box.max(), Vector3(1, 1, 1));
   EXPECT_GT(distance.bytes(), mesh.triangles.size() * 9 * sizeof(double));
-  mesh = {};  // the distance must not reference it
+  mesh = {};  // the distance must not refer to the mesh
   const ExactDistance moved = std::move(distance);
   EXPECT_EQ(moved(Vector3(3, 0, 0)), 2);
   const DistanceFunction function(moved);
@@ -737,7 +737,7 @@ TEST(ExactDistance, refusesInvalidMeshes) {
   }
 }
 
-// --- Mesh files: ten thousand points each, compared with brute force
+// --- Mesh files, compared with brute force at ten thousand points each
 
 class ExactDistanceOfMeshes : public testing::TestWithParam<const char*> {};
 

@@ -37,7 +37,7 @@ void writeAll(const std::filesystem::path& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary) << bytes;
 }
 
-/// The message of the error that loading ends with; empty when it does not.
+/// Returns the message of the error with which loading fails; empty if it succeeds.
 std::string refusal(const std::filesystem::path& file) {
   try {
     load(file);
@@ -124,8 +124,8 @@ std::vector<std::string> everyKind() {
   return files;
 }
 
-/// Cut off, cut open, or with up to eight other bits, of a few bytes or of all; every place as often as another, and
-/// half of them in the header.
+/// Files are truncated, shortened in the middle, or have one to eight flipped bits. Half of the damaged positions lie
+/// in the header.
 TEST(FieldFile, twoThousandDamagedFilesOfEveryKindAreRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "damaged.hpsdf";
@@ -171,17 +171,17 @@ TEST(FieldFile, otherFilesAreNamedForWhatTheyAre) {
   EXPECT_NE(refusal(file).find("version 99"), std::string::npos);
 }
 
-/// `bytes` with a checksum that is right again.
+/// Returns `bytes` with a corrected checksum at the end.
 std::string withChecksum(std::string bytes) {
   const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
   std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
   return bytes;
 }
 
-constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8;  // bytes at the header's end
+constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8;  // bytes that versions 3 and 4 added
 
-/// As older programs wrote them: version 3 without the sign, version 2 without what came after the steps, version 1
-/// without these too.
+/// Older files end their headers earlier: version 3 before the inside test, version 2 before the settings that follow
+/// the number of steps, and version 1 before the number of steps.
 TEST(FieldFile, filesOfOlderVersionsAreRead) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "old.hpsdf";
@@ -244,7 +244,7 @@ TEST(FieldFile, continuityAndBoundsAreKept) {
   EXPECT_EQ(again.metadata().settings.continuityWeight, 3);
 }
 
-/// Blends, bounds and ways to steer that are none, with a right checksum.
+/// Invalid blend widths, bounds and settings are refused even if the checksum is right.
 TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "forged.hpsdf";
@@ -274,7 +274,7 @@ TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   EXPECT_TRUE(refused(since + kSinceVersion3, std::uint8_t{5})) << "sign";
 }
 
-/// A stranger's file with a right checksum: sizes far beyond its length must not take memory, bad nodes must not crash.
+/// Even with a right checksum, a malicious file must not cause huge allocations or crashes.
 TEST(FieldFile, forgedFilesAreRefused) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "forged.hpsdf";
@@ -286,7 +286,7 @@ TEST(FieldFile, forgedFilesAreRefused) {
     writeAll(file, withChecksum(bytes));
     return refusal(file);
   };
-  EXPECT_EQ(forge(0, whole[0]), "");  // the forger's checksum is right
+  EXPECT_EQ(forge(0, whole[0]), "");  // an unchanged file with its checksum recomputed is valid
   EXPECT_NE(forge(16, std::uint64_t{1} << 61), "");
   EXPECT_NE(forge(24, std::uint64_t{1} << 61), "");
   EXPECT_NE(forge(12, std::uint32_t{5}), "");

@@ -32,7 +32,7 @@ Vector3 randomPoint(std::mt19937_64& random, double half) {
   return {x, y, uniform(random)};
 }
 
-/// Makes two base cells along x. The first one holds 100; the second is split once, and child n holds n.
+/// Makes two base cells along x: the first has the value 100; the second is split, and its child n has the value n.
 FieldData steps() {
   FieldData data;
   data.domain = Box(Vector3(0, 0, 0), Vector3(2, 1, 1));
@@ -50,11 +50,11 @@ FieldData steps() {
 TEST(Field, cellsAreHalfOpen) {
   const Field field(steps());
   EXPECT_EQ(field.value({0.9999, 0.5, 0.5}), 100);
-  EXPECT_EQ(field.value({1.0, 0, 0}), 0);      // The face belongs to the upper cell.
+  EXPECT_EQ(field.value({1.0, 0, 0}), 0);      // A common face belongs to the upper cell.
   EXPECT_EQ(field.value({1.5, 0.2, 0.2}), 1);  // lies in child x
   EXPECT_EQ(field.value({1.2, 0.5, 0.2}), 2);  // lies in child y
   EXPECT_EQ(field.value({1.2, 0.2, 0.5}), 4);  // lies in child z
-  EXPECT_EQ(field.value({2, 1, 1}), 7);        // The domain itself is closed.
+  EXPECT_EQ(field.value({2, 1, 1}), 7);        // The domain includes its upper boundary.
   EXPECT_EQ(field.value({1.49, 0.49, 0.49}), 0);
 }
 
@@ -167,7 +167,7 @@ TEST(Field, evaluatesAtInfinityAndNan) {
 }
 
 /// The lookup grid leads to the same leaf as the descent from the base cells: on faces and corners of cells, on and
-/// beyond the domain's boundary, at depths above and below its own, for grids of any shape.
+/// beyond the domain's boundary, at depths above and below the lookup grid's, for base grids of any shape.
 TEST(Field, queriesEndInTheCellThatHoldsThePoint) {
   const auto phi = [](const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; };
   const Box domain(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2));
@@ -179,7 +179,7 @@ TEST(Field, queriesEndInTheCellThatHoldsThePoint) {
     std::uniform_real_distribution<double> coordinate(-1.6, 1.6);
     for (int n = 0; n < 20000; ++n) {
       Vector3 x(coordinate(random), coordinate(random), coordinate(random));
-      for (int axis = 0; axis < 3; ++axis)  // Half of the coordinates lie on faces.
+      for (int axis = 0; axis < 3; ++axis)  // Half of the coordinates lie on faces of cells.
         if (random() % 2 == 0)
           x[axis] = domain.min()[axis] + domain.sizes()[axis] * (eighth(random) / (8.0 * field.grid()[axis]));
       const Cell cell = field.cellAt(x);
@@ -215,7 +215,7 @@ TEST(Field, batchesAndThreadsGiveTheSameBits) {
 }
 
 /// Makes random cells of depths 0 to 5 and degrees 0 to 6. The coefficients of the last leaf end the array, so that
-/// reading beyond them is an error.
+/// AddressSanitizer reports reads beyond them.
 template <typename T>
 Field mixedField() {
   std::mt19937_64 random(5);
@@ -291,7 +291,7 @@ void expectBatchesEqualSingleQueries(const Field& field, std::span<const Vector3
   }
 }
 
-/// The test runs on every instruction set that the processor has, down to scalar code.
+/// Tests every instruction set of the processor, down to scalar code.
 TEST(Field, batchesGiveTheSameBitsOnEveryInstructionSet) {
   for (const Field& field : {mixedField<double>(), mixedField<float>()}) {
     const FieldStatistics found = statistics(field);
@@ -322,7 +322,7 @@ TEST(Field, refusesInvalidArrays) {
   refuses([](FieldData& d) { d.domain.max().x() = std::numeric_limits<double>::infinity(); });
   refuses([](FieldData& d) {
     d.domain = Box(Vector3::Constant(-1e308), Vector3::Constant(1e308));
-  });  // The size overflows.
+  });  // The domain's size overflows.
   refuses([](FieldData& d) { d.grid = {0, 1, 1}; });
   refuses([](FieldData& d) { d.nodes.back() |= std::uint64_t{30} << 40; });
   refuses([](FieldData& d) { d.nodes.front() |= std::uint64_t{1} << (node::isLeaf(d.nodes.front()) ? 62 : 32); });

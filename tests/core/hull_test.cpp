@@ -1,4 +1,4 @@
-// Tests of distances to the outer hull, to which inner walls of overlapping bodies do not belong.
+// Tests of distances to the outer hull: the surface without the walls inside a union of overlapping bodies.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -66,7 +66,7 @@ TEST(OuterHull, ofTwoBallsIsTheSurfaceOfTheirUnion) {
     }
     ++inside;
     EXPECT_NEAR(-found, depthInTwoBalls(x),
-                0.01);  // tolerance for the chords of the mesh and for remains of inner walls
+                0.01);  // tolerance: the mesh consists of flat facets, and small pieces of inner walls remain
     if (found < before - 0.05) ++deeper;
   }
   EXPECT_GT(inside, 1000u);
@@ -81,7 +81,7 @@ TEST(OuterHull, ofAMeshWithoutInnerWallsIsTheMesh) {
   for (const Vector3& x : placesIn(boundingBox(mesh), 500, 3)) EXPECT_EQ(hull(x), withoutHull(x));
 }
 
-/// Of two coplanar walls the larger one is subdivided along the edges of the smaller one.
+/// Two coplanar walls touch; the larger wall is subdivided along the edges of the smaller one.
 TEST(OuterHull, omitsTheWallBetweenTouchingBodies) {
   const TriangleMesh mesh = joined(boxOfTwo(), moved(boxOfTwo(), {1.5, 0, 0}, 0.5));
   const ExactDistance hull(mesh, kHull), withoutHull(mesh, kWinding);
@@ -102,7 +102,7 @@ TEST(OuterHull, omitsSharedWalls) {
   EXPECT_EQ(withoutHull(Vector3(1, 0.5, 0.2)), 0) << "the test has no power";
 }
 
-/// Where three walls meet, or one ends on another, the smallest pieces remain intersected but are surrounded by inside.
+/// Where three inner walls meet, the smallest pieces still intersect other walls, but have the inside all around.
 TEST(OuterHull, omitsInnerWallsWhereTheyMeet) {
   const TriangleMesh mesh = joined(joined(boxBetween({0, 0, 0}, {1, 2, 2}), boxBetween({1, 0, 0}, {2, 2, 2})),
                                    boxBetween({0, 0, 2}, {2, 2, 4}));
@@ -113,14 +113,14 @@ TEST(OuterHull, omitsInnerWallsWhereTheyMeet) {
   EXPECT_NEAR(hull(Vector3(1, 1, 2)), -1, 0.02);
 }
 
-/// A triangle that touches only the boundary of another does not subdivide it, however the neighbours are subdivided.
+/// A triangle is not subdivided by one that touches only its boundary, however their neighbours are divided.
 TEST(OuterHull, ofTouchingBodiesIsExact) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
   for (const bool rotated : {false, true}) {
     TriangleMesh mesh, box = boxBetween({0, 0, 0}, {4, 4, 4});
     for (int i = 0; i < 64; ++i) {
       const Vector3 low(i % 4, i / 4 % 4, i / 16);
-      const bool mirrored = (i + i / 4 + i / 16) % 2 != 0;  // faces are divided along the other diagonals
+      const bool mirrored = (i + i / 4 + i / 16) % 2 != 0;  // mirroring exchanges the diagonals of the faces
       TriangleMesh cube = boxBetween({0, 0, 0}, {1, 1, 1});
       if (mirrored)
         for (Vector3& x : cube.vertices) x.x() = 1 - x.x();
@@ -140,7 +140,7 @@ TEST(OuterHull, ofTouchingBodiesIsExact) {
   }
 }
 
-/// Between plates and in sharp wedges the outside is nearer to a piece than the piece is long.
+/// Between plates and in sharp wedges, points outside are closer to a piece of the surface than the piece is long.
 TEST(OuterHull, outsideDistancesAreThoseToAllTriangles) {
   const TriangleMesh plates =
       joined(joined(boxBetween({0, 0, 0}, {1000, 1000, 100}), boxBetween({0, 0, 100.2}, {1000, 1000, 200})),
@@ -194,7 +194,7 @@ TEST(OuterHull, ofOpenBodiesHasTheSignOfTheWindingNumber) {
   EXPECT_GT(deeper, 50u);
 }
 
-/// A face that no other intersects can cross the surface that closes a hole: part of it is outside.
+/// A face that no other face intersects can cross the surface that closes a hole, so that a part of it is outside.
 TEST(OuterHull, keepsFacesThatPassThroughAHole) {
   const TriangleMesh blade = moved(shapes::mesh("box,width=0.4,height=0.4,depth=2.85"), {0, 0, 0.475});
   const TriangleMesh mesh = joined(support::openBox(), blade);
@@ -230,17 +230,17 @@ TEST(OuterHull, subdividesAlongTheIntersectionOnly) {
   const TriangleMesh mesh = twoBalls();
   const TriangleMesh surface = ExactDistance(mesh, kHull).surface();
   EXPECT_LT(surface.triangles.size(), 4 * mesh.triangles.size());
-  const double area = 2 * (2 * std::numbers::pi * 1.5);  // area of two caps of height 1.5
+  const double area = 2 * (2 * std::numbers::pi * 1.5);  // two spherical caps of height 1.5
   EXPECT_NEAR(surfaceArea(surface), area, 0.02 * area);
   EXPECT_GT(surfaceArea(mesh), 1.3 * area);
   EXPECT_NEAR(surfaceArea(ExactDistance(mesh).surface()), surfaceArea(mesh), 1e-9)
       << "without a hull all triangles remain";
 }
 
-/// The hull of a mesh with holes asks for cancellation thousands of times: before, during and after the subdivision.
+/// The construction of the hull asks thousands of times whether to cancel, in all phases of its work.
 TEST(OuterHull, reportsProgressAndCanBeCancelled) {
   TriangleMesh mesh = twoBalls();
-  mesh.triangles.pop_back();  // a hole, beside which pieces are refined
+  mesh.triangles.pop_back();  // makes a hole; pieces beside it are refined
   std::map<std::string, double, std::less<>> tasks;
   std::atomic<int> asked = 0;
   const Progress telling{.report =

@@ -19,7 +19,7 @@
 namespace hpsdf {
 namespace jumps_test {
 
-/// Makes a row of unit base cells along x. With `children`, one more base cell is added that is split once.
+/// Makes unit base cells along x with these coefficients; `children` adds a base cell that is split once.
 FieldData row(const std::vector<std::vector<double>>& cells, const std::vector<std::vector<double>>& children = {}) {
   FieldData data;
   data.grid = {static_cast<std::uint32_t>(cells.size() + !children.empty()), 1, 1};
@@ -40,10 +40,10 @@ FieldData row(const std::vector<std::vector<double>>& cells, const std::vector<s
   return data;
 }
 
-// Coefficients of degree 1 multiply 1, w, v, u, local coordinates that are 2·(world − cell) − 1 in a unit cell.
+// Coefficients of degree 1 multiply 1, w, v and u, where (u, v, w) = 2·(x − corner) − 1 in a unit cell.
 
 TEST(Jumps, measuresKnownJumpsBetweenEqualCells) {
-  // The leaves hold 1 + w and 3 + 2v, so that the jump is 2 + 2v − w.
+  // The leaves have the polynomials 1 + w and 3 + 2v, so that the jump is 2 + 2v − w.
   const Jumps jumps = findJumps(Field(row({{1, 1, 0, 0}, {3, 0, 2, 0}})));
   ASSERT_EQ(jumps.interfaces.size(), 1u);
   const Interface& face = jumps.interfaces[0];
@@ -55,7 +55,7 @@ TEST(Jumps, measuresKnownJumpsBetweenEqualCells) {
   EXPECT_NEAR(face.value.max, 5, 1e-14);
   EXPECT_TRUE(face.worst.isApprox(Vector3(1, 1, 0), 1e-14)) << face.worst.transpose();
   EXPECT_TRUE(face.center.isApprox(Vector3(1, 0.5, 0.5), 1e-14));
-  // The world gradients are (0, 0, 2) and (0, 4, 0).
+  // In world coordinates, the gradients of the two polynomials are (0, 0, 2) and (0, 4, 0).
   EXPECT_NEAR(face.gradient.rms, std::sqrt(20.0), 1e-14);
   EXPECT_NEAR(face.gradient.max, std::sqrt(20.0), 1e-14);
   EXPECT_EQ(jumps.hanging, 0u);
@@ -64,9 +64,9 @@ TEST(Jumps, measuresKnownJumpsBetweenEqualCells) {
 }
 
 TEST(Jumps, measuresCurvedPolynomialsOfUnequalDegree) {
-  // The leaves hold L2(v) and 0. ∫ L2²/2 = 1/5; the jump is greatest at the edges; the gradient is (0, 2·3v, 0).
+  // The leaves are L2(v) and 0: ∫ L2²/2 = 1/5, the jump is greatest at v = ±1, and its gradient is (0, 2·3v, 0).
   std::vector<double> quadratic(10, 0.0);
-  quadratic[5] = 1;  // the coefficients are 000 001 002 010 011 020 …
+  quadratic[5] = 1;  // coefficients are ordered by degrees in u, v, w: 000 001 002 010 011 020 …
   const Jumps jumps = findJumps(Field(row({quadratic, {0}})));
   ASSERT_EQ(jumps.interfaces.size(), 1u);
   EXPECT_EQ(jumps.interfaces[0].degrees, (std::array<std::uint8_t, 2>{2, 0}));
@@ -77,7 +77,7 @@ TEST(Jumps, measuresCurvedPolynomialsOfUnequalDegree) {
 }
 
 TEST(Jumps, measuresKnownJumpsOnHangingFaces) {
-  // The left leaf holds 10 + u + v, which is 11 + v on the face; the right ones hold the constants 0 to 7.
+  // The left leaf is 10 + u + v, i.e. 11 + v on the face; the right leaves have the constant values 0 to 7.
   std::vector<std::vector<double>> children;
   for (double child = 0; child < 8; ++child) children.push_back({child});
   const Jumps jumps = findJumps(Field(row({{10, 0, 1, 1}}, children)));
@@ -109,8 +109,8 @@ TEST(Jumps, measuresKnownJumpsOnHangingFaces) {
   EXPECT_EQ(inner, 12);
 }
 
-/// The jumps between all pairs of leaves whose boxes share a rectangle, by a rule of much higher order. Slow and
-/// simple.
+/// A reference for the jump across an interface: all pairs of leaves that share a rectangle are integrated by a rule of
+/// much higher order, slowly and simply.
 struct ReferenceJump {
   Jump value, gradient;
 };
@@ -186,7 +186,7 @@ TEST(Jumps, measuresEveryInterfaceOfARandomFieldOnce) {
 }
 
 TEST(Jumps, areZeroInASmoothField) {
-  // All cells hold the function 1 + x + 2y + 3z in their local coordinates.
+  // All cells represent the same function 1 + x + 2y + 3z.
   std::vector<std::vector<double>> cells, children;
   for (int n = 0; n < 2; ++n) cells.push_back({1 + n + 0.5 + 1 + 1.5, 1.5, 1, 0.5});
   for (int n = 0; n < 8; ++n)
@@ -235,8 +235,8 @@ TEST(Jumps, areSortedAssignedToCellsAndCounted) {
   EXPECT_EQ(worstInterfaces(jumps, JumpKind::value, 1u << 30).size(), jumps.interfaces.size());
 }
 
-/// Makes leaves that hold different constants, far from the origin, so that the faces' coordinates are not
-/// representable.
+/// Makes a field whose leaves have different constants. It lies far from the origin, so that the coordinates of faces
+/// are not representable.
 Field steppedField() {
   const Vector3 corner(1e4, -3e4, 1 / 3.0);
   FieldData data =

@@ -38,7 +38,7 @@ TEST(GaussLegendre, integratesUpToItsDegreeAndNoFurther) {
       return sum;
     };
     EXPECT_NEAR(integral(0), 2, 1e-13) << n;
-    const int highest = 2 * n - 2;  // This is the highest even power within degree 2n-1.
+    const int highest = 2 * n - 2;  // the highest even power that the rule integrates exactly
     EXPECT_NEAR(integral(highest), 2.0 / (highest + 1), 1e-13) << n;
     if (n <= 8) {
       EXPECT_GT(std::abs(integral(2 * n) - 2.0 / (2 * n + 1)), 1e-9) << n;

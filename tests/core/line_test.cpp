@@ -23,7 +23,7 @@ std::vector<std::uint32_t> cellsOf(const std::vector<Piece>& pieces) {
   return cells;
 }
 
-/// Expects pieces from 0 to 1 without gaps, each in the leaf that holds its middle, and no leaf twice.
+/// Expects pieces that cover t = 0 to 1 without gaps, each in the leaf at its midpoint, and no leaf twice.
 void expectValidPieces(const Field& field, const Vector3& from, const Vector3& to) {
   const std::vector<Piece> pieces = piecesAlong(field, from, to);
   ASSERT_FALSE(pieces.empty());
@@ -79,7 +79,7 @@ TEST(Line, isCutAtTheFacesThatItCrosses) {
   }
 }
 
-/// Makes n³ base cells, one unit wide, that hold their number.
+/// Makes n³ unit base cells, each with its own number as a constant value.
 Field lattice(std::uint32_t n) {
   FieldData data;
   data.domain = Box(Vector3::Zero(), Vector3::Constant(n));
@@ -109,7 +109,7 @@ TEST(Line, continuesInTheOppositeCellAtCornersAndEdges) {
   EXPECT_EQ(cellsOf(piecesAlong(field, Vector3::Constant(5), Vector3::Zero())), diagonal);
   EXPECT_EQ(cellsOf(piecesAlong(field, Vector3::Constant(5.7), Vector3::Constant(-0.1))), diagonal)
       << "rounded differently along no axis";
-  // These segments pass through a corner at a t that is not representable.
+  // These segments pass through a corner of cells at a parameter t that is not representable.
   for (int n = 1; n < 200; ++n) {
     const Vector3 direction(1 / 3.0 * n, 1 / 7.0 * n, -1 / 11.0 * n), corner(2, 3, 2);
     const auto pieces = piecesAlong(field, corner - direction, corner + 1.7 * direction);
@@ -181,7 +181,7 @@ TEST(Line, samplesLimitsFromBothLeavesAtFaces) {
         EXPECT_GE(sample.t, line.samples[i - 1].t);
       }
       if (sample.t == piece.tEnter || sample.t == piece.tLeave) {
-        // The limit equals the field a little inside the piece.
+        // The sample's one-sided limit equals the field a little inside the piece.
         const double inwards = (sample.t == piece.tEnter ? 1 : -1) * 1e-9;
         const auto near = field.valueAndGradient(pointAt(from, to, sample.t + inwards));
         EXPECT_NEAR(sample.value, near.value, 1e-6);
@@ -207,7 +207,7 @@ TEST(Line, findsKnownJumps) {
     EXPECT_EQ(jumps[n].t, double(n + 2) / 8);
     EXPECT_EQ(jumps[n].value, 1);
   }
-  // The limits replace samples that lie on faces.
+  // Samples on faces are replaced by the limits from both sides.
   EXPECT_EQ(line.samples.size(), 2u * 6 + 2);
 }
 

@@ -1,4 +1,4 @@
-// The memory limits of control groups, read from files with the layout of Linux.
+// Tests the memory limits of Linux control groups (cgroups), read from files with the layout of /proc and /sys.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ TEST_F(ControlGroups, ofVersion1LimitTheirController) {
   EXPECT_EQ(allowed(), 4e9);
 }
 
-/// Within a container the group's own folder is invisible, and the topmost visible folder is the container's.
+/// In a container, the process's own group folder is invisible; the topmost visible folder is the container's group.
 TEST_F(ControlGroups, ofAContainerAreSeenFromWithin) {
   write("sys/fs/cgroup/memory.max", "500000000\n");
   for (const char* group : {"/", "/docker/0123", "/../other"}) {

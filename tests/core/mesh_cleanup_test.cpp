@@ -39,7 +39,7 @@ TriangleMesh cube(double halfSize = 1, const Vector3& center = Vector3::Zero()) 
   return mesh;
 }
 
-/// The mesh with three separate vertices for each triangle, as in an STL file.
+/// Returns the mesh with three separate vertices for each triangle, as in an STL file.
 TriangleMesh separated(const TriangleMesh& mesh) {
   TriangleMesh soup;
   for (const Triangle& t : mesh.triangles) {
@@ -100,8 +100,7 @@ TEST(MeshCleanup, weldsNegativeZeroWithZeroAndNothingElse) {
   for (const Vector3& v : cleaned(mesh).mesh.vertices)
     for (const double x : v) EXPECT_FALSE(std::signbit(x));
 
-  mesh.vertices[0].x() =
-      std::numeric_limits<double>::denorm_min();  // Vertex 0 is now nearly but not exactly equal to others.
+  mesh.vertices[0].x() = std::numeric_limits<double>::denorm_min();  // minimally different from vertex 0's copies
   EXPECT_EQ(cleaned(mesh).report.vertices, 5u);
 }
 
@@ -125,7 +124,7 @@ TEST(MeshCleanup, dropsFacesWithEqualCornersAndUnusedVertices) {
 
 TEST(MeshCleanup, dropsCollinearFaces) {
   TriangleMesh mesh = cube();
-  mesh.vertices.push_back({-1, -1, 0.3});  // The vertex lies on edge 0-4, which has two triangles already.
+  mesh.vertices.push_back({-1, -1, 0.3});  // The vertex lies on edge 0-4, which already has two triangles.
   mesh.triangles.push_back({0, 4, 8});
   // The second collinear triangle lies in no coordinate plane, and its middle corner is rounded.
   mesh = joined(mesh, {{{5, 0, 0}, {5.1, 0.7, 0.3}, {5 + (5.1 - 5) / 2, 0.35, 0.15}}, {{0, 1, 2}}, ""});
@@ -177,7 +176,7 @@ TEST(MeshCleanup, flipsChainsOfCollinearFaces) {
   mesh.triangles.push_back({8, 9, 6});
   mesh.triangles.push_back({9, 10, 6});
   mesh.triangles.push_back({10, 4, 6});
-  mesh.triangles.push_back({0, 9, 8});  // This triangle can be flipped only after the last one.
+  mesh.triangles.push_back({0, 9, 8});  // This triangle can be flipped only after triangle (0, 4, 9).
   mesh.triangles.push_back({9, 4, 10});
   mesh.triangles.push_back({0, 4, 9});
   ASSERT_TRUE(inspect(mesh).closed());
@@ -246,7 +245,7 @@ TEST(MeshCleanup, keepsTheFirstSideOfASurfaceModelledWithBothSides) {
     EXPECT_EQ(report.duplicateFaces, 12u);
     EXPECT_TRUE(report.closed());
   }
-  // The lid is modelled with both sides, and the edges around it would be boundary edges without it.
+  // The lid has triangles for both of its sides; without the lid, the edges around it would be boundary edges.
   TriangleMesh lid = cube(), box = cube();
   lid.triangles.erase(lid.triangles.begin(), lid.triangles.begin() + 10);
   box.triangles.resize(10);
@@ -307,7 +306,7 @@ TEST(MeshCleanup, reversesAnOpenMeshOnlyWhenItsVolumeTellsItsOrientation) {
   EXPECT_FALSE(cleaned(lidless).report.reversed);
   EXPECT_TRUE(cleaned(reversed(lidless)).report.reversed);
 
-  // Two triangles with a slight fold have a volume whose sign means nothing.
+  // The volume of two slightly folded triangles has a sign without meaning.
   for (const double fold : {-1e-3, 1e-3}) {
     const TriangleMesh sheet = {{{0, 0, 0}, {1, 0, 0}, {1, 1, fold}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, ""};
     EXPECT_FALSE(cleaned(sheet).report.reversed);

@@ -1,4 +1,4 @@
-// Tests of the defects of meshes, and of their repair by reversing faces.
+// Tests that defects of meshes are found, and that repair reverses wrongly oriented faces.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ TriangleMesh ball(const Vector3& center = Vector3::Zero(), double radius = 1) {
   return moved(shapes::mesh("builtin:sphere,subdivisions=3"), center, radius);
 }
 
-/// A Möbius strip around z of this many quadrilaterals.
+/// Returns a Möbius strip around the z axis with this number of quadrilaterals.
 TriangleMesh moebiusStrip(int pieces) {
   TriangleMesh mesh;
   for (int i = 0; i < pieces; ++i) {
@@ -50,7 +50,7 @@ TriangleMesh moebiusStrip(int pieces) {
     }
   }
   const auto corner = [&](int i, int side) {
-    return std::uint32_t(i < pieces ? 2 * i + side : 1 - side);  // the end joins the beginning upside down
+    return std::uint32_t(i < pieces ? 2 * i + side : 1 - side);  // the strip closes upside down
   };
   for (int i = 0; i < pieces; ++i) {
     mesh.triangles.push_back({corner(i, 0), corner(i + 1, 0), corner(i + 1, 1)});
@@ -103,7 +103,7 @@ TEST(MeshDefects, countCrossingsWithinOneComponent) {
   EXPECT_EQ(two.count(DefectKind::crossing), two.found.size());
   EXPECT_EQ(two.crossingsWithinComponents, 0u);
   TriangleMesh spike = ball();
-  spike.vertices[0] *= -1.5;  // a spike through the opposite side
+  spike.vertices[0] *= -1.5;  // moves a vertex through the opposite side
   const MeshDefects one = defectsOf(spike);
   EXPECT_GT(one.count(DefectKind::crossing), 0u);
   EXPECT_EQ(one.crossingsWithinComponents, one.count(DefectKind::crossing));
@@ -168,7 +168,7 @@ TEST(MeshRepair, keepsCavitiesThatTouch) {
   }
 }
 
-/// A box whose side at x = high is divided along the other diagonal than those of `boxBetween`.
+/// Returns the mesh of `boxBetween`, except that its side at x = high.x is divided along the other diagonal.
 TriangleMesh boxWithOtherDiagonal(const Vector3& low, const Vector3& high) {
   TriangleMesh mesh = boxBetween(low, high);
   std::vector<std::array<std::uint32_t, 3>*> side;
@@ -186,9 +186,8 @@ TriangleMesh boxWithOtherDiagonal(const Vector3& low, const Vector3& high) {
 TEST(MeshRepair, reversesBodiesWithDifferentlyDividedSharedWallsIndependently) {
   const TriangleMesh left = boxWithOtherDiagonal({-1, -1, -1}, {0, 1, 1}), right = boxBetween({0, -1, -1}, {3, 1, 1});
   ASSERT_NEAR(signedVolume(left), 4, 1e-12);
-  // The third box makes most faces of the mesh face outward.
   const auto welded = [](const TriangleMesh& one, const TriangleMesh& other) {
-    return cleaned(joined(joined(one, other), boxBetween({5, 0, 0}, {9, 4, 4})));  // keeps the total volume positive
+    return cleaned(joined(joined(one, other), boxBetween({5, 0, 0}, {9, 4, 4})));  // keeps the volume positive
   };
   ASSERT_EQ(inspect(welded(left, right).mesh).nonManifoldEdges, 4u);
   for (const bool leftReversed : {false, true})
@@ -203,8 +202,7 @@ TEST(MeshRepair, reversesBodiesWithDifferentlyDividedSharedWallsIndependently) {
     }
 }
 
-/// Some of the eight cubes of a larger cube, in all combinations of orientations, beside a body that is oriented
-/// outward.
+/// Two or three of a cube's eight subcubes have all combinations of orientations, beside a box oriented outward.
 TEST(MeshRepair, reversesTouchingCubesIndependently) {
   const auto lowest = [](int at) { return Vector3(at & 1, at >> 1 & 1, at >> 2); };
   for (const std::vector<int>& all :
@@ -225,7 +223,7 @@ TEST(MeshRepair, reversesTouchingCubesIndependently) {
 TEST(MeshRepair, keepsCavitiesWithAHole) {
   const TriangleMesh outer = moved(boxOfTwo(), {0, 0, 0}, 2);
   TriangleMesh lacking = boxOfTwo();
-  for (std::size_t lack = 0; lack < 2; ++lack) {  // a missing triangle, then a missing side
+  for (std::size_t lack = 0; lack < 2; ++lack) {  // removes one triangle, then the other triangle of that side
     lacking.triangles.pop_back();
     expectUnchanged(joined(outer, support::reversed(lacking)), "an open cavity within a box");
   }
@@ -263,7 +261,7 @@ TEST(MeshRepair, reversesABodyAmongTouchingBodies) {
     if (i == 13) middle = cubes.triangles.size();
     cubes = joined(cubes, boxBetween(low, low + Vector3(1, 1, 1)));
   }
-  // The middle cube touches six others, and its faces are divided along other diagonals than theirs.
+  // The middle cube touches six other cubes, whose faces are divided along the other diagonals.
   TriangleMesh inner = boxBetween({1, 1, 1}, {2, 2, 2});
   for (Vector3& x : inner.vertices) x.x() = 3 - x.x();  // mirroring orients it inward
   std::copy(inner.triangles.begin(), inner.triangles.end(),
@@ -341,7 +339,7 @@ TEST(MeshExport, isReadBackUnchanged) {
   }
 }
 
-/// assimp mistakes a line feed at the beginning of the data for a part of the header.
+/// assimp takes a line feed at the beginning of the binary data for a part of the header.
 TEST(MeshExport, isReadBackWhateverByteThePlyDataBeginWith) {
   const support::TemporaryDirectory folder;
   const std::filesystem::path file = folder.path() / "box.ply";

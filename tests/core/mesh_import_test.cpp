@@ -34,7 +34,7 @@ using ::testing::StartsWith;
 
 static_assert(std::endian::native == std::endian::little, "the binary files below are written as they lie in memory");
 
-/// The bytes of a binary file, to which numbers are appended.
+/// The bytes of a binary file, with functions that append numbers.
 struct Bytes {
   std::string data;
   template <typename T>
@@ -199,7 +199,7 @@ TEST_F(MeshImport, installed3dsFile) {
   EXPECT_NEAR(report.volume, 8, 1e-5);
 }
 
-/// The tetrahedron's positions and 16-bit indices as a glTF buffer.
+/// Returns the tetrahedron's positions and 16-bit indices as a glTF buffer.
 Bytes gltfBuffer() {
   Bytes buffer;
   for (const auto& corner : kCorners)
@@ -209,7 +209,7 @@ Bytes gltfBuffer() {
   return buffer;
 }
 
-/// A glTF scene whose nodes, in JSON, refer to the tetrahedron.
+/// Returns a glTF file with the tetrahedron as its mesh and with the nodes given as JSON.
 std::string gltfScene(const std::string& nodes, const std::string& roots, const std::string& uri = "", int mode = 4) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + roots + R"(]}],"nodes":[)" + nodes +
          R"(],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"mode":)" + std::to_string(mode) +
@@ -276,7 +276,7 @@ TEST_F(MeshImport, allMeshesOfASceneAreJoinedAndWelded) {
 // ---------------------------------------------------------------------------------------------------------------------
 // Polygons
 
-// A prism over an L, whose caps are not star-shaped about their first corner.
+// A prism over an L-shaped polygon, whose caps are not star-shaped about their first corner.
 const std::string kPrismCorners =
     "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 2 1\nv 0 2 1\nv 0 0 1\n";
 const std::string kPrismSides = "f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\n";
@@ -291,7 +291,7 @@ TEST_F(MeshImport, concavePolygons) {
 }
 
 TEST_F(MeshImport, polygonsWithCornersOnAStraightSideStayClosed) {
-  // The caps and the two faces at the side from 6 to 1 have two more corners on that side.
+  // The caps and two side faces meet at the edge from 6 to 1; they have two more corners on that edge.
   const auto [mesh, report] =
       import("l.obj", kPrismCorners + "v 1 0 0\nv 1 0 1\nv 1.5 0 0\nv 1.5 0 1\n" + kPrismSides +
                           "f 6 13 14 12\nf 13 15 16 14\nf 15 1 7 16\nf 7 8 9 10 11 12 14 16\nf 6 5 4 3 2 1 15 13\n");
@@ -351,7 +351,7 @@ TEST_F(MeshImport, coordinateSpacingBoundsTheRounding) {
       for (const Vector3& v : mesh.vertices) nearest = std::min(nearest, (v.array() - x).abs().minCoeff());
       lost = std::max(lost, nearest);
     }
-    EXPECT_LE(lost, 2 * spacing) << at;  // assimp also multiplies by powers of ten in float.
+    EXPECT_LE(lost, 2 * spacing) << at;  // assimp also multiplies by powers of ten in single precision.
     EXPECT_GT(lost, spacing / 8) << at;
   }
 }
@@ -513,7 +513,7 @@ TEST_F(MeshImport, loadMeshTakesFilesAndShapes) {
   EXPECT_EQ(loadMesh(file.string()).triangles.size(), 4u);
   EXPECT_EQ(loadMesh("builtin:box,width=3").name, "builtin:box,width=3");
   EXPECT_THROW(loadMesh("builtin:bax,width=3"), Error);
-  EXPECT_THROW(loadMesh("box"), Error);  // The name stands for a file, which does not exist.
+  EXPECT_THROW(loadMesh("box"), Error);  // Without "builtin:", the name is that of a file, which does not exist here.
   try {
     loadMesh("analytic:torus,major=1");
     FAIL();
@@ -568,7 +568,7 @@ TEST(Triangulate, triangulatesConcavePolygonsInAnyPlane) {
 }
 
 TEST(Triangulate, cornersOnStraightSidesGetTrianglesWithAnArea) {
-  // Each side of the square has nine more corners at thirds of a unit, which float rounds away from the straight side.
+  // Each side of the square has nine more corners at multiples of 1/3; rounded to float, they leave the side.
   std::vector<Vector3> polygon;
   const Vector3 corners[4] = {{0, 0, 0}, {1, 0.3, 0}, {0.7, 1.3, 0}, {-0.3, 1, 0}};
   for (int side = 0; side < 4; ++side)
@@ -632,8 +632,8 @@ TEST(Triangulate, yieldsTrianglesForDegeneratePolygons) {
 // ---------------------------------------------------------------------------------------------------------------------
 // Real meshes
 
-/// A mesh of the test folder with its counts after welding and before faces are dropped. The counts are known
-/// independently of this reader.
+/// A mesh of the test folder and its counts after welding, before degenerate faces are dropped. The counts were
+/// determined without this reader.
 struct KnownMesh {
   std::string file;
   std::size_t vertices, faces;
@@ -678,8 +678,8 @@ INSTANTIATE_TEST_SUITE_P(
                       KnownMesh{"broken/self_intersectA.obj", 8582, 17160, true, 1, 0, 0, 0, 0, 0, false},
                       KnownMesh{"broken/Generic_Twin_7081_left.obj", 9874, 19704, true, 12, 0, 0, 0, 0, 0, false}));
 
-// Dropping faces removes vertices and opens edges. The teapot has three components when components that touch in a
-// corner count as one.
+// Dropping degenerate faces removes vertices and opens edges. The teapot has three components if parts that touch at a
+// corner count as one component.
 INSTANTIATE_TEST_SUITE_P(
     Broken, KnownMeshes,
     ::testing::Values(KnownMesh{"broken/bun_zipper.ply", 34834, 69451, false, 1, 223, 0, 0, 0, 0, false},

@@ -20,7 +20,7 @@ std::vector<double> randomCoefficients(int degree, unsigned seed) {
   return c;
 }
 
-/// Values of the polynomial at points of the box with lower corner `lower` and edge `size` within the cell [-1, 1]³.
+/// Samples a polynomial on [-1, 1]³ at `points`, mapped to the box with the corner `lower` and the edge `size`.
 std::vector<double> sampled(const std::vector<double>& c, int degree, const std::vector<Vector3>& points,
                             const Vector3& lower = {-1, -1, -1}, double size = 2) {
   std::vector<double> samples;
@@ -85,14 +85,14 @@ TEST(Projection, joinedChildrenAreTheParent) {
       children[child] =
           (*project)(sampled(c, std::min(degree, kMaxDegree), project->points(), lower - Vector3::Ones(), 1));
     }
-    auto expected = c;  // The coefficients of degree 31 have an empty top degree.
+    auto expected = c;  // c has no coefficients of degree 31
     if (degree > kMaxDegree)
       expected = basis::appendTopDegree(c, std::vector<double>(coefficientCount(degree), 0.0), degree);
     expectNear(basis::joined(children, degree), expected, 1e-10);
   }
 }
 
-/// No rule integrates a function with a kink exactly, so that the result must equal the projection of all samples.
+/// No quadrature is exact for a function with a kink; still, the result must equal the projection of all samples.
 TEST(Projection, joinedChildrenAreTheProjectionOfAllSamples) {
   const auto kink = [](const Vector3& x) { return std::abs(x.x() + 0.3 * x.y() - 0.2) + x.z() * x.x(); };
   constexpr int kDegree = 4;

@@ -19,7 +19,7 @@ namespace safe_distance_test {
 
 using Phi = std::function<double(const Vector3&)>;
 
-/// Two spheres, whose distance has a kink between them.
+/// Signed distance to two spheres; it has a kink halfway between them.
 double spheres(const Vector3& x) {
   return std::min((x - Vector3(0.5, 0.1, 0)).norm() - 0.4, (x + Vector3(0.5, 0, 0.2)).norm() - 0.35);
 }
@@ -31,7 +31,7 @@ struct BoundCheck {
   double medianBound = 0, medianWorst = 0;  ///< medians over leaves
 };
 
-/// Checks the bounds at 5³ points of every leaf, its corners among them.
+/// Checks the bounds at 5³ points of every leaf, including its corners.
 BoundCheck checkBounds(const Field& field, const Phi& phi) {
   BoundCheck check;
   std::vector<double> bounds, worst;
@@ -40,7 +40,7 @@ BoundCheck checkBounds(const Field& field, const Phi& phi) {
     double greatest = 0;
     for (int n = 0; n < 125; ++n) {
       const Vector3 share(n % 5 / 4.0, n / 5 % 5 / 4.0, n / 25 / 4.0);
-      // On the faces themselves, rounding would decide about the cell.
+      // Points are moved slightly into the leaf, because on its faces rounding would decide which leaf they belong to.
       const Vector3 inner = Vector3::Constant(1e-9) + share * (1 - 2e-9);
       const Vector3 x = cell.box.min() + inner.cwiseProduct(cell.box.sizes());
       const auto [value, gradient] = field.valueAndGradient(x);
@@ -149,7 +149,7 @@ TEST(SafeDistance, raysNeverPassThroughTheSurface) {
   EXPECT_FALSE(safeTrace(field, {3, 3, 3}, {1, 0, 0}, 1e-3).mayTouch) << "past the domain";
 }
 
-/// Far away, rounding may swallow a step, and the error of a point may exceed the slack.
+/// Far from the domain, rounding of points on the ray exceeds the slack of 1e-3; the ray must still end.
 TEST(SafeDistance, raysFromFarAwayEnd) {
   const Field field = build(spheres, cube(), {.targetError = 1e-6, .grid = {24, 24, 24}, .bounds = true});
   const auto from = [&](double far) { return safeTrace(field, {far, 0.5, 0.5}, {-1, 0, 0}, 1e-3); };
@@ -159,7 +159,7 @@ TEST(SafeDistance, raysFromFarAwayEnd) {
   EXPECT_LT(from(8e15).steps, 10);
 }
 
-/// The bound is that of the leaf that holds the point, with and without blending.
+/// The subtracted error bound belongs to the leaf that contains the point, with and without blending.
 TEST(SafeDistance, isTheValueLessTheBound) {
   for (const double blend : {0.0, 0.1}) {
     const Field field =

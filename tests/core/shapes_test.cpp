@@ -40,7 +40,7 @@ std::vector<std::string> shapeNames() {
   return names;
 }
 
-/// Root mean square of the distance to the smooth shape over the surface of the mesh.
+/// Returns the root mean square distance between the mesh's surface and the smooth shape.
 double surfaceDeviation(const TriangleMesh& mesh, const DistanceFunction& smooth) {
   constexpr int kSteps = 8;  // Each triangle is sampled at the centroids of 64 parts.
   std::vector<Vector3> points;
@@ -111,8 +111,7 @@ TEST(Shapes, curvedMeshesFollowTheSmoothSurface) {
   for (const std::string name : {"sphere", "torus"}) {
     const double deviation = surfaceDeviation(shapes::mesh(name), shapes::analytic(name));
     EXPECT_LT(deviation / 2, 5e-5) << name;
-    EXPECT_GT(deviation / 2, 1e-7)
-        << name;  // A mesh differs from the smooth surface, so that the deviation cannot be 0.
+    EXPECT_GT(deviation / 2, 1e-7) << name;  // A mesh of flat facets deviates; 0 would mean that nothing was measured.
     RecordProperty(name + "_rms", std::to_string(deviation));
   }
 }
@@ -134,7 +133,7 @@ TEST(Shapes, gearHasItsSizeAndOneHole) {
   EXPECT_EQ(report.components, 1u);
   const auto edges = static_cast<double>(report.faces) * 1.5;
   EXPECT_EQ(static_cast<double>(report.vertices) - edges + static_cast<double>(report.faces),
-            0);  // The Euler characteristic of genus 1 is 0.
+            0);  // The Euler characteristic of a surface of genus 1 is 0.
   EXPECT_EQ(report.box.max(), Vector3(3, 3, 0.4));
   double nearest = 1e9;
   for (const Vector3& v : mesh.vertices) {
@@ -143,12 +142,12 @@ TEST(Shapes, gearHasItsSizeAndOneHole) {
     EXPECT_TRUE(std::abs(r - 1) < 1e-14 || std::abs(r - 2.6) < 1e-14 || std::abs(r - 3) < 1e-14) << r;
   }
   EXPECT_NEAR(nearest, 1, 1e-14);
-  // The volume lies between those of the rings with the inner and the outer radius.
+  // The volume lies between the volumes of two rings, with the gear's inner and its outer radius.
   EXPECT_GT(report.volume, 0.8 * kPi * (2.6 * 2.6 - 1) * 0.95);
   EXPECT_LT(report.volume, 0.8 * kPi * (9 - 1));
 }
 
-/// Top and bottom must not fold over themselves.
+/// Triangles of the gear's top and bottom must not fold over each other.
 TEST(Shapes, gearCapsFaceOutward) {
   for (const std::string spec :
        {"gear", "gear,teeth=3,segments=1,tooth-depth=0.6,hole=0.39", "gear,teeth=3,hole=0.779"}) {
@@ -165,7 +164,7 @@ TEST(Shapes, gearCapsFaceOutward) {
   }
 }
 
-/// The z coordinates at which the vertical line through (x, y) intersects the mesh, ascending.
+/// Returns the z coordinates at which the vertical line through (x, y) intersects the mesh, in ascending order.
 std::vector<double> crossings(const TriangleMesh& mesh, double x, double y) {
   std::vector<double> heights;
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -185,12 +184,12 @@ TEST(Shapes, bowlsAreOneWallOpenTowardsPositiveZ) {
   for (const std::string name : {"helix-bowl", "structured-bowl"}) {
     const TriangleMesh mesh = shapes::mesh(name);
     const Box box = boundingBox(mesh);
-    EXPECT_EQ(mesh.triangles.size(), 37'632u) << name;  // A bowl has 16 cells (cells + 1) triangles.
+    EXPECT_EQ(mesh.triangles.size(), 37'632u) << name;  // 16 n (n + 1) triangles for n = 48 cells
     double thinnest = 1e9, thickest = 0;
     for (const double x : {0.013, 0.21, 0.47, 0.63})
       for (const double y : {0.007, -0.18, 0.33, -0.52}) {
         const std::vector<double> wall = crossings(mesh, x, y);
-        ASSERT_EQ(wall.size(), 2u) << name << " at " << x << ", " << y;  // The line intersects the wall only.
+        ASSERT_EQ(wall.size(), 2u) << name << " at " << x << ", " << y;  // The line crosses both sides of the wall.
         EXPECT_NEAR(wall[0], box.min().z() + 0.8 * (x * x + y * y), 1e-3) << name;
         const double slope = 1.6 * std::hypot(x, y);
         const double thickness = (wall[1] - wall[0]) / std::hypot(1, slope);
@@ -204,15 +203,15 @@ TEST(Shapes, bowlsAreOneWallOpenTowardsPositiveZ) {
 }
 
 TEST(Shapes, theHelixBowlsGrooveWindsOutwards) {
-  // Along a ray from the axis the wall is thinnest once a turn. A rotation of the ray by a quarter turn moves these
-  // positions outwards by a quarter of their spacing.
+  // Along a ray from the axis, the spiral groove makes the wall thin once per turn. If the ray is rotated by a quarter
+  // turn, the thin places move outwards by a quarter of their spacing.
   const TriangleMesh mesh = shapes::mesh("helix-bowl,cells=96,height=0.1");
   const auto depthAt = [&](double radius, double angle) {
     const auto wall = crossings(mesh, radius * std::cos(angle) + 1e-4, radius * std::sin(angle) + 1e-4);
     return wall.size() == 2 ? 0.1 - (wall[1] - wall[0]) : 0;
   };
   for (const double angle : {0.1, 0.1 + kPi / 2}) {
-    const double groove = 0.5 + angle / (2 * kPi) / 4;  // This is the second of the four turns.
+    const double groove = 0.5 + angle / (2 * kPi) / 4;  // radius of the groove in the second of its four turns
     EXPECT_GT(depthAt(groove, angle), 0.05);
     EXPECT_LT(depthAt(groove + 0.125, angle), 0.01);
     EXPECT_GT(depthAt(groove + 0.25, angle), 0.05);
@@ -224,12 +223,12 @@ TEST(Shapes, theMarbleRunFillsLittleOfItsBoxAndDescends) {
   const MeshReport report = inspect(mesh);
   EXPECT_EQ(report.faces, 2u * 18 * 4 * 96 + 4 * 8);
   EXPECT_LT(report.volume / report.box.volume(), 0.03);
-  // The volume is that of half an annulus with 16 corners swept along the turns.
+  // The expected volume is half an annulus with 16 corners, swept along all turns.
   const double length = 4 * 2 * kPi * 0.92, area = 8 * std::sin(kPi / 8) / 2 * (0.08 * 0.08 - 0.06 * 0.06);
   EXPECT_NEAR(report.volume, length * area, 0.002 * length * area);
-  // Vertical lines through the channel's middle, on two sides of the axis, intersect the floors of all turns.
+  // Vertical lines through the middle of the channel, on opposite sides of the axis, intersect the floors of all turns.
   const std::vector<double> floors = crossings(mesh, 0.92, 1e-3);
-  ASSERT_EQ(floors.size(), 8u);  // Each of the four turns has two sides of the wall.
+  ASSERT_EQ(floors.size(), 8u);  // two sides of the wall in each of four turns
   for (int turn = 0; turn < 4; ++turn) EXPECT_NEAR(floors[2 * turn + 1] - floors[2 * turn], 0.02, 2e-3);
   EXPECT_NEAR(floors[2] - floors[0], 0.25, 1e-3);
   const std::vector<double> opposite = crossings(mesh, -0.92, 1e-3);
@@ -344,7 +343,7 @@ TEST(Shapes, analyticDistancesHaveUnitGradients) {
       distance(points, values);
       const Vector3 gradient =
           Vector3(values[1] - values[0], values[3] - values[2], values[5] - values[4]) / (2 * kStep);
-      if (std::abs(gradient.norm() - 1) > 1e-6) ++kinks;  // Kinks occur on the medial axis only.
+      if (std::abs(gradient.norm() - 1) > 1e-6) ++kinks;  // a kink, which exists on the medial axis only
     }
     EXPECT_LE(kinks, 1) << shape.name;
   }

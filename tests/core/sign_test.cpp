@@ -82,7 +82,7 @@ TEST(WindingNumber, estimatesAreWithinTheirErrorBounds) {
   }
 }
 
-/// Returns the mesh without every n-th face.
+/// Returns the mesh without the faces 0, every, 2·every, …
 TriangleMesh withHoles(TriangleMesh mesh, std::size_t every) {
   std::vector<std::array<std::uint32_t, 3>> left;
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
@@ -203,7 +203,7 @@ TEST(InsideTest, isTheWindingNumberForBodiesThatShareAnEdge) {
   for (const Vector3& x : placesIn(boundingBox(mesh), 2000)) EXPECT_EQ(distance(x), byWinding(x));
 }
 
-/// A vertex is pushed through the opposite side of a ball. The spike there is inside out and misleads pseudonormals.
+/// One vertex of a ball is pushed through the opposite side: the spike is inside out and misleads pseudonormals.
 TEST(InsideTest, isRightWhereAClosedMeshFoldsIntoItself) {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=3");
   const std::uint32_t vertex = mesh.triangles[100][0];
@@ -257,7 +257,7 @@ TEST(InsideTest, fieldsOfOpenMeshesAreNotRefinedWithoutEnd) {
   const Field field = build(ExactDistance(mesh, kAutomatic), domainAround(mesh), options);
   const Field unsignedField =
       build(ExactDistance(mesh, {.insideTest = InsideTest::shell, .thickness = 1e-9}), domainAround(mesh), options);
-  // This distance has the sign of the winding number, but ignores the surface that closes the hole.
+  // For comparison, `jump` has the sign of the winding number but ignores the surface that closes the hole: it jumps.
   const ExactDistance byNormals(mesh, {.insideTest = InsideTest::pseudonormal}), byWinding(mesh, kAutomatic);
   const auto jump = [&](const Vector3& x) { return std::copysign(byNormals(x), byWinding(x)); };
   BuildOptions asLong = options;
@@ -276,7 +276,7 @@ TEST(InsideTest, singleAndBatchedQueriesAgreeBitForBit) {
     const ExactDistance distance(mesh, kAutomatic);
     ASSERT_EQ(distance.insideTestChoice().insideTest, InsideTest::winding);
     for (const double size :
-         {2.0, 0.3, 0.01}) {  // size of the box of the points: the nearer they are, the more share samples
+         {2.0, 0.3, 0.01}) {  // edge of the box of points; the sides of close points are derived from each other
       const Box box(Vector3(0.9, 0.2, 0.95), Vector3(0.9, 0.2, 0.95) + Vector3::Constant(size));
       std::vector<Vector3> points = placesIn(box, 700);
       points[13].setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -325,7 +325,7 @@ TEST(SignCheck, comparesWithTheSumOverAllTriangles) {
   EXPECT_EQ(right.wrong, 0u);
   EXPECT_EQ(right.points, 4000u);
   EXPECT_LT(right.tooNear, 100u);
-  // Pseudonormals are wrong inside one ball near the surface of the other.
+  // Pseudonormals are wrong inside one ball near the surface of the other ball.
   const ExactDistance byNormals(mesh, {.insideTest = InsideTest::pseudonormal});
   const SignCheck wrong = checkSign(mesh, byNormals, 4000), other = checkSign(mesh, byNormals, 4000, 2);
   EXPECT_GT(wrong.wrong, 100u);
@@ -336,7 +336,7 @@ TEST(SignCheck, comparesWithTheSumOverAllTriangles) {
   const SignCheck alone = withThreads(1, [&] { return checkSign(mesh, byNormals, 4000); });
   EXPECT_EQ(alone.wrong, wrong.wrong);
   EXPECT_EQ(alone.worst, wrong.worst);
-  // The check stores no points: so many would not fit into memory.
+  // The check must not store its points: this number of points would not fit into memory.
   EXPECT_THROW(checkSign(ball, ExactDistance(ball), 1'000'000'000'000'000, 1, {{}, [] { return true; }}), Cancelled);
 }
 
@@ -345,7 +345,7 @@ TEST(SignCheck, acceptsInwardMeshes) {
   EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 2000).wrong, 0u);
 }
 
-/// A part within a box, both oriented outward. The largest face of the part is `gap` away from the wall at x = 0.
+/// Returns a part in a box, both oriented outward. The part's largest face is `gap` away from the wall at x = 0.
 TriangleMesh partBeforeWall(double gap) {
   TriangleMesh part = boxOfTwo();
   for (Vector3& v : part.vertices)
@@ -360,7 +360,7 @@ TEST(InsideTest, isRightForWallsAtAnyDistance) {
     const TriangleMesh beside = joined(moved(boxOfTwo(), {1 + gap, 0, 0}), moved(boxOfTwo(), {-1, 0, 0}));
     TriangleMesh far = beside;
     for (Vector3& v : far.vertices)
-      if (v.x() == 1 + gap - 1) v.x() = gap;  // representable near 0 only
+      if (v.x() == 1 + gap - 1) v.x() = gap;  // 1 + gap was rounded
     for (const TriangleMesh& mesh : {nested, far}) {
       EXPECT_EQ(checkSign(mesh, ExactDistance(mesh), 3000).wrong, 0u) << gap;
       misled += checkSign(mesh, ExactDistance(mesh, {.insideTest = InsideTest::pseudonormal}), 3000).wrong > 0;
@@ -381,7 +381,7 @@ TEST(InsideTest, isRightBesideFacesThinnerThanRounding) {
   EXPECT_GT(checkSign(mesh, ExactDistance(mesh, {.insideTest = InsideTest::pseudonormal}), 3000).wrong, 0u);
 }
 
-/// The edge of a blade along z is at x = 1. All points beyond it are outside, however near.
+/// The blade's sharp edge is at x = 1, along z. All points with x > 1 are outside, however near to the edge.
 TEST(InsideTest, isRightBesideBlades) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform(-1, 1), exponent(-18, -1);
@@ -418,7 +418,7 @@ TEST(AngleSum, countsTurns) {
   double expected = 0;
   for (int i = 0; i < 2000; ++i) {
     double x = u(random), y = u(random);
-    if (i % 3 == 0) y = 0;  // half a turn or no turn
+    if (i % 3 == 0) y = 0;  // an angle of 0 or 180 degrees
     if (i % 7 == 0) x = 0;
     sum.add(x, y);
     if (x != 0 || y != 0) expected += std::atan2(y, x);
@@ -426,7 +426,7 @@ TEST(AngleSum, countsTurns) {
   }
 }
 
-/// Meshes of files, closed and broken, at fewer points than `hpsdf mesh --check-sign` takes.
+/// Tests closed and broken mesh files, at fewer points than `hpsdf mesh --check-sign` takes.
 TEST(InsideTest, ofMeshFilesEqualsTheWindingNumber) {
   HPSDF_SKIP_WITHOUT_MESHES();
   for (const char* name : {"cad/cube_12.obj", "cad/fandisk.obj", "cad/wingnut.obj", "cad/1002_tray_bottom.STL",

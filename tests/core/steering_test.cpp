@@ -1,4 +1,4 @@
-// Ways to say how exact a field is to be, and to choose its cells.
+// Tests the options that say how accurate a field must be and which cells are refined.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,14 +14,14 @@
 namespace hpsdf {
 namespace steering_test {
 
-/// Two spheres, between which the distance has a kink.
+/// Signed distance to two spheres; it has a kink halfway between them.
 double spheres(const Vector3& x) {
   return std::min((x - Vector3(0.5, 0.1, 0)).norm() - 0.4, (x + Vector3(0.5, 0, 0.2)).norm() - 0.35);
 }
 Box cube() { return Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)); }
 
 struct Measured {
-  double rms = 0, near = 0, far = 0;  ///< near: within 0.022 of the surface, a hundredth of the cube's edge over 1.1
+  double rms = 0, near = 0, far = 0;  ///< near: within kNear of the surface; far: beyond 2 kNear
   double largest = 0, largestInBand = 0;
 };
 
@@ -34,7 +34,7 @@ Measured measure(const Field& field, int count = 200000) {
   int nearOnes = 0;
   for (int n = 0; n < count; ++n) {
     Vector3 x(coordinate(random), coordinate(random), coordinate(random));
-    if (n % 2 == 1) x *= 0.4 / x.norm(), x += x.x() > 0 ? Vector3(0.5, 0.1, 0) : Vector3(-0.5, 0, -0.2);  // many near
+    if (n % 2 == 1) x *= 0.4 / x.norm(), x += x.x() > 0 ? Vector3(0.5, 0.1, 0) : Vector3(-0.5, 0, -0.2);  // at surfaces
     const double exact = spheres(x), error = std::abs(field.value(x) - exact);
     m.largest = std::max(m.largest, error);
     if (std::abs(exact) <= kBand) m.largestInBand = std::max(m.largestInBand, error);
@@ -71,7 +71,7 @@ TEST(Steering, optimalNeedsFewerCoefficientsForTheSameError) {
 
 TEST(Steering, optimalKeepsToItsStrategyAndLimits) {
   for (const Strategy strategy : {Strategy::h1, Strategy::h2}) {
-    const double target = strategy == Strategy::h1 ? 0.1 : 1e-5;  // the embedded estimate of degree 1 is its slope
+    const double target = strategy == Strategy::h1 ? 0.1 : 1e-5;  // for degree 1 the estimate is the slope
     const Field field =
         build(spheres, cube(),
               {.targetError = target, .grid = {3, 3, 3}, .criterion = Criterion::optimal, .strategy = strategy});
@@ -85,7 +85,7 @@ TEST(Steering, optimalKeepsToItsStrategyAndLimits) {
   EXPECT_EQ(statistics(field).degreeLeaves.rbegin()->first, 3);
 }
 
-/// Also at the ends that are no goals: steps, and limits of degree and depth.
+/// Pruning also follows constructions that end at limits of steps, degree or depth instead of at the target error.
 TEST(Steering, optimalTakesBackWhateverEndedTheConstruction) {
   const BuildOptions options{.targetError = 1e-9, .grid = {3, 3, 3}, .criterion = Criterion::optimal, .maxSteps = 100};
   BuildOptions paper = options;
@@ -156,7 +156,7 @@ TEST(Steering, bytesAreALimitThatIsMadeUseOf) {
   EXPECT_NE(refusal({.targetError = 0, .maxBytes = 1000}).find("base grid alone"), std::string::npos);
 }
 
-/// With whatever is done to the cells or kept beside them at the end, and for hardly more than the base cells.
+/// The byte limit also holds with enrichment, blending and bounds, and for fields of hardly more than the base cells.
 TEST(Steering, bytesAreNeverExceeded) {
   std::vector<BuildOptions> ways(1);
   const auto both = [&](const auto& change) {
@@ -198,7 +198,7 @@ TEST(Steering, noSampleIsWorseThanTheMaximumError) {
   EXPECT_LE(measure(band).largestInBand, 0.01);
   EXPECT_LT(statistics(band).leaves, statistics(field).leaves);
 
-  // bytes are room for it, not to be filled before
+  // maxBytes is only a limit for the refinement towards maxError; the refinement must not fill it up.
   const Field within = build(spheres, cube(), {.targetError = 0, .maxError = 0.01, .maxBytes = field.bytes() + 100000});
   EXPECT_LE(within.metadata().measuredError, 0.01);
   EXPECT_LE(within.bytes(), field.bytes());
@@ -240,7 +240,7 @@ TEST(Steering, nearAndFarErrorsAreReached) {
   }
 }
 
-/// What lies outside of it neither counts as exact nor as wrong.
+/// Points outside the narrow band count neither as accurate nor as wrong.
 TEST(Steering, nearAndFarErrorsLookAtTheBandAlone) {
   const auto made = [](Criterion criterion) {
     return build(spheres, cube(), {.targetError = NearFarError{3e-4, 3e-3}, .criterion = criterion, .band = kBand});

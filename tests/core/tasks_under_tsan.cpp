@@ -1,5 +1,5 @@
-// What ThreadSanitizer is to make of oneTBB's tasks (cmake/tbb_for_tsan.cpp): nothing of what is in order, and, called
-// with `race`, a report.
+// Checks that ThreadSanitizer reports nothing about correct oneTBB tasks (see cmake/tbb_for_tsan.cpp), and that it
+// reports the data race that the argument `race` adds.
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -18,8 +18,8 @@
 
 namespace {
 
-/// What its caller wrote is read by tasks within tasks, and what they wrote by its caller; so often that the memory of
-/// tasks goes from thread to thread. `race`: whether all of them also count in one plain number.
+/// Exchanges data between nested tasks and their caller, so often that memory of tasks passes from thread to thread.
+/// With `race`, all tasks also increment one unprotected counter.
 long long sumOfTasks(bool race) {
   long long sum = 0;
   int counted = 0;
@@ -59,7 +59,7 @@ long long sumOfTasks(bool race) {
 
 int main(int count, char** arguments) {
   const bool race = count > 1 && std::strcmp(arguments[1], "race") == 0;
-  const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 4);  // on any machine
+  const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 4);
   tbb::task_arena arena(4);
   long long sums[2];
   const auto ask = [&](int place) { arena.execute([&, place] { sums[place] = sumOfTasks(race); }); };

@@ -18,7 +18,7 @@ namespace verify_test {
 
 double height(const Vector3& x) { return x.z(); }
 
-/// Returns the part of the plane z = 0 in the domain [−1, 1]³.
+/// Returns a mesh of the plane z = 0 within the domain [−1, 1]³.
 const TriangleMesh& plane() {
   static const TriangleMesh mesh = {{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, "plane"};
   return mesh;
@@ -30,7 +30,7 @@ Field twoPlanes(const std::array<double, 2>& offset, const Vector3& slope) {
   data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
   data.grid = {2, 1, 1};
   data.nodes = {node::leaf(1, 0), node::leaf(1, 4)};
-  std::vector<double> coefficients;  // of 1, w, v, u; the local coordinate u runs over half of the domain
+  std::vector<double> coefficients;  // of 1, w, v, u; the local coordinate u spans half of the domain
   for (int cell = 0; cell < 2; ++cell) {
     const double center = cell == 0 ? -0.5 : 0.5;
     coefficients.insert(coefficients.end(), {offset[cell] + slope.x() * center, slope.z(), slope.y(), slope.x() / 2});
@@ -58,7 +58,7 @@ TEST(Verify, measuresAConstantError) {
       EXPECT_NEAR(figures->gradient.maxAngleDegrees, 0, 1e-6);
     }
     EXPECT_EQ(found.uniform.error.percentiles.size(), 4u);
-    EXPECT_NEAR(found.near, 0.02, 1e-15);  // The default is a hundredth of the plane's side.
+    EXPECT_NEAR(found.near, 0.02, 1e-15);  // the default: a hundredth of the plane's side
   }
 }
 
@@ -75,7 +75,7 @@ TEST(Verify, findsWrongSignsBetweenTheSurfaceAndTheZeroOfTheField) {
   const Verification found = verifyAgainstPlane(twoPlanes({0.1, 0.1}, {0, 0, 1}), {.points = 40'000});
   EXPECT_NEAR(double(found.uniform.signs.mismatches), 20'000 * 0.05, 150);
   EXPECT_NEAR(found.uniform.signs.farthest, 0.1, 2e-3);
-  EXPECT_EQ(found.uniform.signs.defects, 0u);  // All lie within ten times the error.
+  EXPECT_EQ(found.uniform.signs.defects, 0u);  // wrong signs within ten times the error are no defects
   const Verification strict =
       verifyAgainstPlane(twoPlanes({0.1, 0.1}, {0, 0, 1}), {.points = 40'000, .signBound = 0.05});
   EXPECT_NEAR(double(strict.uniform.signs.defects), 20'000 * 0.025, 150);
@@ -97,7 +97,7 @@ TEST(Verify, comparesGradientsByAngleAndLength) {
 
 TEST(Verify, listsTheWorstPointOfEachCellWorstFirst) {
   const Verification found = verifyAgainstPlane(twoPlanes({0.3, 0.1}, {0, 0, 1}));
-  ASSERT_EQ(found.worst.size(), 2u);  // The field has two cells.
+  ASSERT_EQ(found.worst.size(), 2u);  // one point for each of the two cells
   EXPECT_EQ(found.worst[0].cell, 0u);
   EXPECT_LT(found.worst[0].point.x(), 0);
   EXPECT_NEAR(found.worst[0].error(), 0.3, 1e-12);
@@ -143,7 +143,7 @@ TEST(Verify, figuresDoNotDependOnTheThreads) {
   EXPECT_EQ(figures(one), figures(three));
   EXPECT_NE(figures(one), figures(other));
   EXPECT_EQ(one.worst.size(), 5u);
-  // The gradients at near points follow the surface's normal.
+  // Gradients at points near the surface follow its normal.
   EXPECT_LT(one.nearSurface.gradient.meanAngleDegrees, 10);
 }
 
@@ -162,7 +162,7 @@ TEST(Verify, drawsUniformSamplesInTheDomainAndInTheBand) {
     if (n > 0) distance += (x - samples.points[n - 1]).norm();
   }
   for (const int count : octants) EXPECT_NEAR(count, 10'000, 400);
-  EXPECT_LT(distance / 80'000, 0.15);  // In random order the mean distance between consecutive points would be 2.
+  EXPECT_LT(distance / 80'000, 0.15);  // in random order, points would be about 2 apart
 
   const ExactSamples band = sampleUniform(height, domain, 0.05, {.count = 20'000});
   ASSERT_EQ(band.points.size(), 20'000u);
@@ -177,7 +177,7 @@ TEST(Verify, drawsUniformSamplesInTheDomainAndInTheBand) {
 }
 
 TEST(Verify, drawsNearSamplesCloseToTheSurfaceAndInTheDomain) {
-  const Box half(Vector3(-1, -1, -1), Vector3(0, 1, 1));  // contains half of the plane
+  const Box half(Vector3(-1, -1, -1), Vector3(0, 1, 1));  // the half of the domain with x < 0
   const ExactSamples samples = sampleNear(height, plane(), half, 0.1, {.count = 20'000});
   ASSERT_EQ(samples.points.size(), 20'000u);
   int lower = 0, front = 0;
@@ -221,7 +221,7 @@ TEST(Verify, refusesImpossibleSamples) {
             std::string::npos);
 }
 
-/// The check comes before a thousand candidates for each wanted point have been drawn.
+/// The error must appear after few candidates, not after a thousand candidates for each wanted point.
 TEST(Verify, refusesImpossibleSamplesSoon) {
   std::atomic<std::size_t> calls = 0;
   const auto counting = [&](const Vector3& x) {

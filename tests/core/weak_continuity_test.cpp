@@ -35,7 +35,7 @@ Field inDouble(const Field& field) {
   return Field(std::move(data));
 }
 
-/// Measures Σ w_F ∫ jump² dA face by face with a quadrature.
+/// Measures Σ w_F ∫ jump² dA over all interfaces F by quadrature, where w_F is the width of the smaller cell.
 double jumpEnergy(const Field& field) {
   double sum = 0;
   for (const Interface& face : findJumps(field).interfaces) {
@@ -45,7 +45,7 @@ double jumpEnergy(const Field& field) {
   return sum;
 }
 
-/// Computes ‖f − g‖² from the coefficients of fields with the same leaves, in whatever order these are stored.
+/// Computes ‖f − g‖² from the coefficients of two fields with the same leaves, which may be stored in different orders.
 double squaredDistance(const Field& field, const Field& other) {
   const auto& a = coefficientsOf(field);
   const auto& b = coefficientsOf(other);
@@ -65,7 +65,7 @@ double functional(const Field& field, const Field& fits, double weight) {
   return jumpEnergy(field) + weight * squaredDistance(field, fits);
 }
 
-/// Returns M from its products with unit vectors.
+/// Returns the matrix M of the face coupling, one product with a unit vector per column.
 Eigen::MatrixXd denseMatrix(continuity::FaceCoupling& coupling, std::size_t size) {
   Eigen::MatrixXd matrix(size, size);
   std::vector<double> unit(size), column(size);
@@ -79,7 +79,7 @@ Eigen::MatrixXd denseMatrix(continuity::FaceCoupling& coupling, std::size_t size
   return matrix;
 }
 
-/// Returns M by polarisation of the measured functional, without traces and restrictions.
+/// Returns the matrix M by polarisation of measured jump energies, independently of the library's traces.
 Eigen::MatrixXd measuredMatrix(const Field& field, continuity::FaceCoupling& coupling, std::size_t size) {
   const double volume = field.domain().sizes().prod();
   const auto energy = [&](std::size_t m, std::size_t n) {
@@ -108,7 +108,7 @@ Field twoCells() {
                          .maxDegree = 4});
 }
 
-/// Makes a base cell whose neighbours are split once and twice.
+/// Makes two base cells, one of which is split, with one of its children split again.
 Field hangingCells() {
   return randomField(8, {.domain = Box(Vector3(0, 0, 0), Vector3(1, 2, 1.3)),
                          .grid = {1, 2, 1},
@@ -179,7 +179,7 @@ TEST(WeakContinuity, isAMinimumOfTheFunctional) {
   const double least = functional(made, field, kWeight);
   EXPECT_LT(least, functional(field, field, kWeight));
   const std::vector<double>& c = coefficientsOf(made);
-  for (std::size_t n = 0; n < c.size(); ++n) {  // Central differences of a quadratic are exact.
+  for (std::size_t n = 0; n < c.size(); ++n) {  // central differences of a quadratic are exact
     std::vector<double> above = c, below = c;
     above[n] += kStep;
     below[n] -= kStep;
@@ -205,7 +205,7 @@ TEST(WeakContinuity, tradesJumpForChange) {
 }
 
 TEST(WeakContinuity, leavesAContinuousFieldAlone) {
-  // All leaves hold the cubic x³ − x·y + z.
+  // All leaves have the same polynomial x³ − x·y + z.
   const Field pattern = randomField(11, {.minDegree = 3, .maxDegree = 5});
   FieldData data = pattern.data();
   auto& c = std::get<std::vector<double>>(data.coefficients);

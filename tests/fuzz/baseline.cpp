@@ -1,4 +1,4 @@
-// The JSON beside a baseline: what is read is written and read again.
+// Fuzz target: the JSON file beside a baseline picture is written and read again without change.
 #include "check/baseline.h"
 
 #include "target.h"

@@ -1,4 +1,4 @@
-// The list of `hpsdf build --batch`: each mesh once, under a name that stays in its folder and is of the line alone.
+// Fuzz target: a `--batch` list gives each mesh once, with a safe file name that depends on its line only.
 #include "batch/batch_list.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 using namespace hpsdf;
 
-constexpr std::size_t kLongestName = 200;  // bytes; file systems allow 255, and more is put behind it
+constexpr std::size_t kLongestName = 200;  // bytes; file systems allow 255, and suffixes need some
 
 bool isPlain(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == '_'; }
 
@@ -20,7 +20,7 @@ void check(const app::BatchMesh& mesh) {
   fuzz::require(!mesh.surface.empty() && mesh.surface.find('\n') == std::string::npos, "a mesh is a line");
   fuzz::require(std::ranges::all_of(mesh.name, isPlain) && !mesh.name.starts_with('.'), "a name is safe");
   fuzz::require(mesh.name.size() <= kLongestName, "a name is short");
-  const auto alone = app::parseBatchList("\n" + mesh.surface);  // a byte order mark belongs to the first line
+  const auto alone = app::parseBatchList("\n" + mesh.surface);  // a byte order mark is skipped in the first line only
   fuzz::require(alone.size() == 1 && alone[0].surface == mesh.surface && alone[0].name == mesh.name &&
                     alone[0].number == mesh.number,
                 "a line stands for itself");

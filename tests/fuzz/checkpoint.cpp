@@ -1,5 +1,5 @@
-// A checkpoint: a construction that takes it up refuses it or comes to its end. The first byte says which construction
-// it is, the rest is the state; what a checkpoint has before and behind, which depends on the program's version, is
+// Fuzz target: a construction that resumes from a checkpoint refuses it or ends. The input's first byte selects the
+// construction, the rest is the state. The bytes before and after the state depend on the program's version and are
 // added here.
 #include "checkpoint.h"
 
@@ -15,7 +15,7 @@ using namespace hpsdf;
 
 Checkpoint at(const std::filesystem::path& file) { return {.file = file, .seconds = 0, .share = 1}; }
 
-/// What checkpoints of this construction begin with.
+/// Returns the bytes with which checkpoints of this construction begin, up to the state.
 std::string beginning(const BuildOptions& options) {
   const auto file = fuzz::fileOf("state", "");
   std::filesystem::remove(file);
@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   bytes.append(8, '\0');
   fuzz::mendChecksum(reinterpret_cast<std::uint8_t*>(bytes.data()), bytes.size());
   Checkpoint checkpoint = at(fuzz::fileOf("state", bytes));
-  checkpoint.seconds = 1000;  // no other is kept
+  checkpoint.seconds = 1000;  // no further checkpoint is written
   fuzz::reads([&] { buildResumably(fuzz::sphere, fuzz::domain(), kConstructions[which], checkpoint); });
   return 0;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The constructions whose states the target `checkpoint` takes up, and which its corpus holds.
+// The constructions that the fuzz target `checkpoint` resumes. The target's corpus contains their states.
 
 #include <array>
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace hpsdf::fuzz {
 
-/// Each ends soon whatever its state: there are not many cells to refine.
+/// Returns constructions that end soon from any state, because they have few cells to refine.
 inline std::array<BuildOptions, 3> constructions() {
   BuildOptions paper{.targetError = 1e-3, .grid = {2, 1, 1}, .maxDegree = 2, .maxDepth = 2, .threads = 1};
   BuildOptions optimal = paper;
@@ -24,9 +24,9 @@ inline std::array<BuildOptions, 3> constructions() {
 inline double sphere(const Vector3& x) { return (x - Vector3(0.1, 0.2, 0)).norm() - 0.5; }
 inline Box domain() { return Box(Vector3::Constant(-1), Vector3::Constant(1)); }
 
-/// Of a checkpoint's bytes, those before the state: what it is, of which version, and what it is of.
+/// Returns the number of bytes before the state in a checkpoint: magic number, versions and three digests.
 inline std::size_t bytesBeforeState(std::string_view checkpoint) {
-  constexpr std::size_t kLengthAt = 8 + 4;  // of the program's version, behind which are three digests
+  constexpr std::size_t kLengthAt = 8 + 4;  // position of the length of the program's version text
   std::uint32_t length = 0;
   checkpoint.copy(reinterpret_cast<char*>(&length), sizeof length, kLengthAt);
   return kLengthAt + sizeof length + length + 3 * 8;

@@ -1,5 +1,5 @@
-// Raw values that `hpsdf check` compares, .pfm where they begin like one, else .csv: rows times columns of them, which
-// equal themselves.
+// Fuzz target: raw values that `hpsdf check` compares, as .pfm if the input begins with "P", else as .csv. They form a
+// full table of rows and columns, which equals itself.
 #include "files/data_table.h"
 
 #include "target.h"

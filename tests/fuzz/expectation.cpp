@@ -1,4 +1,4 @@
-// What `expect` says of figures: it holds of the number that it names, or it does not, as its comparison wants.
+// Fuzz target: an expectation holds for the number that it names exactly if its comparison allows equality.
 #include "language/expectation.h"
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace hpsdf;
   std::string text(fuzz::textOf(data, size));
-  std::ranges::replace(text, '\n', ' ');  // in scripts and on the command line it is a word
+  std::ranges::replace(text, '\n', ' ');  // a word of a script has no newline
   fuzz::reads([&] {
     const app::Expectation expectation = app::parseExpectation(text);
     const bool allowsEqual = expectation.comparison.ends_with('=') && expectation.comparison != "!=";

@@ -1,4 +1,4 @@
-// A `.hpsdf` file: what loads answers wherever it is asked, and is written again as it was.
+// Fuzz target: a `.hpsdf` file that loads can be queried at any point and is saved again without change.
 #include "hpsdf/field_file.h"
 
 #include <array>
@@ -22,9 +22,9 @@ namespace {
 using namespace hpsdf;
 
 constexpr std::size_t kVersionAt = 8;
-constexpr std::uint8_t kVersion = 4;  // before it a field was written with less
+constexpr std::uint8_t kVersion = 4;  // fields of older versions are saved with more data
 
-/// Within the domain, on its sides, around it, and places that are none.
+/// Returns points within the domain, on its sides and around it, and points that are infinite or NaN.
 std::vector<Vector3> placesOf(const Box& domain) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr std::array kParts = {-0.5, 0.0, 0.137, 0.5, 0.71, 1.0, 1.0 + 1e-15, 3.0};

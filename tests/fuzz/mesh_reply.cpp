@@ -1,4 +1,4 @@
-// The answer of the process that reads a mesh file: what is taken is written again as it was.
+// Fuzz target: an accepted reply of the process that reads mesh files keeps its content when it is written again.
 #include "construction/mesh_reply.h"
 
 #include <xxhash.h>
@@ -32,12 +32,12 @@ Bytes written(const app::MeshReply& reply) {
   return bytes;
 }
 
-/// Over the header behind its checksum, the vertices, the triangles and the text, as far as they are there.
+/// Corrects the checksum of the header, vertices, triangles and text, as far as the input contains them.
 void mendChecksum(std::uint8_t* data, std::size_t size) {
   constexpr std::size_t kChecksumAt = 8, kSummedFrom = 16, kCountsAt = 24;
   const std::size_t header = app::kReplyHeaderBytes;
   if (size < header) return;
-  std::array<std::uint64_t, 3> counts;  // of vertices, triangles, bytes of text
+  std::array<std::uint64_t, 3> counts;  // of vertices, of triangles, and of bytes of text
   std::memcpy(counts.data(), data + kCountsAt, sizeof counts);
   constexpr std::array<std::uint64_t, 3> kEach = {24, 12, 1};
   XXH64_hash_t sum = XXH3_64bits_withSeed(data + kSummedFrom, header - kSummedFrom, 0);

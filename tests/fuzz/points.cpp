@@ -1,4 +1,4 @@
-// The points of `hpsdf query`: what is answered is a line, or an object of JSON, for each.
+// Fuzz target: `hpsdf query` answers each point with one line of CSV or with one JSON object.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>

@@ -1,6 +1,6 @@
-// A fuzz target without a fuzzer, for any compiler: runs it on every file of a folder, and on so many mutations of
-// these. The same files give the same mutations everywhere. Ends with status 1 where there is no file; what the target
-// finds ends it as it does a fuzzer, after a line that names the input.
+// Runs a fuzz target without a fuzzer, with any compiler: on every file of a folder and on a number of mutations, which
+// are the same on every machine. A failure ends the program as it ends a fuzzer, after a line that names the input. The
+// exit status is 1 if there is no file.
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -15,7 +15,7 @@
 
 #include "target.h"
 
-// of targets that have their own; null otherwise
+// Defined by fuzz targets with their own mutator; null otherwise.
 extern "C" [[gnu::weak]] std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t maxSize,
                                                              unsigned seed);
 
@@ -25,14 +25,14 @@ namespace fs = std::filesystem;
 using namespace hpsdf;
 
 constexpr std::size_t kMostGrowth = 64;  // bytes that mutations may add to a file
-std::mt19937 random_;                    // its numbers are the same in every library, those of distributions are not
+std::mt19937 random_;                    // portable, unlike the distributions of <random>
 
 std::size_t below(std::size_t count) { return count == 0 ? 0 : random_() % count; }
 
-std::array<char, 256> input{};  // what is being run, for the last line
+std::array<char, 256> input{};  // name of the current input, printed when the program crashes
 
 extern "C" void tellInput(int signal) {
-  std::cerr << "replay: " << input.data() << std::endl;  // the program ends either way
+  std::cerr << "replay: " << input.data() << std::endl;  // not signal-safe, but the program ends anyway
   std::signal(signal, SIG_DFL);
   std::raise(signal);
 }
@@ -40,7 +40,7 @@ extern "C" void tellInput(int signal) {
 void run(const std::string& name, const std::vector<std::uint8_t>& bytes) {
   input.fill('\0');
   std::ranges::copy(name.substr(0, input.size() - 1), input.begin());
-  // a block of its own size, so that AddressSanitizer sees where it ends
+  // The copy has exactly the input's size, so that AddressSanitizer detects reads beyond its end.
   LLVMFuzzerTestOneInput(std::vector<std::uint8_t>(bytes).data(), bytes.size());
 }
 
@@ -79,7 +79,7 @@ std::size_t numberOf(const char* text) {
 
 }  // namespace
 
-/// One to four changes: a bit, a byte, a number where readers look for such, a piece copied, cut out or put in.
+/// Makes one to four changes: a flipped bit, another byte, a special number, or a piece copied, removed or inserted.
 std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t maxSize) {
   constexpr std::array<std::uint64_t, 10> kNumbers = {
       0, 1, 0x7f, 0xff, 0x7fffffff, 0xffffffff, 0x7ff0000000000000, 0x7ff8000000000000, 0x7fffffffffffffff, ~0ull};

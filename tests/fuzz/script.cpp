@@ -1,4 +1,4 @@
-// A script: read and checked as `hpsdf run` does before its first line runs; nothing is run.
+// Fuzz target: a script is parsed and checked as by `hpsdf run` before its first line runs; no command is run.
 #include "language/script.h"
 
 #include <string>
@@ -10,7 +10,7 @@ namespace {
 
 using namespace hpsdf;
 
-/// Scripts to be included: a plain one, and two that include each other.
+/// Writes scripts that the input can include: a plain one, and two that include each other.
 void writeIncluded() {
   fuzz::fileOf("plain.hps", "set width=640\nload bunny.hpsdf\n");
   fuzz::fileOf("a.hps", "include b.hps\n");

@@ -1,5 +1,5 @@
-// Writes the corpus's files that are not text: fields of every kind, states of constructions, replies about meshes, raw
-// values. usage: fuzz_seeds tests/fuzz/corpus
+// Writes the binary files of the fuzzing corpus: fields of every kind, states of constructions, replies about meshes,
+// and raw values. Usage: fuzz_seeds tests/fuzz/corpus
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -47,11 +47,11 @@ void writeFields(const fs::path& folder) {
 }
 
 void writeStates(const fs::path& folder) {
-  constexpr int kMiddle = 12;  // questions whether to go on
+  constexpr int kMiddle = 12;  // number of times that the construction asks whether to cancel
   std::uint8_t which = 0;
   for (const BuildOptions& options : fuzz::constructions()) {
     int questions = 0;
-    for (const int last : {kMiddle, 1 << 30}) {  // from the middle and from the end
+    for (const int last : {kMiddle, 1 << 30}) {  // interrupted in the middle, and ended
       const auto file = fuzz::fileOf("state", "");
       fs::remove(file);
       try {

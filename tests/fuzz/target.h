@@ -1,8 +1,7 @@
 #pragma once
-// What the fuzz targets share. A target is one file with one `LLVMFuzzerTestOneInput`, which hands any bytes to one
-// reader of ours: what that refuses is an `Error` of one line, what it takes has to hold what the target says.
-// Everything else that leaves a target ends the program: any other exception, a broken promise, what the sanitizers
-// find.
+// Functions that the fuzz targets share. A target is one file with one `LLVMFuzzerTestOneInput`, which passes any bytes
+// to one reader of this project. The reader either throws an `Error` with a one-line message, or its result fulfils the
+// target's requirements. Another exception, a violated requirement or a sanitizer's report ends the program.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +12,7 @@
 
 extern "C" {
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
-/// Of the fuzzing engine, for the mutators of targets: changes the bytes and returns how many there are then.
+/// Provided by the fuzzing engine for custom mutators: changes the bytes and returns their new number.
 std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t maxSize);
 }
 
@@ -23,17 +22,17 @@ inline std::string_view textOf(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
-/// Ends the program, with a line that says what does not hold, where it does not.
+/// Ends the program with the message `what` unless `holds` is true.
 void require(bool holds, std::string_view what);
 
-/// Whether `read` goes through; what it refuses has to be an `Error` of one line.
+/// Returns true if `read` succeeds, and false if it throws an `Error`, whose message must be one line.
 bool reads(const std::function<void()>& read);
 
-/// A file of that name, with these bytes, in a folder of the process's own: in memory where TMPDIR is.
+/// Writes `bytes` to a file with this name in a temporary folder of this process (under TMPDIR).
 std::filesystem::path fileOf(std::string_view name, std::string_view bytes);
 std::string bytesOf(const std::filesystem::path& file);
 
-/// Sets the last 8 bytes to the checksum of those before, as files with one have it.
+/// Sets the last 8 bytes to the checksum of all bytes before, as in files that end with a checksum.
 void mendChecksum(std::uint8_t* data, std::size_t size);
 
 }  // namespace hpsdf::fuzz

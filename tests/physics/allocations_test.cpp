@@ -1,4 +1,4 @@
-// Queries take no memory once they have what they need.
+// Tests that repeated contact queries allocate no memory after the first time.
 
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
@@ -34,7 +34,7 @@ class Allocations : public testing::Test {
   std::vector<BodyPair> pairs_;
 };
 
-TEST_F(Allocations, OfAQueryAreMadeOnce) {
+TEST_F(Allocations, ofAQueryAreMadeOnce) {
   ContactQuery query;
   std::size_t contacts = 0;
   const auto askAll = [&] {
@@ -46,7 +46,7 @@ TEST_F(Allocations, OfAQueryAreMadeOnce) {
   EXPECT_GT(contacts, 1000u);
 }
 
-TEST_F(Allocations, OfManyPairsAreMadeOnce) {
+TEST_F(Allocations, ofManyPairsAreMadeOnce) {
   for (const int threads : {1, 2}) {
     tbb::task_arena arena(threads);
     PairContacts contacts;

@@ -1,4 +1,4 @@
-// Fields as shapes of Bullet.
+// Tests fields as collision shapes in Bullet.
 
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -23,11 +23,11 @@
 namespace hpsdf::physics {
 namespace bullet_test {
 
-/// A mesh with its field, samples and shape.
+/// A mesh with everything that Bullet needs: field, collider, samples, mass and collision shape.
 struct Kind {
   explicit Kind(const std::string& spec, std::size_t count = 2000) : Kind(shapes::mesh(spec), nullptr, count) {}
 
-  /// With another field than the mesh's.
+  /// If `distance` is given, the field approximates it instead of the distance to the mesh.
   Kind(TriangleMesh of, const std::function<double(const Vector3&)>& distance, std::size_t count)
       : mesh(std::move(of)),
         field(distance ? build(distance, domainAround(mesh), {.targetError = 1e-9})
@@ -45,7 +45,7 @@ struct Kind {
   FieldShape shape;
 };
 
-/// A hollow of radius 1 around the origin, of which the lower half matters: as smooth as a field can be.
+/// Returns a spherical hollow of radius 1 around the origin, whose lower half is a smooth bowl.
 Kind& hollow() {
   static Kind kind(
       shapes::mesh("box,width=2.4,height=2.4,depth=2.4"), [](const Vector3& x) { return 1 - x.norm(); }, 10);
@@ -54,7 +54,7 @@ Kind& hollow() {
 
 Eigen::Isometry3d at(const Vector3& place) { return Eigen::Isometry3d(Eigen::Translation3d(place)); }
 
-/// A square of cloth, its sides twice `half`, with so many nodes along each.
+/// Returns a square piece of cloth with side length 2·half and `nodes` nodes along each side.
 std::unique_ptr<btSoftBody> flatSheet(World& world, const Vector3& middle, double half, int nodes) {
   const auto corner = [&](double x, double y) { return toBullet(middle + half * Vector3(x, y, 0)); };
   return std::unique_ptr<btSoftBody>(btSoftBodyHelpers::CreatePatch(
@@ -64,12 +64,12 @@ std::unique_ptr<btSoftBody> flatSheet(World& world, const Vector3& middle, doubl
 double energy(const World& world, std::size_t number) {
   const btRigidBody& body = world.body(number);
   const btVector3 v = body.getLinearVelocity(), w = body.getAngularVelocity();
-  const btVector3 inertia = body.getLocalInertia();  // of a sphere
+  const btVector3 inertia = body.getLocalInertia();  // a sphere's, equal about all axes
   return 0.5 * body.getMass() * v.length2() + 0.5 * inertia.x() * w.length2() +
          9.81 * body.getMass() * body.getWorldTransform().getOrigin().z();
 }
 
-TEST(MassProperties, OfABoxThatIsTurnedAndFarAway) {
+TEST(MassProperties, ofATurnedAndDistantBox) {
   TriangleMesh mesh = shapes::mesh("box,width=2,height=1,depth=0.5");
   const Eigen::Matrix3d turn = Eigen::Quaterniond(0.4, 0.3, -0.7, 0.5).normalized().toRotationMatrix();
   for (Vector3& x : mesh.vertices) x = turn * x + Vector3(1000, 2000, -3000);
@@ -78,7 +78,7 @@ TEST(MassProperties, OfABoxThatIsTurnedAndFarAway) {
   EXPECT_NEAR((mass.meshFromInertia.translation() - Vector3(1000, 2000, -3000)).norm(), 0, 1e-9);
   EXPECT_NEAR((mass.inertia - Vector3(2 * 2 + 1, 2 * 2 + 0.25, 1 + 0.25) / 12).cwiseAbs().maxCoeff(), 0, 1e-9);
   EXPECT_NEAR(mass.meshFromInertia.linear().determinant(), 1, 1e-12);
-  EXPECT_NEAR((mass.box.max() - Vector3(0.25, 0.5, 1)).norm(), 0, 1e-9);  // of the least inertia the last axis
+  EXPECT_NEAR((mass.box.max() - Vector3(0.25, 0.5, 1)).norm(), 0, 1e-9);  // last axis: least inertia
   EXPECT_NEAR((mass.box.min() + Vector3(0.25, 0.5, 1)).norm(), 0, 1e-9);
   EXPECT_THROW(massProperties(TriangleMesh{}), Error);
   mesh.triangles.front()[1] = 1'000'000'000;
@@ -97,7 +97,7 @@ TEST(ReduceContacts, keepsTheDeepestAndThoseAroundIt) {
     EXPECT_TRUE(std::ranges::any_of(contacts, [&](const BodyContact& c) { return c.onSecond == corner; })) << corner;
 }
 
-TEST(BulletField, AMarbleInASmoothBowlGainsNoEnergyAndComesToRestInTheMiddle) {
+TEST(BulletField, aMarbleInASmoothBowlGainsNoEnergyAndComesToRestInTheMiddle) {
   constexpr double kRadius = 0.05;
   btSphereShape sphere(kRadius);
   World world;
@@ -124,7 +124,7 @@ TEST(BulletField, AMarbleInASmoothBowlGainsNoEnergyAndComesToRestInTheMiddle) {
   EXPECT_NEAR(end.z(), -(1 - kRadius), 0.02 * kRadius);
 }
 
-TEST(BulletField, ABodyComesToRestOnAPlaneAndOnAnother) {
+TEST(BulletField, aBodyComesToRestOnAPlaneAndOnAnotherBody) {
   Kind box("box,width=1,height=0.8,depth=0.4"), slab("box,width=4,height=4,depth=0.5");
   btStaticPlaneShape plane(btVector3(0, 0, 1), 0);
   World world;
@@ -139,8 +139,8 @@ TEST(BulletField, ABodyComesToRestOnAPlaneAndOnAnother) {
   EXPECT_LT(world.body(onSlab).getLinearVelocity().length(), 0.01);
 }
 
-/// However few its samples are.
-TEST(BulletField, BoxesOfTheBroadPhaseHoldTheWholeBody) {
+/// The broad phase uses the box of the mesh, so that few samples suffice.
+TEST(BulletField, broadPhaseBoxesHoldTheWholeBody) {
   Kind ball("sphere,radius=0.5", 5);
   btSphereShape marble(0.05);
   for (int axis = 0; axis < 3; ++axis)
@@ -153,8 +153,8 @@ TEST(BulletField, BoxesOfTheBroadPhaseHoldTheWholeBody) {
     }
 }
 
-/// Whichever body Bullet has first.
-TEST(BulletField, TheOrderOfBodiesChangesNothing) {
+/// A body rests at the same height whether it or the ground was added first.
+TEST(BulletField, theOrderOfBodiesChangesNothing) {
   Kind box("box,width=1,height=0.8,depth=0.4"), slab("box,width=4,height=4,depth=0.5");
   btSphereShape sphere(0.1);
   btStaticPlaneShape plane(btVector3(0, 0, 1), 0);
@@ -175,7 +175,7 @@ TEST(BulletField, TheOrderOfBodiesChangesNothing) {
   }
 }
 
-TEST(BulletField, ASphereInsideComesOutOnTheNearerSide) {
+TEST(BulletField, aSphereInsideComesOutOnTheNearerSide) {
   Kind slab("box,width=3,height=3,depth=1");
   btSphereShape sphere(0.1);
   for (const double height : {0.3, 0.1, -0.2}) {
@@ -187,7 +187,7 @@ TEST(BulletField, ASphereInsideComesOutOnTheNearerSide) {
   }
 }
 
-TEST(BulletField, BodiesFallAsleepAndWakeWhenHit) {
+TEST(BulletField, bodiesFallAsleepAndWakeWhenHit) {
   Kind box("box,width=0.6,height=0.6,depth=0.4");
   btStaticPlaneShape plane(btVector3(0, 0, 1), 0);
   btSphereShape sphere(0.1);
@@ -204,8 +204,8 @@ TEST(BulletField, BodiesFallAsleepAndWakeWhenHit) {
   EXPECT_GT(world.worldFromBody(body).translation().x() - asleep.x(), 0.1);
 }
 
-/// A table that goes up half a unit by itself.
-TEST(BulletField, AMovingFieldLiftsABodyAndCloth) {
+/// A table rises by half a unit as a kinematic body, i.e. moved by the test and not by forces.
+TEST(BulletField, aMovingFieldLiftsABodyAndCloth) {
   Kind slab("box,width=3,height=3,depth=0.4"), box("box,width=0.6,height=0.6,depth=0.4");
   World world;
   btRigidBody& table = world.body(world.add(slab.shape, 0, at({0, 0, -0.2}) * slab.mass.meshFromInertia));
@@ -231,8 +231,8 @@ TEST(BulletField, AMovingFieldLiftsABodyAndCloth) {
     EXPECT_NEAR(cloth.m_nodes[node].m_x.z(), kSpeed + 0.005, 0.006) << node;
 }
 
-/// Bullet hands a compound's parts to the algorithm with the compound in their place.
-TEST(BulletField, AsAPartOfACompoundItCollidesWithNothing) {
+/// Bullet presents a part of a compound to the collision algorithm as the compound, whose shape is no field.
+TEST(BulletField, aFieldWithinACompoundCollidesWithNothing) {
   Kind plate("box,width=1,height=1,depth=0.2");
   btCompoundShape compound;
   compound.addChildShape(toBullet(plate.mass.meshFromInertia), &plate.shape);
@@ -247,7 +247,7 @@ TEST(BulletField, AsAPartOfACompoundItCollidesWithNothing) {
   EXPECT_LT(world.softBody(0).m_nodes[12].m_x.z(), -0.5);
 }
 
-TEST(BulletField, ThreadsAndRepetitionsChangeNothing) {
+TEST(BulletField, threadsAndRepetitionsChangeNothing) {
   Kind gear("gear"), slab("box,width=6,height=6,depth=0.5");
   const auto end = [&](int threads) {
     tbb::task_arena arena(threads);
@@ -271,8 +271,8 @@ TEST(BulletField, ThreadsAndRepetitionsChangeNothing) {
   EXPECT_EQ(once, end(2));
 }
 
-/// Bullet's own contacts of spheres start from nothing in each step, too few iterations to carry what lies above.
-TEST(BulletField, AColumnOfMarblesStands) {
+/// Bullet's own sphere contacts have no warm start: its few iterations per step cannot carry a column of marbles.
+TEST(BulletField, aColumnOfMarblesStands) {
   constexpr double kRadius = 0.05;
   constexpr int kCount = 12;
   Kind slab("box,width=1,height=1,depth=0.2");
@@ -282,7 +282,7 @@ TEST(BulletField, AColumnOfMarblesStands) {
   std::vector<std::size_t> column;
   for (int n = 0; n < kCount; ++n) {
     column.push_back(world.add(marble, 1, at({0, 0, 0.1 + (2 * n + 1) * kRadius})));
-    world.body(column.back()).setLinearFactor({0, 0, 1});  // does not fall over
+    world.body(column.back()).setLinearFactor({0, 0, 1});  // keeps the column from falling over
   }
   for (int step = 0; step < 480; ++step) world.step();
   double height = 0.1 - kRadius;
@@ -293,7 +293,7 @@ TEST(BulletField, AColumnOfMarblesStands) {
   }
 }
 
-TEST(BulletField, ABodyRestsAsDeepAsTheSlop) {
+TEST(BulletField, aBodyRestsAsDeepAsTheSlop) {
   Kind slab("box,width=1,height=1,depth=0.2");
   btSphereShape marble(0.05);
   World world({.slop = 0.001});
@@ -303,7 +303,7 @@ TEST(BulletField, ABodyRestsAsDeepAsTheSlop) {
   EXPECT_NEAR(world.worldFromBody(number).translation().z(), 0.15 - 0.001, 0.0002);
 }
 
-TEST(BulletField, WhatBlowsUpSaysWhereAndWhen) {
+TEST(BulletField, aDivergingBodyIsReportedWithPositionAndTime) {
   btSphereShape sphere(0.1);
   World world;
   world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
@@ -324,8 +324,8 @@ TEST(BulletField, WhatBlowsUpSaysWhereAndWhen) {
   EXPECT_THROW(World({.slop = -1}), Error);
 }
 
-/// Bullet leaves it where it is, and says nothing.
-TEST(BulletField, WhatIsThrownOutOfTheWorldBlowsUpToo) {
+/// Bullet alone would leave the body where it is, without an error.
+TEST(BulletField, aBodyThrownOutOfTheWorldCountsAsDiverging) {
   btSphereShape sphere(0.1);
   World world;
   world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
@@ -339,7 +339,7 @@ TEST(BulletField, WhatIsThrownOutOfTheWorldBlowsUpToo) {
   }
 }
 
-TEST(BulletField, ANodeThatBlowsUpSaysWhereAndWhen) {
+TEST(BulletField, aDivergingClothNodeIsReportedWithPositionAndTime) {
   World world;
   world.add(hollow().shape, 0, hollow().mass.meshFromInertia);
   world.add(flatSheet(world, {0, 0, 0}, 0.2, 4));
@@ -354,7 +354,7 @@ TEST(BulletField, ANodeThatBlowsUpSaysWhereAndWhen) {
   }
 }
 
-TEST(BulletField, AMarbleAtRestFallsAsleepAndStaysInTheFigures) {
+TEST(BulletField, aMarbleAtRestFallsAsleepAndStaysInTheFigures) {
   Kind slab("box,width=1,height=1,depth=0.2");
   btSphereShape marble(0.05);
   World world;
@@ -369,7 +369,7 @@ TEST(BulletField, AMarbleAtRestFallsAsleepAndStaysInTheFigures) {
   EXPECT_EQ(world.figures().dispatch.contacts, 1u);
 }
 
-TEST(BulletField, AMarbleOnReliefIsFoundAsDeepAsItIs) {
+TEST(BulletField, depthOfAMarbleOnReliefIsExact) {
   Kind bowl("structured-bowl,bumps=4,cells=24");
   constexpr double kRadius = 0.06;
   btSphereShape marble(kRadius);
@@ -398,14 +398,14 @@ TEST(BulletField, AMarbleOnReliefIsFoundAsDeepAsItIs) {
   EXPECT_GT(deepest, 0.04 * kRadius);
 }
 
-TEST(BulletField, ClothThatFallsFastDoesNotPassAThinPlate) {
+TEST(BulletField, fastClothDoesNotPassAThinPlate) {
   Kind plate("box,width=1,height=1,depth=0.02");
   World world;
   world.add(plate.shape, 0, plate.mass.meshFromInertia);
   std::unique_ptr<btSoftBody> sheet = flatSheet(world, {0, 0, 0.3}, 0.25, 15);
   sheet->getCollisionShape()->setMargin(0.01);
   sheet->setTotalMass(1, false);
-  sheet->setVelocity(btVector3(0, 0, -20));  // four times its thickness in a step
+  sheet->setVelocity(btVector3(0, 0, -20));  // four plate thicknesses per step
   world.add(std::move(sheet));
   for (int step = 0; step < 60; ++step) world.step();
   const btSoftBody& cloth = world.softBody(0);
@@ -413,7 +413,7 @@ TEST(BulletField, ClothThatFallsFastDoesNotPassAThinPlate) {
   EXPECT_LT(world.figures().dispatch.deepest, 0.005);
 }
 
-TEST(BulletField, ClothRestsOnABody) {
+TEST(BulletField, clothRestsOnABody) {
   Kind ball("sphere,radius=0.5");
   World world;
   world.add(ball.shape, 0, ball.mass.meshFromInertia);

@@ -38,7 +38,7 @@ double degreesBetween(const Vector3& a, const Vector3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
 }
 
-/// Every sample asked for, one at a time.
+/// Evaluates every sample, one at a time, as a reference for queries that skip samples.
 std::vector<Contact> unculled(const BodyPair& pair, double margin) {
   const Eigen::Isometry3d fieldFromSamples = pair.worldFromField.inverse() * pair.worldFromSamples;
   std::vector<Contact> result;
@@ -58,12 +58,12 @@ Field fieldOf(const std::string& shape, double targetError = 1e-5, bool bounds =
 }
 
 struct Compared {
-  std::size_t poses = 0, touching = 0;  ///< with contacts
+  std::size_t poses = 0, touching = 0;  ///< `touching`: poses with contacts
   QueryCost cost;
   std::size_t samples = 0;
 };
 
-/// Both ways on random poses of both bodies, far from the world's origin too.
+/// Compares queries with the reference for random poses of both bodies, also far from the world's origin.
 Compared compare(const Field& field, const SurfaceSamples& samples, int poses, double reach, unsigned seed) {
   const FieldCollider collider(field);
   ContactQuery query;
@@ -92,26 +92,26 @@ void expectWorth(const Compared& compared) {
   EXPECT_LT(compared.cost.samples, compared.samples / 2) << "nothing was culled";
 }
 
-TEST(Contacts, AreThoseOfAllSamplesOnTheGear) {
+TEST(Contacts, equalThoseOfAllSamplesOnTheGear) {
   expectWorth(compare(fieldOf("gear"), sampleSurface(shapes::mesh("torus"), {.count = 1500}), 1000, 1.6, 1));
 }
 
-TEST(Contacts, AreThoseOfAllSamplesOnTheMarbleRun) {
+TEST(Contacts, equalThoseOfAllSamplesOnTheMarbleRun) {
   expectWorth(compare(fieldOf("marble-run", 1e-4), sampleSurface(shapes::mesh("gear"), {.count = 1500}), 1000, 3, 2));
 }
 
-TEST(Contacts, AreThoseOfAllSamplesWithBounds) {
+TEST(Contacts, equalThoseOfAllSamplesWithBounds) {
   const Field field = fieldOf("torus", 1e-5, true);
   ASSERT_FALSE(field.data().bounds.empty());
   expectWorth(compare(field, sampleSurface(shapes::mesh("gear"), {.count = 1500}), 1000, 1.6, 3));
 }
 
-TEST(Contacts, AreThoseOfAllSamplesWhereBlended) {
+TEST(Contacts, equalThoseOfAllSamplesInBlendedFields) {
   expectWorth(compare(blended(fieldOf("gear", 1e-4), 0.2), sampleSurface(shapes::mesh("torus"), {.count = 1500}), 1000,
                       1.6, 4));
 }
 
-TEST(Contacts, AreThoseOfAllSamplesInTheRudestFields) {
+TEST(Contacts, equalThoseOfAllSamplesInTheCoarsestFields) {
   const SurfaceSamples samples = sampleSurface(shapes::mesh("torus,major=0.5,minor=0.2"), {.count = 1000});
   for (unsigned seed = 0; seed < 5; ++seed) {
     const Field field = randomField(seed, {.roughness = 1});
@@ -120,7 +120,7 @@ TEST(Contacts, AreThoseOfAllSamplesInTheRudestFields) {
   }
 }
 
-TEST(Contacts, OfSpheresHaveTheirDepthsAndNormals) {
+TEST(Contacts, ofSpheresHaveTheirDepthsAndNormals) {
   constexpr double kRadius = 0.6;
   const DistanceFunction sphere = shapes::analytic("sphere,radius=0.6");
   const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 1e-9});
@@ -138,7 +138,7 @@ TEST(Contacts, OfSpheresHaveTheirDepthsAndNormals) {
       ASSERT_NEAR(contact.depth, kRadius - out.norm(), 1e-3 * 2 * kRadius);
       ASSERT_EQ(contact.position, pair.worldFromSamples * samples.points()[contact.sample]);
       ASSERT_NEAR(contact.normal.norm(), 1, 1e-12);
-      if (out.norm() < kRadius / 3) continue;  // towards the middle there is less and less of a way out
+      if (out.norm() < kRadius / 3) continue;  // near the center the normal is undefined
       ASSERT_LT(degreesBetween(contact.normal, out), 0.5);
       ++contacts;
     }
@@ -146,7 +146,7 @@ TEST(Contacts, OfSpheresHaveTheirDepthsAndNormals) {
   EXPECT_GT(contacts, 5000u);
 }
 
-TEST(Contacts, OfABoxHaveTheirDepthsAndNormals) {
+TEST(Contacts, ofABoxHaveItsDepthsAndNormals) {
   const Vector3 half(0.5, 0.35, 0.25);
   const auto box = [&](const Vector3& x) { return shapes::boxDistance(x, half); };
   const Field field = build(box, Box(-1.2 * half, 1.2 * half), {.targetError = 1e-9});
@@ -165,7 +165,7 @@ TEST(Contacts, OfABoxHaveTheirDepthsAndNormals) {
       Eigen::Index axis;
       const double least = below.minCoeff(&axis);
       below[axis] = std::numeric_limits<double>::infinity();
-      if (below.minCoeff() < least + 0.05) continue;  // between two faces the way out is a matter of opinion
+      if (below.minCoeff() < least + 0.05) continue;  // near an edge of the box, two normals are possible
       const Vector3 out = std::copysign(1.0, x[axis]) * Vector3::Unit(axis);
       ASSERT_LT(degreesBetween(contact.normal, pair.worldFromField.linear() * out), 0.5) << x.transpose();
       ++contacts;
@@ -174,7 +174,7 @@ TEST(Contacts, OfABoxHaveTheirDepthsAndNormals) {
   EXPECT_GT(contacts, 2000u);
 }
 
-TEST(Contacts, OutsideTheDomainAreFoundByTheMargin) {
+TEST(Contacts, outsideTheDomainAreFoundByTheMargin) {
   const Field field = fieldOf("sphere,radius=0.5", 1e-6);
   const FieldCollider collider(field);
   const SurfaceSamples samples = sampleSurface(shapes::mesh("sphere,radius=0.1"), {.count = 300});
@@ -189,7 +189,7 @@ TEST(Contacts, OutsideTheDomainAreFoundByTheMargin) {
   EXPECT_LT(degreesBetween(found[0].normal, Vector3::UnitX()), 5);
 }
 
-/// The field of a leaf that is the same everywhere.
+/// Returns a field with one leaf and a constant value.
 Field constantField(double value) {
   FieldData data;
   data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
@@ -198,7 +198,7 @@ Field constantField(double value) {
   return Field(std::move(data));
 }
 
-TEST(Contacts, WithoutAGradientGoAgainstTheSamplesNormal) {
+TEST(Contacts, withoutAGradientOpposeTheSamplesNormal) {
   const Field field = constantField(-0.25);
   const FieldCollider collider(field);
   const SurfaceSamples samples(std::vector<Vector3>{{0.1, 0.2, 0.3}}, std::vector<Vector3>{Vector3::UnitX()});
@@ -211,7 +211,7 @@ TEST(Contacts, WithoutAGradientGoAgainstTheSamplesNormal) {
   EXPECT_EQ(found[0].normal, pair.worldFromSamples.linear() * -Vector3::UnitX());
 }
 
-TEST(Contacts, MayBeTheDeepestOnes) {
+TEST(Contacts, canBeLimitedToTheDeepest) {
   const Field field = fieldOf("torus");
   const FieldCollider collider(field);
   const SurfaceSamples samples = sampleSurface(shapes::mesh("gear"), {.count = 2000});
@@ -229,7 +229,7 @@ TEST(Contacts, MayBeTheDeepestOnes) {
   }
 }
 
-TEST(Contacts, OfEqualDepthAreTakenByTheirIndex) {
+TEST(Contacts, ofEqualDepthAreOrderedByIndex) {
   const Field field = constantField(-0.25);
   const FieldCollider collider(field);
   const SurfaceSamples samples = sampleSurface(shapes::mesh("sphere,radius=0.5"), {.count = 300});
@@ -254,10 +254,10 @@ class ContactsOfPairs : public testing::Test {
   std::vector<BodyPair> pairs_;
 };
 
-TEST_F(ContactsOfPairs, AreThoseOfEachInTheirOrder) {
+TEST_F(ContactsOfPairs, areThoseOfEachPairInOrder) {
   PairContacts contacts;
   ContactQuery query;
-  for (const std::size_t count : {200, 17, 0, 64}) {  // the same room for fewer
+  for (const std::size_t count : {200, 17, 0, 64}) {  // memory is reused for fewer pairs
     const std::span<const BodyPair> pairs = std::span(pairs_).first(count);
     for (const ContactOptions& options : {ContactOptions{}, {.margin = 0.05}, {.margin = 0.05, .deepest = 3}}) {
       findContacts(pairs, options, contacts);
@@ -277,7 +277,7 @@ TEST_F(ContactsOfPairs, AreThoseOfEachInTheirOrder) {
   }
 }
 
-TEST_F(ContactsOfPairs, AreTheSameForAnyNumberOfThreads) {
+TEST_F(ContactsOfPairs, areTheSameForAnyNumberOfThreads) {
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 8);
   PairContacts one;
   tbb::task_arena(1).execute([&] { findContacts(pairs_, {.margin = 0.02}, one); });
@@ -290,7 +290,7 @@ TEST_F(ContactsOfPairs, AreTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST_F(ContactsOfPairs, RefuseTheFirstPairAtFault) {
+TEST_F(ContactsOfPairs, refuseTheFirstFaultyPair) {
   const auto refusal = [&](const ContactOptions& options = {}) -> std::string {
     PairContacts contacts;
     try {
@@ -312,7 +312,7 @@ TEST_F(ContactsOfPairs, RefuseTheFirstPairAtFault) {
   EXPECT_EQ(refusal(), "pair 33: the samples' transform is not rigid: give a rotation and a shift");
 }
 
-TEST_F(ContactsOfPairs, RefuseTransformsThatAreNotRigid) {
+TEST_F(ContactsOfPairs, refuseTransformsThatAreNotRigid) {
   ContactQuery query;
   const auto refused = [&](auto&& change) {
     for (const bool ofField : {false, true}) {

@@ -22,7 +22,7 @@ Vector3 pointAround(const Box& box, std::mt19937_64& random, double beyond = 1.2
   return box.center() + beyond / 2 * box.sizes().cwiseProduct(from);
 }
 
-/// 10‖x‖² − 5 over [-1, 1]³: high at the sides, negative in the middle, and much steeper than a distance.
+/// Returns 10‖x‖² − 5 over [-1, 1]³: positive at the sides, negative in the middle, and much steeper than a distance.
 Field steepField() {
   FieldData data;
   data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
@@ -31,7 +31,7 @@ Field steepField() {
   return Field(std::move(data));
 }
 
-/// Fields that are anything but distances; the last are smooth ones, of a single leaf of the highest degree too.
+/// Returns random fields that are no distances, and at the end two fields of a torus, one with a single base cell.
 std::vector<Field> fields() {
   std::vector<Field> result = {steepField()};
   const Box flat(Vector3(-3, -1, 5), Vector3(1, 2, 5.5));
@@ -51,7 +51,7 @@ std::vector<Field> fields() {
   return result;
 }
 
-TEST(FieldCollider, BoundsTheFieldFromBelow) {
+TEST(FieldCollider, boundsTheFieldFromBelow) {
   std::mt19937_64 random(1);
   for (const Field& field : fields()) {
     const FieldCollider collider(field);
@@ -63,7 +63,7 @@ TEST(FieldCollider, BoundsTheFieldFromBelow) {
   }
 }
 
-TEST(FieldCollider, BoundsTheFieldInSpheres) {
+TEST(FieldCollider, boundsTheFieldInSpheres) {
   std::mt19937_64 random(2);
   std::uniform_real_distribution<double> uniform(0, 1);
   int wrongByItself = 0;
@@ -85,8 +85,8 @@ TEST(FieldCollider, BoundsTheFieldInSpheres) {
   EXPECT_GT(wrongByItself, 1000) << "the fields' own values would not do";
 }
 
-/// Bounds that are always low would be right too.
-TEST(FieldCollider, LosesFewCells) {
+/// Bounds must also be close to the field: bounds that are far too low would pass the other tests.
+TEST(FieldCollider, losesFewCells) {
   const DistanceFunction sphere = shapes::analytic("sphere,radius=0.7");
   const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 1e-7});
   const FieldCollider collider(field);
@@ -101,7 +101,7 @@ TEST(FieldCollider, LosesFewCells) {
   EXPECT_LT(collider.bytes(), 4u << 20);
 }
 
-TEST(FieldCollider, TakesLeavesOfDegreeZero) {
+TEST(FieldCollider, takesLeavesOfDegreeZero) {
   FieldData data;
   data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
   data.nodes = {node::leaf(0, 0)};
@@ -110,11 +110,11 @@ TEST(FieldCollider, TakesLeavesOfDegreeZero) {
   const FieldCollider collider(field);
   for (const Vector3& x : {Vector3(0, 0, 0), Vector3(0.9, -0.9, 0.9)}) {
     EXPECT_LE(collider.lowerBound(x), 0.01);
-    EXPECT_GT(collider.lowerBound(x), 0.008);  // rounded down, to a 32nd of a cell
+    EXPECT_GT(collider.lowerBound(x), 0.008);  // rounded down to multiples of 1/32 of a cell's edge
   }
 }
 
-TEST(FieldCollider, KnowsThatFarAwayIsOutside) {
+TEST(FieldCollider, knowsThatFarAwayIsOutside) {
   const DistanceFunction sphere = shapes::analytic("sphere,radius=0.7");
   const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 1e-5});
   const FieldCollider collider(field);

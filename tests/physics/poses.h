@@ -6,7 +6,7 @@
 
 namespace hpsdf::physics {
 
-/// A random rotation, and a shift by up to `reach` along each axis.
+/// Returns a random rotation with a random shift of up to `reach` along each axis.
 inline Eigen::Isometry3d randomPose(std::mt19937_64& random, double reach) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> shift(-reach, reach);

@@ -18,7 +18,7 @@
 namespace hpsdf::physics {
 namespace surface_samples_test {
 
-/// To the nearest other sample that faces the same way.
+/// Returns each sample's distance to the nearest other sample that faces the same way.
 std::vector<double> nearest(const SurfaceSamples& samples) {
   std::vector<double> result(samples.size(), std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < samples.size(); ++i)
@@ -37,7 +37,7 @@ double mean(const std::vector<double>& values) {
   return sum / double(values.size());
 }
 
-/// The nearest neighbours' distance in the densest packing of disks, of which no set of points has a greater least one.
+/// Returns the neighbour distance of the densest (hexagonal) packing, which no set of points can exceed.
 double idealDistance(double area, std::size_t count) {
   return std::sqrt(2 * area / (std::numbers::sqrt3 * double(count)));
 }
@@ -53,8 +53,8 @@ std::string refusal(const TriangleMesh& mesh, const SampleOptions& options) {
 
 class Samples : public testing::TestWithParam<const char*> {};
 
-// Points by chance: 0.47 in the mean, and 0.01 the least.
-TEST_P(Samples, AreEven) {
+// For random points, the mean nearest distance would be 0.47 and the least one 0.01 of the ideal distance.
+TEST_P(Samples, areEven) {
   const TriangleMesh mesh = shapes::mesh(GetParam());
   const SurfaceSamples samples = sampleSurface(mesh, {.count = 3000});
   ASSERT_EQ(samples.size(), 3000u);
@@ -66,8 +66,8 @@ TEST_P(Samples, AreEven) {
   EXPECT_GT(*std::ranges::min_element(distances), 0.55 * ideal);
 }
 
-// Of the densest packing the widest hole's centre is 0.58 away from the nearest sample.
-TEST_P(Samples, LeaveNoHoles) {
+// In the densest packing, the center of the widest hole is 0.58 ideal distances away from the nearest sample.
+TEST_P(Samples, leaveNoHoles) {
   const TriangleMesh mesh = shapes::mesh(GetParam());
   const SurfaceSamples samples = sampleSurface(mesh, {.count = 1000});
   const SurfaceSamples places = sampleSurface(mesh, {.count = 5000, .seed = 77});
@@ -79,7 +79,7 @@ TEST_P(Samples, LeaveNoHoles) {
   }
 }
 
-TEST_P(Samples, LieOnTheSurfaceAndFaceOutwards) {
+TEST_P(Samples, lieOnTheSurfaceAndFaceOutwards) {
   const TriangleMesh mesh = shapes::mesh(GetParam());
   const SurfaceSamples samples = sampleSurface(mesh, {.count = 1000});
   const ExactDistance distance(mesh);
@@ -93,7 +93,7 @@ TEST_P(Samples, LieOnTheSurfaceAndFaceOutwards) {
 INSTANTIATE_TEST_SUITE_P(Shapes, Samples, testing::Values("sphere", "torus", "gear"),
                          [](const auto& shape) { return std::string(shape.param); });
 
-TEST(SurfaceSamples, OfAThinWallAreEvenOnEachSide) {
+TEST(SurfaceSamples, ofAThinWallAreEvenOnEachSide) {
   const TriangleMesh mesh = shapes::mesh("box,width=1,height=1,depth=0.002");
   const SurfaceSamples samples = sampleSurface(mesh, {.count = 2000});
   const auto above = std::ranges::count_if(samples.points(), [](const Vector3& x) { return x.z() > 0; });
@@ -101,7 +101,7 @@ TEST(SurfaceSamples, OfAThinWallAreEvenOnEachSide) {
   EXPECT_GT(mean(nearest(samples)), 0.75 * idealDistance(surfaceArea(mesh), samples.size()));
 }
 
-TEST(SurfaceSamples, BySpacingHaveAsManySquares) {
+TEST(SurfaceSamples, bySpacingAreAsManyAsSquaresOfThatSide) {
   const TriangleMesh mesh = shapes::mesh("box,width=2,height=3,depth=4");
   const SurfaceSamples samples = sampleSurface(mesh, {.spacing = 0.2});
   EXPECT_EQ(samples.size(), std::size_t(52 / 0.04));
@@ -109,7 +109,7 @@ TEST(SurfaceSamples, BySpacingHaveAsManySquares) {
   EXPECT_EQ(sampleSurface(mesh, {.spacing = 100}).size(), 1u);
 }
 
-TEST(SurfaceSamples, AreTheSameForTheSameSeed) {
+TEST(SurfaceSamples, areTheSameForTheSameSeed) {
   const TriangleMesh mesh = shapes::mesh("gear");
   const auto sample = [&](std::uint64_t seed) { return sampleSurface(mesh, {.count = 500, .seed = seed}); };
   const SurfaceSamples one = sample(1), again = sample(1), other = sample(2);
@@ -118,7 +118,7 @@ TEST(SurfaceSamples, AreTheSameForTheSameSeed) {
   EXPECT_FALSE(std::ranges::equal(one.points(), other.points()));
 }
 
-TEST(SurfaceSamples, AreFewIfAskedFor) {
+TEST(SurfaceSamples, areFewIfAskedFor) {
   for (const std::size_t count : {1, 2, 3, 17}) {
     const SurfaceSamples samples = sampleSurface(shapes::mesh("torus"), {.count = count});
     EXPECT_EQ(samples.size(), count);
@@ -126,7 +126,7 @@ TEST(SurfaceSamples, AreFewIfAskedFor) {
   }
 }
 
-/// The node's subtree in order; returns the first node behind it.
+/// Checks a node and its subtree recursively; returns the first node behind the subtree.
 std::uint32_t checkSubtree(const SurfaceSamples& samples, std::uint32_t node) {
   const Sphere& sphere = samples.spheres()[node];
   double widest = 0;
@@ -149,7 +149,7 @@ std::uint32_t checkSubtree(const SurfaceSamples& samples, std::uint32_t node) {
   return at;
 }
 
-TEST(SurfaceSamples, StandInTightSpheres) {
+TEST(SurfaceSamples, lieInTightSpheres) {
   for (const char* shape : {"torus", "gear", "box,width=4,height=1,depth=0.1"}) {
     const SurfaceSamples samples = sampleSurface(shapes::mesh(shape), {.count = 700});
     EXPECT_EQ(samples.spheres()[0].begin, 0u);
@@ -158,13 +158,13 @@ TEST(SurfaceSamples, StandInTightSpheres) {
   }
 }
 
-TEST(SurfaceSamples, StandInTheSmallestSphere) {
+TEST(SurfaceSamples, lieInTheSmallestSphere) {
   const SurfaceSamples samples = sampleSurface(shapes::mesh("sphere,radius=0.5"), {.count = 2000});
   EXPECT_NEAR(samples.spheres()[0].radius, 0.5, 0.01);
   EXPECT_LT(samples.spheres()[0].center.norm(), 0.01);
 }
 
-TEST(SurfaceSamples, OfAnyPoints) {
+TEST(SurfaceSamples, ofAnyPoints) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::vector<Vector3> points(100), normals(100, Vector3::UnitZ());
@@ -184,7 +184,7 @@ TEST(SurfaceSamples, OfAnyPoints) {
   EXPECT_THROW(SurfaceSamples(points, normals), Error);
 }
 
-TEST(SurfaceSamples, RefuseWhatGivesNone) {
+TEST(SurfaceSamples, refuseMeshesThatGiveNone) {
   const TriangleMesh torus = shapes::mesh("torus");
   const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_THAT(refusal(torus, {}), testing::HasSubstr("either their count or their spacing"));

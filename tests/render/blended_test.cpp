@@ -1,4 +1,4 @@
-// Blended fields are drawn as they are: bounds, oracle and OpenGL.
+// Tests that blended fields are drawn correctly: error bounds, the CPU reference renderer (oracle) and OpenGL.
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ std::vector<SliceView> slices(const Field& field) {
           planeSlice(field.domain(), field.domain().center(), Vector3(1, -2, 0.5), kWidth, kHeight)};
 }
 
-/// By how much a blended field differs from the polynomial of a leaf at local coordinates.
+/// Returns the difference between a blended field and its unblended version at local coordinates of a leaf.
 double differenceAt(const Field& smooth, const Field& plain, const Cell& cell, const Vector3& local) {
   const Vector3 x = cell.box.center() + (cell.box.sizes() / 2).cwiseProduct(local);
   return smooth.value(x) - plain.value(x);
@@ -76,7 +76,7 @@ TEST(BlendZoneBounds, holdWithinTheWholeLeaf) {
             ASSERT_EQ(apart, 0);
             continue;
           }
-          // steps of a quarter of a weight's reach
+          // The segment from -half to half is a quarter as long as a blending weight reaches.
           const Vector3 half = zone.extent / 8 * Vector3(unit(random), unit(random), unit(random)).normalized();
           if ((local.cwiseAbs() + half.cwiseAbs()).maxCoeff() > 1) continue;
           const double sag = 0.5 * (differenceAt(smooth, plain, cell, local - half) +
@@ -84,7 +84,7 @@ TEST(BlendZoneBounds, holdWithinTheWholeLeaf) {
                              differenceAt(smooth, plain, cell, local);
           mostSag = std::max(mostSag, std::abs(sag) / zone.valueDifference);
         }
-        // the leaf across a face and this one, where the one reaches into the other
+        // Compares this leaf's gradient with its neighbour's where the neighbour's blending weight reaches into it.
         for (int n = 0; n < 30; ++n) {
           Vector3 local(unit(random), unit(random), unit(random)), across = local;
           const int axis = n % 3;
@@ -122,7 +122,7 @@ TEST(BlendedSlice, ofTheOracleHasTheFieldsValues) {
     const Field field = jumping(seed), smooth = blended(field, 0.1);
     std::size_t changed = 0;
     for (SliceView view : slices(field)) {
-      view.origin += 0.00137 * view.right + 0.00211 * view.up;  // no row of samples along a face
+      view.origin += 0.00137 * view.right + 0.00211 * view.up;  // avoids samples on faces of cells
       const ViewBuffers buffers = makeCpuRenderer(smooth)->slice(view, kWidth, kHeight);
       for (std::size_t i = 0; i < buffers.cell.size(); ++i) {
         if (!buffers.hit(i)) continue;
@@ -151,7 +151,7 @@ TEST(BlendedTrace, ofTheOracleFindsTheFirstCrossing) {
         const Vector3 start = rayStart(view.camera, kWidth, kHeight, x, y);
         const Vector3 ray = rayDirection(view.camera, kWidth, kHeight, x, y);
         const ValueAndGradient hit = smooth.valueAndGradient(start + double(buffers.distance[i]) * ray);
-        if (buffers.value[i] - view.offset < 1e-4) {  // else the ray enters the domain within the solid
+        if (buffers.value[i] - view.offset < 1e-4) {  // false if the ray starts inside the solid
           ASSERT_NEAR(hit.value, view.offset, 2e-4);
           ASSERT_GT(hit.gradient.normalized().dot(buffers.normal[i].cast<double>()), 0.999);
         }
@@ -184,7 +184,7 @@ TEST(BlendedOpenGl, drawsWhatTheOracleDraws) {
     }
 }
 
-/// The same check on a field that is blended otherwise, and on one that is not.
+/// The comparison must reject a field with another blend width and a field without blending.
 TEST(BlendedOpenGl, differsForAWrongField) {
   HPSDF_REQUIRE_GL();
   const Field field = jumping(10);
@@ -197,7 +197,7 @@ TEST(BlendedOpenGl, differsForAWrongField) {
         << width;
 }
 
-/// Where leaves of depths far apart meet, single precision tells the weights of the smallest less exactly.
+/// Where cells of very different depths meet, single precision is less accurate for weights of the smallest cells.
 TEST(BlendedOpenGl, drawsDeepOctrees) {
   HPSDF_REQUIRE_GL();
   const Field smooth = blended(

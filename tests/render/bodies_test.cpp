@@ -1,4 +1,4 @@
-// Bodies in pictures: the oracle against formulas, OpenGL against the oracle, and what pictures make of both.
+// Tests bodies in pictures: the CPU renderer (oracle) against formulas, OpenGL against the oracle, and the pictures.
 
 #include "hpsdf/render/bodies.h"
 
@@ -49,7 +49,7 @@ Eigen::Isometry3d placed(const Vector3& place, double angle = 0, const Vector3& 
   return Eigen::Translation3d(place) * Eigen::AngleAxisd(angle, axis.normalized());
 }
 
-/// A sheet of n × n squares over [-1, 1]², hanging in waves: open, seen from both sides.
+/// Returns a wavy sheet of n × n squares over [-1, 1]². It is open and seen from both sides.
 TriangleMesh sheet(int n, double phase) {
   TriangleMesh mesh{.vertices = {}, .triangles = {}, .name = "sheet"};
   for (int j = 0; j <= n; ++j)
@@ -78,7 +78,7 @@ std::vector<TriangleMesh> testMeshes() {
           sheet(24, 0)};
 }
 
-/// Bodies anywhere in the domain, turned anyhow, some through one another.
+/// Returns bodies with random positions and rotations in the domain; some intersect each other.
 std::vector<Body> crowd(unsigned seed, int count, std::uint32_t meshes) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> within(-1.6, 1.6);
@@ -91,14 +91,14 @@ std::vector<Body> crowd(unsigned seed, int count, std::uint32_t meshes) {
   return bodies;
 }
 
-// --- The rule by which OpenGL's buffers are held against the oracle's
+// --- Comparison of OpenGL's buffers with the oracle's buffers
 // -------------------------------------------------
 
 struct BodyTolerance {
-  double position = 0;        ///< where triangles agree: along the ray, world units
-  double besidePixels = 0.1;  ///< where they do not: across the surface of the oracle's triangle, in pixels' sizes
-  double normal = 1e-5;       ///< where triangles agree
-  double pixels = 1e-3;       ///< fraction whose body may differ, at edges only
+  double position = 0;        ///< same triangle: difference of distances along the ray, in world units
+  double besidePixels = 0.1;  ///< different triangles: difference across the oracle's triangle, in pixels
+  double normal = 1e-5;       ///< same triangle: norm of the normals' difference
+  double pixels = 1e-3;       ///< fraction of pixels, at edges only, that may show different bodies
 };
 
 bool atEdge(const BodyBuffers& buffers, int x, int y) {
@@ -109,9 +109,9 @@ bool atEdge(const BodyBuffers& buffers, int x, int y) {
   return false;
 }
 
-/// Bodies agree but for few pixels, each within one pixel of where another begins in either buffers. Where triangles
-/// agree too, so do distances and normals; where they do not, both see the one surface from either side of an edge, or
-/// they are counted as those of other bodies are.
+/// Both buffers must show the same bodies, except for few pixels next to an edge of a body. Where the triangles agree,
+/// distances and normals must agree too; where they differ, the distances across the surface must agree, or the pixel
+/// counts as one of the few.
 testing::AssertionResult agree(const BodyBuffers& expected, const BodyBuffers& actual, const Camera& camera,
                                const BodyTolerance& tolerance) {
   if (expected.width != actual.width || expected.height != actual.height)
@@ -176,7 +176,7 @@ TEST(BodyNormals, areSmoothOnASphereAndFlatOnABox) {
 }
 
 TEST(BodyNormals, weighAFanOfSmallTrianglesByItsAngle) {
-  // a roof of two slopes at 10 degrees; one of them is cut into many triangles at the vertex on the ridge
+  // The roof has two slopes of 10 degrees; one slope is divided into many triangles that meet in a vertex of the ridge.
   const double slope = 10 * std::numbers::pi / 180;
   TriangleMesh mesh{.vertices = {Vector3::Zero()}, .triangles = {}, .name = "roof"};
   const auto add = [&](double from, double to, double tilt) {
@@ -203,7 +203,7 @@ TEST(BodyNormals, ignoreDegenerateTriangles) {
 // --- The oracle
 // ---------------------------------------------------------------------------------------------------------
 
-/// Where a ray enters a box about the origin, by its slabs; and how near it passes an edge of it.
+/// Where a ray enters a box around the origin, and how far it is from missing the box.
 struct Entry {
   double distance;
   int axis;
@@ -266,7 +266,7 @@ TEST(CpuBodies, showBoxesWhereTheirSlabsAre) {
   }
 }
 
-/// Whether a ray meets a triangle, by the volumes that it spans with the edges; its distance there.
+/// Returns the distance at which a ray meets a triangle, found from the volumes that the ray spans with its edges.
 std::optional<double> meetByVolumes(const Vector3& start, const Vector3& ray, const std::array<Vector3, 3>& corners) {
   std::array<double, 3> volumes;
   for (int k = 0; k < 3; ++k) volumes[k] = ray.dot((corners[(k + 1) % 3] - start).cross(corners[(k + 2) % 3] - start));
@@ -364,7 +364,7 @@ TEST_F(GlBodies, areThoseOfTheOracle) {
     for (const Projection projection : kProjections)
       for (const double distance : {0.3, 1.1, 8.0}) {
         Camera camera = cameraFrom(projection, 80.0 * seed, 50.0 - 30 * seed, distance);
-        if (distance < 1 && projection == Projection::orthographic) camera.eye += 2.0 * camera.forward;  // within
+        if (distance < 1 && projection == Projection::orthographic) camera.eye += 2.0 * camera.forward;  // in the crowd
         const BodyBuffers expected = cpu->view(camera, bodies, kWidth, kHeight);
         const auto result = agree(expected, device->view(camera, bodies, kWidth, kHeight), camera, kTolerance);
         EXPECT_TRUE(result) << result.message() << " (seed " << seed << ", distance " << distance << ")";
@@ -425,7 +425,7 @@ TEST_F(GlBodies, showMovedVerticesAsAMeshMadeOfThem) {
   bodies[1].worldFromBody = placed(Vector3(0, 0, 0.2), 1, Vector3::UnitX());
   const std::vector<TriangleMesh> before = {shapes::mesh("box"), sheet(60, 0)};
   TriangleMesh later = sheet(60, 1.5);
-  for (Vector3& vertex : later.vertices) vertex += Vector3(30, 0, 0);  // its middle moves too
+  for (Vector3& vertex : later.vertices) vertex += Vector3(30, 0, 0);  // moves its center too
   for (Body& body : bodies)
     if (body.mesh == 1) body.worldFromBody.translate(Vector3(-30, 0, 0));
   const auto device = gl(before);
@@ -439,7 +439,7 @@ TEST_F(GlBodies, showMovedVerticesAsAMeshMadeOfThem) {
   EXPECT_EQ(moved.normal, anew.normal);
   EXPECT_EQ(moved.distance, anew.distance);
   EXPECT_NE(moved.body, old.body);
-  // coordinates in the mesh's frame are of size 30
+  // Both renderers must agree although the mesh's own coordinates are about 30.
   const auto result = agree(cpu->view(camera, bodies, kWidth, kHeight), moved, camera, kTolerance);
   EXPECT_TRUE(result) << result.message();
 }
@@ -570,7 +570,7 @@ const Field& ball() {
   return field;
 }
 
-/// Boxes half sunk into the ball's surface, before it, behind it, and outside of the domain.
+/// Returns boxes that are half sunk into the ball's surface, before it, behind it, and outside of the domain.
 std::vector<Body> aboutTheBall() {
   std::vector<Body> bodies;
   for (const Vector3& place : {Vector3(0.9, 0.2, 0.6), Vector3(-0.7, 0.8, 0.5), Vector3(0.4, -0.3, 1.7),
@@ -595,7 +595,7 @@ TEST(BodyPictures, showTheNearerOfSurfaceAndBody) {
     const int width = drawn.buffers.width, height = drawn.buffers.height;
     const ViewBuffers alone = cpu->surface({camera}, width, height);
     const BodyBuffers seen = bodyRenderer->view(camera, bodies, width, height);
-    std::array<int, 3> counts = {};  // bodies before nothing, before the ball, behind it
+    std::array<int, 3> counts = {};  // pixels of bodies: before the background, before the ball, behind it
     for (std::size_t i = 0; i < alone.cell.size(); ++i) {
       const bool body = seen.hit(i) && (!alone.hit(i) || seen.distance[i] < alone.distance[i]);
       ASSERT_EQ(drawn.buffers.showsBody(i), body);
@@ -612,10 +612,10 @@ TEST(BodyPictures, showTheNearerOfSurfaceAndBody) {
     EXPECT_TRUE(drawn.seen);
     EXPECT_EQ(drawn.details[1], "t = 2.5 s");
     EXPECT_EQ(drawn.details[2], "5 bodies");
-    // what lies before the domain is seen of parallel rays too
+    // Bodies in front of the domain are visible with parallel rays too.
     EXPECT_EQ(std::ranges::count(drawn.buffers.body, 4u) > 100, true);
 
-    // picks are of the field alone
+    // Picks find the field only, not bodies.
     int picked = 0, none = 0;
     for (int y = 10; y < drawn.image.height; y += 20)
       for (int x = 10; x < drawn.image.width; x += 20) {
@@ -661,7 +661,7 @@ TEST(BodyPictures, keepTheColorsOfBodiesForAnyColorsOfTheField) {
     }
     EXPECT_GT(count, 1000);
     EXPECT_LT(far, count / 20);
-    // what bodies near by take of the light alone
+    // The field's pixels change only where nearby bodies shade the surface.
     EXPECT_LT(changed, fieldOnly / 2);
     EXPECT_GT(changed, 0) << "no shade where bodies touch the surface";
   }
@@ -704,7 +704,7 @@ TEST(BodyPictures, averageSamplesInLinearLight) {
 TEST(BodyPictures, hideLinesOutlinesAndBoxesBehindBodies) {
   const auto cpu = makeCpuRenderer(ball());
   const auto bodyRenderer = makeCpuBodyRenderer({smallBox()});
-  const std::vector<Body> bodies = {{0, placed(Vector3(0.2, 0.1, 2.4), 0.4)}};  // before the domain
+  const std::vector<Body> bodies = {{0, placed(Vector3(0.2, 0.1, 2.4), 0.4)}};  // in front of the domain
   for (const CellStyle style : {CellStyle::none, CellStyle::lines, CellStyle::boxes}) {
     SurfacePicture picture{.camera = {.azimuthDegrees = 5, .elevationDegrees = 10},
                            .width = 200,

@@ -9,7 +9,7 @@ namespace color_view_test {
 
 const LevelMap kMap(std::vector<int>{2, 3, 5});
 
-// A slice seen by hand: one cell of degree 2, no depth, far from the surface.
+// Returns a slice that shows one cell of degree 2 and depth 3, with the same value everywhere.
 ViewBuffers blank(int width, int height, float value = 10) {
   ViewBuffers buffers;
   const std::size_t size = std::size_t(width) * height;
@@ -30,7 +30,7 @@ void forEachSample(ViewBuffers& buffers, const Visit& visit) {
     for (int x = 0; x < buffers.width; ++x) visit(x, y, std::size_t(y) * buffers.width + x);
 }
 
-// Degree 2 on the left half, 5 on the right one, nothing in the last four columns.
+// Returns a slice with degree 2 in the left half, degree 5 in the right half, and nothing in the last four columns.
 ViewBuffers twoCells(int size) {
   ViewBuffers buffers = blank(size, size);
   forEachSample(buffers, [&](int x, int, std::size_t i) {
@@ -46,7 +46,7 @@ Image degrees(const ViewBuffers& buffers, int samples = 1) {
 
 double lightnessOf(Color color) { return toOklab(decodeSrgb(color)).lightness; }
 
-// How much darker a pixel is than the colour of its value alone.
+// Returns how much darker a pixel is than the colour of its value, because of lines.
 double inkAt(const Image& image, int x, int y, double value, const DistanceScale& scale) {
   return toOklab(divergingColor(value / scale.range)).lightness - lightnessOf(image.at(x, y));
 }
@@ -109,10 +109,10 @@ TEST(LevelSlice, hasOutlinesOfOneWidthForAnyNumberOfSamples) {
 }
 
 TEST(LevelSlice, averagesSamplesInLinearLight) {
-  // columns one sample wide, so that every pixel holds as much of either level and no outline
+  // Degrees alternate from column to column of samples, so that every pixel contains equal parts of both.
   ViewBuffers buffers = blank(32, 32);
   forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.cell[i] = x, buffers.degree[i] = x % 2 ? 5 : 2; });
-  // a cell as high as the picture would be outlined: cut the columns into single samples
+  // Each sample becomes a cell of its own, because cells as high as the picture would have outlines.
   forEachSample(buffers, [&](int x, int y, std::size_t i) { buffers.cell[i] = y * 32 + x; });
   const Image image = degrees(buffers, 2);
   ASSERT_EQ(image.width, 16);
@@ -130,7 +130,7 @@ TEST(LevelSlice, showsTheSurfaceAsALine) {
   EXPECT_EQ(image.at(50, 20), encodeSrgb(kMap(2)));
 }
 
-// Values rise by `slope` a column and pass 0 between columns 31 and 32.
+// Returns a slice whose values rise by `slope` per column and pass 0 between columns 31 and 32.
 ViewBuffers ramp(double slope) {
   ViewBuffers buffers = blank(64, 64);
   forEachSample(buffers, [&](int x, int, std::size_t i) { buffers.value[i] = static_cast<float>(slope * (x - 31.5)); });
@@ -175,7 +175,7 @@ TEST(DistanceSlice, hasLinesOfOneWidthForAnySlope) {
 }
 
 TEST(DistanceSlice, hasNoBlotsAtJumps) {
-  // two cells whose values jump by half a step where they meet, and pass a line each
+  // Two cells, each with one iso-line; where the cells meet, their values differ by half an iso-line step.
   ViewBuffers buffers = ramp(0.01);
   forEachSample(buffers, [&](int x, int, std::size_t i) {
     if (x >= 45) buffers.cell[i] = 1, buffers.value[i] += 0.05F;
@@ -219,7 +219,7 @@ TEST(Surface, showsTheBackdropWhereARayMisses) {
 }
 
 TEST(Surface, isLitFromAboveLeftOfTheCameraInAnyDirection) {
-  // the same scene before two cameras: its normals turned along
+  // Two cameras see the same scene: `turn` rotates the second camera together with the normals.
   const Eigen::Matrix3f turn = Eigen::AngleAxisf(1.3F, Eigen::Vector3f(1, 2, -1).normalized()).toRotationMatrix();
   const auto shaded = [&](const Eigen::Vector3f& normal, const Eigen::Matrix3f& rotation) {
     ViewBuffers buffers = blank(1, 1);
@@ -237,11 +237,11 @@ TEST(Surface, isLitFromAboveLeftOfTheCameraInAnyDirection) {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(shaded(normal, still)[i], shaded(normal, turn)[i], 1);
 }
 
-// A wall before the camera whose middle steps back by `depth` in a groove, ten columns wide.
+// Draws a wall in front of the camera with a vertical groove in its middle, `depth` deep and ten columns wide.
 Image groove(double depth, ColorBy color, Projection projection) {
   ViewBuffers buffers = blank(200, 200);
   const bool parallel = projection == Projection::orthographic;
-  const double half = parallel ? 0.9 : 0.3;  // 0.9 of the wall in either case
+  const double half = parallel ? 0.9 : 0.3;  // both views are 1.8 wide at the wall
   const Camera camera = {{0, 0, 3}, {0, 0, -1}, {half, 0, 0}, {0, half, 0}, projection};
   forEachSample(buffers, [&](int x, int y, std::size_t i) {
     const Vector3 ray((2 * (x + 0.5) / 200 - 1) * 0.3, (1 - 2 * (y + 0.5) / 200) * 0.3, -1);

@@ -12,12 +12,12 @@
 namespace hpsdf::render {
 namespace colormap_test {
 
-// How dichromats see a colour: the response of the missing cone is replaced by the combination of the other two that
-// leaves white and one more colour, which they see as others do, unchanged (after Viénot, Brettel & Mollon 1999).
+// How dichromats see a colour: the missing cone's response is replaced by a combination of the other two cones that
+// keeps white and one more colour unchanged (after Viénot, Brettel & Mollon 1999).
 enum class Vision { normal, protan, deutan, tritan };
 
 Eigen::Matrix3d coneFromLinear() {
-  // Hunt-Pointer-Estevez cones (normalised to D65) of CIE XYZ, of linear sRGB.
+  // Matrices from CIE XYZ to Hunt-Pointer-Estevez cones (normalised to D65), and from linear sRGB to CIE XYZ.
   Eigen::Matrix3d coneFromXyz, xyzFromLinear;
   coneFromXyz << 0.4002, 0.7076, -0.0808, -0.2263, 1.1653, 0.0457, 0, 0, 0.9182;
   xyzFromLinear << 0.4124, 0.3576, 0.1805, 0.2126, 0.7152, 0.0722, 0.0193, 0.1192, 0.9505;
@@ -53,19 +53,19 @@ TEST(Color, returnsUnchangedFromLinearLight) {
     EXPECT_EQ(encodeSrgb(decodeSrgb({v, 0, v})), (Color{v, 0, v}));
   }
   EXPECT_EQ(encodeSrgb({-1, 2, 0.2140411F}),
-            (Color{0, 255, 127}));  // half of the code range, from the standard's curve
+            (Color{0, 255, 127}));  // half of the code range, by the sRGB standard's curve
 }
 
 TEST(Color, returnsUnchangedFromOklabAndHasItsKnownCorners) {
   const Oklab white = toOklab({1, 1, 1});
   EXPECT_NEAR(white.lightness, 1, 1e-6);
   EXPECT_NEAR(std::hypot(white.a, white.b), 0, 1e-6);
-  EXPECT_NEAR(toOklab({1, 0, 0}).lightness, 0.62796, 1e-4);  // red, in Ottosson's article
+  EXPECT_NEAR(toOklab({1, 0, 0}).lightness, 0.62796, 1e-4);  // red, from Ottosson's article about Oklab
   for (float r : {0.0F, 0.3F, 1.0F})
     for (float g : {0.0F, 0.5F, 1.0F})
       for (float b : {0.0F, 0.7F, 1.0F})
         EXPECT_LT((fromOklab(toOklab({r, g, b})) - LinearColor(r, g, b)).norm(), 1e-4) << r << " " << g << " " << b;
-  // beyond the gamut: the same lightness and hue, less chroma
+  // A colour beyond the gamut keeps its lightness and hue, and loses chroma.
   const Oklab vivid = toOklab(fromOklch(0.5, 0.9, 145));
   EXPECT_NEAR(vivid.lightness, 0.5, 1e-3);
   EXPECT_NEAR(std::atan2(vivid.b, vivid.a), 145 * 3.14159265 / 180, 0.01);
@@ -75,7 +75,7 @@ TEST(LevelMap, risesStrictlyInLightnessForUpTo29Levels) {
   for (int count = 2; count <= 29; ++count) {
     const LevelMap map(firstLevels(count));
     for (int level = 3; level < count + 2; ++level) {
-      // of the colours as they are stored, eight bits a channel
+      // Lightness is compared for colours as stored, with eight bits per channel.
       const double below = toOklab(decodeSrgb(encodeSrgb(map(level - 1)))).lightness;
       const double here = toOklab(decodeSrgb(encodeSrgb(map(level)))).lightness;
       EXPECT_GT(here, below + 0.01) << count << " levels, level " << level;
@@ -88,13 +88,13 @@ TEST(LevelMap, hasNeighboursThatEveryEyeDistinguishes) {
     for (int count = 2; count <= 10; ++count) {
       const LevelMap map(firstLevels(count));
       for (int level = 3; level < count + 2; ++level)
-        // 0.02 is just noticeable; neighbours must be told apart at a glance
+        // A difference of 0.02 is just noticeable; neighbours must be distinguishable at a glance.
         EXPECT_GT(colorDifference(toOklab(seen(map(level - 1), vision)), toOklab(seen(map(level), vision))), 0.05)
             << count << " levels, level " << level << ", vision " << static_cast<int>(vision);
     }
 }
 
-/// From what surfaces are coloured with: the map of levels and quantities, shaded, and clay from light to dark.
+/// Cracks must differ from the shaded colours of levels and quantities, and from clay (the plain surface) in any light.
 TEST(CrackColor, differsFromEveryOtherForEveryEye) {
   std::vector<LinearColor> others;
   for (double t = 0; t <= 1; t += 0.02)
@@ -109,7 +109,7 @@ TEST(CrackColor, differsFromEveryOtherForEveryEye) {
 }
 
 TEST(ColorVisionSimulation, confusesTheColorsThatDichromatsConfuse) {
-  // negative control of the test above: a red and a green that are one colour without M cones
+  // Negative control of the simulation: a red and a green that look alike without M cones.
   const LinearColor red = fromOklch(0.60, 0.12, 30), green = fromOklch(0.60, 0.12, 135);
   const auto difference = [&](Vision v) { return colorDifference(toOklab(seen(red, v)), toOklab(seen(green, v))); };
   EXPECT_GT(difference(Vision::normal), 0.15);

@@ -1,5 +1,5 @@
 #pragma once
-// The rule by which a renderer's buffers are held against the oracle's.
+// Compares the view buffers of a renderer with the buffers of the double-precision CPU renderer (oracle).
 
 #include <gtest/gtest.h>
 
@@ -11,13 +11,13 @@
 namespace hpsdf::render {
 
 struct BufferTolerance {
-  double value = 0;        ///< of f, world units
-  double position = 0;     ///< of a hit across the surface, world units
-  double normalAngle = 0;  ///< radians
-  double pixels = 1e-3;    ///< fraction whose hit, cell, degree or depth may differ, at edges only
+  double value = 0;        ///< tolerance of the field's value, in world units
+  double position = 0;     ///< tolerance of a hit's position across the surface, in world units
+  double normalAngle = 0;  ///< tolerance of the normal, in radians
+  double pixels = 1e-3;    ///< fraction of pixels, at edges only, whose hit, cell, degree or depth may differ
 };
 
-/// Some pixel around (x, y) differs from it in this one of the buffers.
+/// Returns true if any of the eight pixels around (x, y) has another value in `buffer` than this pixel.
 template <typename T>
 bool atEdge(const ViewBuffers& buffers, const std::vector<T>& buffer, int x, int y) {
   const T here = buffer[std::size_t(y) * buffers.width + x];
@@ -27,28 +27,28 @@ bool atEdge(const ViewBuffers& buffers, const std::vector<T>& buffer, int x, int
   return false;
 }
 
-/// Where a pixel's ray starts.
+/// Returns the starting point of a pixel's ray.
 inline Vector3 rayStart(const Camera& camera, int width, int height, int x, int y) {
   if (camera.projection == Projection::perspective) return camera.eye;
   return camera.eye + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
 }
 
-/// Its direction, unit.
+/// Returns the unit direction of a pixel's ray.
 inline Vector3 rayDirection(const Camera& camera, int width, int height, int x, int y) {
   if (camera.projection == Projection::orthographic) return camera.forward;
   return (camera.forward + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height))
       .normalized();
 }
 
-/// What a pixel sees: where it hits.
+/// Returns the point where a pixel's ray hits the surface.
 inline Vector3 hitPoint(const Camera& camera, const ViewBuffers& buffers, std::size_t pixel) {
   const int x = static_cast<int>(pixel % buffers.width), y = static_cast<int>(pixel / buffers.width);
   return rayStart(camera, buffers.width, buffers.height, x, y) +
          double(buffers.distance[pixel]) * rayDirection(camera, buffers.width, buffers.height, x, y);
 }
 
-/// Cells, degrees, depths and cracks agree but for few pixels, each within one pixel of an edge; where cells agree,
-/// values, and, for a surface (`camera` given), positions across the surface and normals agree within the tolerances.
+/// Cells, degrees, depths and cracks must agree except for few pixels, each within one pixel of an edge. Where cells
+/// agree, values must agree within the tolerances, and so must positions and normals if `camera` is given.
 inline testing::AssertionResult agree(const ViewBuffers& expected, const ViewBuffers& actual,
                                       const BufferTolerance& tolerance, const Camera* camera = nullptr) {
   if (expected.width != actual.width || expected.height != actual.height)

@@ -7,9 +7,9 @@ namespace compare_test {
 
 const Color kGrey = {100, 100, 100};
 
-Image grey() { return Image(50, 20, kGrey); }  // 1000 pixels: the budget of 0.2 % is two of them
+Image grey() { return Image(50, 20, kGrey); }  // 1000 pixels, of which 0.2 % (two) may differ
 
-/// The grey picture with so many pixels of another colour.
+/// Returns the grey picture with `count` pixels of another colour.
 Image withSpots(int count, Color color) {
   Image image = grey();
   for (int n = 0; n < count; ++n) image.pixels[std::size_t(n) * 37] = color;
@@ -67,7 +67,7 @@ TEST(DifferencePicture, distinguishesToleratedDifferences) {
 TEST(WorstPixels, areSortedAndApart) {
   Image actual = grey();
   actual.at(2, 3) = {100, 100, 140};
-  actual.at(3, 3) = {100, 100, 139};  // beside it: not listed
+  actual.at(3, 3) = {100, 100, 139};  // next to a listed pixel, so not listed
   actual.at(40, 10) = {0, 100, 100};
   actual.at(20, 19) = {101, 100, 100};
   const auto worst = worstPixels(grey(), actual, 10);

@@ -12,7 +12,7 @@ namespace cracks_test {
 
 constexpr Color kGrey = {90, 90, 90};
 
-/// A view in which the given samples show cracks, by a step of the given height.
+/// Returns a view in which the given samples show cracks of the given height.
 ViewBuffers torn(int width, int height, const std::set<std::pair<int, int>>& samples, float step) {
   ViewBuffers buffers = emptyBuffers(width, height, true);
   for (const auto& [x, y] : samples) {
@@ -36,7 +36,7 @@ TEST(CracksOfAView, areCountedInPixelsAndMeasuredFromTheOffset) {
 }
 
 TEST(MarkedCracks, areAPixelWiderOnEverySide) {
-  Image picture(20, 12, kGrey);  // of which the view is a part
+  Image picture(20, 12, kGrey);  // the view is only a part of it
   markCracks(picture, torn(16, 9, {{7, 4}, {0, 0}, {15, 8}}, 1), {1, 1, 1});
   for (int y = 0; y < 12; ++y)
     for (int x = 0; x < 20; ++x) {

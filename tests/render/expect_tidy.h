@@ -1,5 +1,5 @@
 #pragma once
-// Layouts as readers need them.
+// Checks that the layout of a picture's texts and boxes is readable.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 namespace hpsdf::render {
 
-/// Nothing beyond the picture; texts large enough, and apart from each other.
+/// Expects that nothing extends beyond the picture, and that texts are large enough and do not overlap.
 inline void expectReadable(const Overlay& overlay, const Frame& frame, const std::string& what) {
   const PixelRect whole = {0, 0, frame.width, frame.height};
   std::vector<PixelRect> boxes;
@@ -32,7 +32,7 @@ inline void expectReadable(const Overlay& overlay, const Frame& frame, const std
   }
 }
 
-/// Also no text in the view.
+/// Expects a readable layout with no text over the view, i.e. all texts in the panel or the caption.
 inline void expectTidy(const Overlay& overlay, const Frame& frame, const std::string& what) {
   expectReadable(overlay, frame, what);
   for (const TextItem& item : overlay.texts) {

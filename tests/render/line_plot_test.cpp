@@ -16,7 +16,7 @@
 namespace hpsdf::render {
 namespace line_plot_test {
 
-/// f = 0 in x < 0, 1 from there on; two cells of degrees 0 and 1.
+/// Makes a field of two cells with degrees 0 and 1, whose value is 0 for x < 0 and 1 otherwise.
 Field stepField() {
   FieldData data;
   data.domain = Box(Vector3(-1, 0, 0), Vector3(1, 1, 1));
@@ -58,7 +58,7 @@ TEST(LinePlot, showsAJumpAsAnUprightStepInItsPlace) {
     EXPECT_GT(a.y() - b.y(), 0.8 * chart.height()) << "upwards";
   }
   EXPECT_EQ(steps, 1);
-  // without an exact distance, the jump stands in the second chart
+  // Without an exact distance, the second chart shows the jump.
   const CurveItem& stem = layout.curves[1];
   EXPECT_EQ(stem.within, layout.charts[1]);
   ASSERT_EQ(stem.points.size(), 2u);
@@ -91,7 +91,7 @@ TEST(LinePlot, hasBandsInTheColorsOfTheFieldsLevels) {
   const LineLayout layout = layOutLine(frame(1280, 720), field, line, {});
   const PixelRect& last = layout.charts.back();
   const auto at = [&](double t) { return last.x0 + int(t * last.width()); };
-  const int y = last.y1 + 20;  // within the band of degrees, above and beside its numbers
+  const int y = last.y1 + 20;  // within the band of degree colours, but not on a number
   const LevelMap map(std::vector<int>{0, 1});
   EXPECT_EQ(image.at(at(0.3), y), encodeSrgb(map(0)));
   EXPECT_EQ(image.at(at(0.7), y), encodeSrgb(map(1)));

@@ -1,4 +1,4 @@
-// Pictures of meshes: which way faces look, and where defects are.
+// Tests pictures of meshes, which show the orientation of faces and the places of defects.
 
 #include "hpsdf/render/mesh_picture.h"
 
@@ -45,7 +45,7 @@ Image drawn(const TriangleMesh& mesh, const MeshPicture& picture) {
   return drawMesh(makeCpuBodyRenderer, mesh, defectsOf(mesh), picture);
 }
 
-/// The pixel that shows a place.
+/// Returns the colour of the pixel that shows a point of the mesh.
 Color colorAt(const Image& image, const TriangleMesh& mesh, const MeshPicture& picture, const Vector3& place) {
   const PixelRect view = frame(picture.width, picture.height).view;
   const Camera camera = cameraOf(picture.camera, domainAround(mesh), view.width(), view.height());
@@ -72,7 +72,7 @@ TEST(MeshPicture, showsTheOrientationOfFaces) {
   EXPECT_TRUE(isClay(colorAt(drawn(boxOfTwo(), above), boxOfTwo(), above, {0.3, 0, 1})));
 }
 
-/// Of the pixels around a place, how near one comes to a colour.
+/// Returns the smallest difference from a colour among the pixels around a point of the mesh.
 int nearestTo(const Color& color, const Image& image, const TriangleMesh& mesh, const MeshPicture& picture,
               const Vector3& place) {
   const PixelRect view = frame(picture.width, picture.height).view;
@@ -87,7 +87,7 @@ int nearestTo(const Color& color, const Image& image, const TriangleMesh& mesh, 
 TEST(MeshPicture, drawsEdgesInTheirColor) {
   const TriangleMesh open = openBox();
   const Color yellow = defectColor(DefectKind::boundaryEdge);
-  const Vector3 onRim(0, -1, 1);  // in front
+  const Vector3 onRim(0, -1, 1);  // a point on the open box's front edge
   const MeshPicture above = pictureFrom(0, 30);
   EXPECT_LT(nearestTo(yellow, drawn(open, above), open, above, onRim), 150);
   EXPECT_GT(nearestTo(yellow, drawn(boxOfTwo(), above), boxOfTwo(), above, onRim), 200);
@@ -98,7 +98,7 @@ TEST(MeshPicture, dashesHiddenMarksAndKeepsTheirHue) {
   below.width = 1280;
   below.height = 720;
   const TriangleMesh box = boxOfTwo(), open = openBox();
-  TriangleMesh wrong = box;  // all around its upper side edges are inconsistent, where those of the open one are open
+  TriangleMesh wrong = box;  // will have inconsistent edges where `open` has boundary edges
   for (auto& triangle : wrong.triangles)
     if (std::ranges::all_of(triangle, [&](std::uint32_t v) { return wrong.vertices[v].z() > 0; }))
       std::swap(triangle[0], triangle[1]);
@@ -106,7 +106,7 @@ TEST(MeshPicture, dashesHiddenMarksAndKeepsTheirHue) {
   int gaps = 0, dashes = 0;
   constexpr int kPlaces = 200;
   for (int i = 0; i < kPlaces; ++i) {
-    const Vector3 behind(1.8 * (i + 0.5) / kPlaces - 0.9, 1, 1);  // behind floor and front
+    const Vector3 behind(1.8 * (i + 0.5) / kPlaces - 0.9, 1, 1);  // hidden by the floor and the front side
     const Color yellow = colorAt(boundary, box, below, behind), green = colorAt(inconsistent, box, below, behind);
     gaps += yellow == colorAt(plain, box, below, behind) && green == yellow;
     dashes += differenceOf(yellow, green) > 150;
@@ -162,7 +162,7 @@ TEST(MeshPicture, showsCrossingFacesInRed) {
   EXPECT_GT(differenceOf(meeting, defectColor(DefectKind::crossing)), 150) << "rings on them do not show";
 }
 
-/// What pictures of two meshes do not share.
+/// Returns the bounding box of the pixels in which two pictures differ.
 Eigen::AlignedBox2i differenceBox(const Image& a, const Image& b) {
   Eigen::AlignedBox2i box;
   for (int y = 0; y < a.height; ++y)
@@ -183,7 +183,7 @@ TEST(MeshPicture, showsTheWholeMeshForAnyShapeOfMeshAndView) {
           picture.width = width;
           picture.height = height;
           picture.camera.projection = projection;
-          MeshPicture away = picture;  // looks past it
+          MeshPicture away = picture;  // looks past the mesh
           away.whole = false;
           away.camera.target = Vector3(1e4, 0, 0);
           const Eigen::AlignedBox2i seen = differenceBox(drawn(mesh, picture), drawn(mesh, away));
@@ -198,7 +198,7 @@ TEST(MeshPicture, showsTheWholeMeshForAnyShapeOfMeshAndView) {
         }
 }
 
-/// As GL does it, through llvmpipe.
+/// Makes an OpenGL renderer on the software device (llvmpipe).
 std::unique_ptr<BodyRenderer> makeGl(std::vector<TriangleMesh> meshes) {
   return makeGlBodyRenderer(std::move(meshes), GlChoice::software);
 }
@@ -227,7 +227,7 @@ TEST(MeshPicture, isTheSameAtAnySizeAndPlace) {
         const double scale = std::ldexp(1.0, exponent);
         EXPECT_EQ(differentPixels(image, drawnBy(scale, {0, 0, 0}), 0), 0u) << exponent;
       }
-      const double far = std::ldexp(1.0, 60);  // coordinates 1024 apart there keep the mesh as it is
+      const double far = std::ldexp(1.0, 60);  // the scaled mesh's coordinates are still exact there
       EXPECT_EQ(differentPixels(image, drawnBy(std::ldexp(1.0, 20), {far, -far, far}), 0), 0u);
     }
 }

@@ -17,10 +17,10 @@
 namespace hpsdf::render {
 namespace picture_test {
 
-constexpr double kPlane = 0.125;  // the surface of the test field: x = kPlane, inside below
+constexpr double kPlane = 0.125;  // the test field's surface is at x = kPlane; points below are inside
 
-// f = x − kPlane over [−1, 1]³: 2 × 2 × 2 base cells, the last one divided once. `degrees`: of the undivided cells in x
-// below 0, in x above 0, and of the small ones.
+// Returns the field x − kPlane over [−1, 1]³ with 2 × 2 × 2 base cells, of which the last is divided once. `degrees`:
+// of undivided cells at x < 0, of undivided cells at x > 0, and of the children.
 Field planeField(std::array<int, 3> degrees = {2, 3, 5}, std::string name = "plane") {
   FieldData data;
   data.domain = Box(Vector3::Constant(-1), Vector3::Constant(1));
@@ -29,7 +29,7 @@ Field planeField(std::array<int, 3> degrees = {2, 3, 5}, std::string name = "pla
   const auto leaf = [&](int degree, double center, double halfSize) {
     const auto offset = static_cast<std::uint32_t>(coefficients.size());
     coefficients.resize(offset + coefficientCount(degree), 0.0);
-    // lexicographic, last index fastest: (1, 0, 0) follows all (0, j, k)
+    // Coefficients are in lexicographic order: (1, 0, 0) follows all (0, j, k).
     coefficients[offset] = center - kPlane;
     coefficients[offset + (degree + 1) * (degree + 2) / 2] = halfSize;
     return node::leaf(degree, offset);
@@ -43,7 +43,7 @@ Field planeField(std::array<int, 3> degrees = {2, 3, 5}, std::string name = "pla
   return Field(std::move(data));
 }
 
-// Asks the field itself, a point a pixel; sees a surface everywhere below the picture's middle.
+// A renderer that evaluates the field once per pixel of a slice, and shows a surface in the lower half of a 3D view.
 class FakeRenderer : public Renderer {
  public:
   explicit FakeRenderer(const Field& field) : field_(field) {}
@@ -108,7 +108,7 @@ SlicePicture slice(ColorBy color, int width = 640, int height = 360, int samples
   return {AxisPlane{2, 0.5}, color, width, height, samples};
 }
 
-/// The size of the view in a picture of this size.
+/// Returns the size of the view within a picture of the given size.
 ViewSize viewSize(int pictureWidth, int pictureHeight) {
   SurfacePicture picture;
   picture.width = pictureWidth;
@@ -116,7 +116,7 @@ ViewSize viewSize(int pictureWidth, int pictureHeight) {
   return render::viewSize(picture);
 }
 
-// The pixel that shows a point of the slice.
+// Returns the colour of the pixel that shows a point of the slice.
 Color colorAt(const Image& image, const Field& field, const SlicePicture& picture, const Vector3& point) {
   const SliceView view = sliceView(field, picture);
   const ViewSize size = viewSize(picture.width, picture.height);
@@ -218,15 +218,15 @@ TEST(Legend, hasTheLevelsOfTheWholeFieldAndNoOthers) {
   const Field field = planeField({2, 3, 5});
   FakeRenderer renderer(field);
   SlicePicture picture = slice(ColorBy::degree);
-  picture.plane = AxisPlane{2, -0.5};  // below the divided cell: no degree 5 in the section itself
+  picture.plane = AxisPlane{2, -0.5};  // below the divided cell, so that no leaf of degree 5 is in the section
   const Image image = draw(renderer, field, picture);
   const LevelMap map(std::vector<int>{2, 3, 5});
-  const int panel = viewSize(640, 360).width / 2 + 160;  // right of the section, which is as wide as high
+  const int panel = viewSize(640, 360).width / 2 + 160;  // columns right of the section, which is square
   for (int level : map.levels()) EXPECT_TRUE(holds(image, encodeSrgb(map(level)), panel)) << level;
   EXPECT_FALSE(holds(image, encodeSrgb(orderedColor(0.25)), panel));
 }
 
-/// What a picture was drawn with, asked for, gives the same picture; and another field's, its colours.
+/// A picture's scale gives the same pixels when it is applied again, and the same colours for another field.
 TEST(Scale, ofOnePictureAppliesToAnother) {
   const Field field = planeField({2, 3, 5}), other = planeField({3, 3, 4});
   FakeRenderer renderer(field), otherRenderer(other);
@@ -517,7 +517,7 @@ TEST(Layout, clipsAndOverlapsNothingAtAnySize) {
       EXPECT_GE(overlay.texts.size(), 4U) << size << ": hardly a number beside the bar for range " << range;
       for (const TextItem& item : overlay.texts) EXPECT_EQ(item.text.find("…"), std::string::npos) << item.text;
     }
-    // close looks, far from the surface: very many lines within the range
+    // The slice shows a small area far from the surface, so that the bar's range contains very many iso-lines.
     for (const double spread : {7e-2, 7e-3, 7e-5, 1e-16}) {
       Overlay overlay;
       addDistanceBar(overlay, f, distanceScale(0.4648, 0.4648 + spread));
@@ -568,7 +568,7 @@ double middleOf(const TextItem& item) { return item.baseline - capHeight(item.si
 
 TEST(LevelLegend, hasEachNumberAtItsColor) {
   static const std::string titles[] = {"polynomial degree", "degree"};
-  // at 320 × 240, 31 levels leave no room for shares: the swatches touch
+  // At 320 × 240, 31 levels leave no room to print their shares, and the legend's colour swatches touch.
   for (const auto& [width, height, count] :
        {std::tuple(1280, 720, 5), {1280, 720, 31}, {320, 240, 5}, {320, 240, 31}, {200, 1000, 9}}) {
     const Frame f = frame(width, height);
@@ -600,7 +600,7 @@ TEST(DistanceBar, hasEachNumberAtItsColor) {
       Overlay overlay;
       addDistanceBar(overlay, f, scale);
       const Image image = painted(overlay, f);
-      std::vector<std::pair<double, double>> labels;  // value and row
+      std::vector<std::pair<double, double>> labels;  // pairs of value and row
       for (const TextItem& item : overlay.texts)
         if (const auto value = numberOf(item.text)) labels.emplace_back(*value, middleOf(item));
       ASSERT_GE(labels.size(), 3U);
@@ -610,7 +610,7 @@ TEST(DistanceBar, hasEachNumberAtItsColor) {
       EXPECT_GT(bottom, top) << "outside is above";
       const int bar = static_cast<int>(overlay.boxes.front().x0) + 2;
       for (const auto& [value, row] : labels)
-        for (int beside : {-3, 3}) {  // the line itself covers the label's own row
+        for (int beside : {-3, 3}) {  // the label's own row is hidden by a line
           const int y = static_cast<int>(std::floor(row)) + beside;
           const double here = value - (y + 0.5 - row) * (highest - lowest) / (bottom - top);
           if (std::abs(here) >= scale.range) continue;
@@ -626,7 +626,7 @@ TEST(Axes, areBesideTheSectionOrOnAPlate) {
     const Frame f = frame(width, height);
     const int w = f.view.width(), h = f.view.height(), side = static_cast<int>(0.94 * std::min(w, h));
     const PixelRect middle = {(w - side) / 2, (h - side) / 2, (w + side) / 2, (h + side) / 2};
-    const PixelRect band = {0, h / 4, w, 3 * h / 4};  // zoomed: from edge to edge
+    const PixelRect band = {0, h / 4, w, 3 * h / 4};  // a zoomed section
     const PixelRect flat = {w / 40, h / 4, w - w / 40, 3 * h / 4}, full = {w / 40, h / 40, w - w / 40, h - h / 40};
     for (const PixelRect& section : {middle, band, flat, full, f.view}) {
       Overlay overlay;
@@ -699,7 +699,7 @@ TEST(Slice, namesItsAxesWhereItsPlaneIsAcrossOne) {
   expectAxes(oblique, nullptr);
 }
 
-// f = |x − center|² − radius² in [−1, 1]³.
+// Returns the field |x − center|² − radius² in [−1, 1]³.
 Field ball(double radius, const Vector3& center = Vector3::Zero()) {
   std::vector<double> c(10, 0.0);
   c[0] = 1 + center.squaredNorm() - radius * radius;

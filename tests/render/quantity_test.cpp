@@ -98,7 +98,7 @@ TEST(Quantity, ofASurfaceIsThatOfItsHits) {
 }
 
 TEST(ScaleOfAQuantity, dependsOnTheCellsOrThePointsOrTheLimits) {
-  // a cell of half the domain, and one divided once
+  // One cell fills half of the domain; the other half is divided once.
   FieldData data;
   data.domain = Box(Vector3(0, 0, 0), Vector3(2, 1, 1));
   data.grid = {2, 1, 1};
@@ -117,7 +117,7 @@ TEST(ScaleOfAQuantity, dependsOnTheCellsOrThePointsOrTheLimits) {
 }
 
 TEST(ScaleOfAQuantity, isNotStretchedByManyTinyCells) {
-  // leaves deeper than 4 are a third of all, but fill a four-thousandth of the volume
+  // A third of all leaves are deeper than 4, but fill only 1/4096 of the volume.
   const Field field =
       randomField(4, {.grid = {1, 1, 1}, .refinement = 0, .maxDepth = 6, .deepAt = Vector3(-0.99, -0.99, -0.99)});
   std::vector<double> cells(field.data().nodes.size(), 0.5);

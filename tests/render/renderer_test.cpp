@@ -35,7 +35,7 @@ constexpr int kHeight = 120;
 
 const Box kCube(Vector3(-1.1, -1.1, -1.1), Vector3(1.1, 1.1, 1.1));
 
-/// Built once: all tests of this program look at these.
+/// Returns the field of a built-in shape, which is built only once for all tests.
 const Field& shape(const std::string& spec) {
   static std::map<std::string, Field> fields;
   const auto found = fields.find(spec);
@@ -45,9 +45,9 @@ const Field& shape(const std::string& spec) {
 
 const std::vector<std::string> kShapes = {"sphere", "torus", "box"};
 
-/// What single precision may change, for fields of size about 1.
+/// Tolerance for single precision, for fields with values of about 1.
 constexpr BufferTolerance kSliceTolerance{.value = 2e-6};
-/// Positions: 1e-6 of the diagonal.
+/// Tolerance for surfaces; positions may differ by 1e-6 of the domain's diagonal.
 BufferTolerance surfaceTolerance(const Field& field) {
   return {.value = 1e-5, .position = 1e-6 * field.domain().sizes().norm(), .normalAngle = 2e-3};
 }
@@ -60,8 +60,8 @@ Camera lookingAt(const Vector3& eye, const Vector3& forward, double halfHeight) 
 
 constexpr Projection kProjections[] = {Projection::perspective, Projection::orthographic};
 
-/// Cameras of every kind: orbits near and far, eyes anywhere within the domain (also inside the solid) and eyes beside
-/// the surface looking along it. The first two also orthographically: from before the domain, and from planes within.
+/// Returns cameras of three kinds: orbits at random distances, eyes anywhere in the domain (also inside the solid), and
+/// eyes near the surface that look along it. Cameras of the first two kinds also exist with orthographic projection.
 std::vector<Camera> cameras(const Field& field, unsigned seed, int count) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -109,7 +109,7 @@ std::size_t hits(const ViewBuffers& buffers) {
   return count;
 }
 
-/// Pixels that miss between two that hit, in a row or a column.
+/// Counts the pixels that miss the surface between two hits in their row or column.
 std::size_t gaps(const ViewBuffers& buffers) {
   std::size_t count = 0;
   const auto hit = [&](int x, int y) {
@@ -125,10 +125,10 @@ Vector3 samplePoint(const SliceView& view, int width, int height, int x, int y) 
   return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
 }
 
-// --- The oracle against the field itself ---------------------------------------------------------------------------
+// --- The oracle (double-precision CPU renderer) against the field itself --------------------------------------------
 
-/// Cells, levels and values of a slice are those of the field's own queries at the samples' points. The view is moved a
-/// little within its plane, so that no row or column of samples runs along a face between cells.
+/// Expects that a slice has the cells, levels and values of the field's own queries at the samples' points. The view is
+/// shifted a little within its plane, so that no row or column of samples runs along a face between cells.
 void expectFieldsAnswers(const Field& field, SliceView view) {
   view.origin += 0.00137 * view.right + 0.00211 * view.up;
   const ViewBuffers buffers = makeCpuRenderer(field)->slice(view, kWidth, kHeight);
@@ -168,7 +168,7 @@ TEST(CpuSlice, hasTheFieldsValues) {
 }
 
 TEST(CpuSlice, showsTheUpperCellsInAPlaneOnFaces) {
-  // z = 0 is a face of the even base grid, and of every child of it
+  // The plane z = 0 is a face of base cells, because their number is even, and of their children.
   const Field& field = shape("torus");
   const ViewBuffers at = makeCpuRenderer(field)->slice(axisSlice(kCube, 2, 0, kWidth, kHeight), kWidth, kHeight);
   const ViewBuffers above = makeCpuRenderer(field)->slice(axisSlice(kCube, 2, 1e-9, kWidth, kHeight), kWidth, kHeight);
@@ -187,9 +187,9 @@ TEST(CpuSlice, acceptsBoxDomainsAndBothKindsOfCoefficients) {
   }
 }
 
-// --- The oracle's tracing against the truth ------------------------------------------------------------------------
+// --- The oracle's ray tracing against the exact surface --------------------------------------------------------------
 
-/// Length of a ray until it enters or leaves the box; empty where it misses.
+/// Returns the distances at which a ray enters and leaves the box; empty if it misses the box.
 std::optional<std::pair<double, double>> stretchWithin(const Box& box, const Vector3& eye, const Vector3& direction) {
   double first = 0;
   double last = std::numeric_limits<double>::infinity();
@@ -203,9 +203,9 @@ std::optional<std::pair<double, double>> stretchWithin(const Box& box, const Vec
   return std::pair(first, last);
 }
 
-/// Follows every 7th pixel's ray in small steps. Before the hit (by `nearHit` across the faces of cells, which a ray
-/// may meet at a shallow angle), and all along the ray where there is none, `height(point)` must stay on the side of
-/// the surface on which it starts, down to -tolerance.
+/// Follows the ray of every 7th pixel in small steps: up to `nearHit` before its hit, measured across cell faces, which
+/// a ray may meet at a shallow angle, or through the domain if there is no hit. `height(point)` minus the view's offset
+/// must keep its sign, except for values below `tolerance`.
 template <typename Height>
 void expectNothingPassed(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, int steps,
                          double tolerance, double nearHit, Height&& height) {
@@ -223,7 +223,7 @@ void expectNothingPassed(const Field& field, const SurfaceView& view, const View
     const double shallowest = std::max(0.02, direction.cwiseAbs().minCoeff());
     const double end = buffers.hit(i) ? buffers.distance[i] - nearHit / shallowest : last - 1e-9;
     const double start = height(eye + (first + 1e-9) * direction) - view.offset;
-    if (std::abs(start) <= tolerance) continue;  // starts on the surface
+    if (std::abs(start) <= tolerance) continue;  // the ray starts on the surface
     for (int step = 1; step < steps; ++step) {
       const double t = first + 1e-9 + (end - first) * step / steps;
       if (t >= end) break;
@@ -293,7 +293,7 @@ TEST(ClippingPlane, removesTheHalfOnTheEyesSide) {
 TEST(ClippingPlane, removesTheSameSideForParallelRaysAlongItAsInPerspective) {
   const Field field = randomField(5, {.roughness = 0.05});
   const auto cpu = makeCpuRenderer(field);
-  for (const double azimuth : {-90.0, 90.0, 270.0})  // along x, but for rounding
+  for (const double azimuth : {-90.0, 90.0, 270.0})  // along x, up to rounding
     for (const double offset : {-0.1, 0.1}) {
       const OrbitCamera orbit{.azimuthDegrees = azimuth, .elevationDegrees = 0, .projection = Projection::orthographic};
       const Camera camera = cameraOf(orbit, field.domain(), kWidth, kHeight);
@@ -347,7 +347,7 @@ TEST(Section, showsTheSolidWhereItIsCut) {
   for (const Projection projection : kProjections) expectSectionWhereTheSolidIsCut(projection);
 }
 
-/// One cell of degree 2 in [−1, 1]³: the linear terms are 0, `c` in lexicographic order.
+/// Makes a field of one cell of degree 2 in [−1, 1]³. The linear terms of `c`, in lexicographic order, are 0.
 Field quadratic(const std::vector<double>& c) {
   return Field({.domain = Box(-Vector3::Ones(), Vector3::Ones()),
                 .nodes = {node::leaf(2, 0)},
@@ -360,19 +360,19 @@ struct Grazing {
   Vector3 direction;
 };
 
-/// Fields below zero between two planes close to each other in the middle, and directions across the planes: from
-/// either side a ray comes down from far above, and the longest step would carry it to where it has risen again.
+/// Returns fields that are negative only in a thin layer in the middle of the domain, and the directions across the
+/// layer. A ray comes from far above, and too long a step would carry it beyond the layer.
 std::vector<Grazing> grazingFields(double dip) {
-  // f = 3/2 u² − dip, and the same in v and in w
+  // f = 3/2 u² − dip, and the same with v and with w
   std::vector<Grazing> result;
-  const int places[] = {9, 5, 2};  // of c_200, c_020, c_002
+  const int places[] = {9, 5, 2};  // indices of the coefficients c_200, c_020, c_002
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> c(10, 0.0);
     c[0] = 0.5 - dip;
     c[places[axis]] = 1;
     result.push_back({quadratic(c), Vector3::Unit(axis)});
   }
-  // f = −u·v − dip: u = −v = s gives s² − dip
+  // f = −u·v − dip: along u = −v = s it is s² − dip.
   std::vector<double> c(10, 0.0);
   c[0] = -dip;
   c[8] = -1;
@@ -396,7 +396,7 @@ void expectGrazedSurfaceIsSeen(const std::function<std::unique_ptr<Renderer>(con
 
 TEST(CpuTrace, findsASurfaceThatIsGrazedTwiceWithinAStep) { expectGrazedSurfaceIsSeen(makeCpuRenderer); }
 
-/// Never past the true surface by more than the field's own error there.
+/// A ray must not pass the true surface by more than the field's error near the surface.
 TEST(CpuTrace, neverPassesTheTrueSurfaceOfTheBuiltInShapes) {
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
@@ -415,14 +415,14 @@ TEST(CpuTrace, neverPassesTheTrueSurfaceOfTheBuiltInShapes) {
       if (std::abs(d) < 0.02) error = std::max(error, std::abs(field.value(p) - d));
     }
     EXPECT_LT(error, 0.01) << name;
-    const double tolerance = 1.5 * error + 1e-6;  // the largest error lies between the points that were tried
+    const double tolerance = 1.5 * error + 1e-6;  // 1.5: the samples miss the largest error
     const auto renderer = makeCpuRenderer(field);
     for (const Camera& camera : cameras(field, 23, 15)) {
       const ViewBuffers buffers = renderer->surface({camera, 0}, kWidth, kHeight);
       expectNothingPassed(field, {camera, 0}, buffers, 300, tolerance, 0, distance);
       for (std::size_t i = 0; i < buffers.cell.size(); i += 7) {
         if (!buffers.hit(i)) continue;
-        // where the ray begins within the error of the surface the field may see it already crossed
+        // If the ray starts within the error from the surface, it may already be on the other side in the field.
         if (std::abs(distance(rayStart(camera, kWidth, kHeight, int(i % kWidth), int(i / kWidth)))) > tolerance) {
           EXPECT_NEAR(distance(hitPoint(camera, buffers, i)), 0, tolerance) << name;
         }
@@ -460,14 +460,14 @@ TEST(CpuTrace, hitsTheSphereWhereTheFormulaSays) {
   EXPECT_GT(compared, 2000);
 }
 
-/// Parallel rays, by the formula; and however far away the camera is said to be, hits are as precise.
+/// Parallel rays must hit the sphere where the formula says, with the same precision for any distance of the camera.
 TEST(CpuTrace, hitsTheSphereOrthographically) {
   const double radius = 0.8;
   const Field& field = shape("sphere,radius=0.8");
   const auto cpu = makeCpuRenderer(field);
   const auto gl = support::glProblem().empty() ? makeGlRenderer(field, GlChoice::software) : nullptr;
   for (const double distance : {1.1, 1e7}) {
-    // the same height at the target
+    // This makes the view equally high at the target for every distance.
     const double halfHeight = 1.1 * std::tan(17.5 * std::acos(-1.0) / 180) / distance;
     const OrbitCamera orbit{.distance = distance,
                             .fieldOfViewDegrees = 2 * std::atan(halfHeight) * 180 / std::acos(-1.0),
@@ -498,7 +498,7 @@ TEST(CpuTrace, hitsTheSphereOrthographically) {
 TEST(CpuTrace, startsInsideAndHandlesOffsetsAndTheDomainsBoundary) {
   const Field& field = shape("sphere,radius=0.8");
   const auto renderer = makeCpuRenderer(field);
-  // a camera at the centre sees the inside all around
+  // A camera near the sphere's centre sees the sphere's inside in all directions.
   const Camera centered = lookingAt(Vector3(0.01, 0.02, 0.03), Vector3(1, 0, 0), 1);
   const ViewBuffers inside = renderer->surface({centered, 0}, kWidth, kHeight);
   EXPECT_EQ(hits(inside), inside.cell.size());
@@ -513,9 +513,9 @@ TEST(CpuTrace, startsInsideAndHandlesOffsetsAndTheDomainsBoundary) {
     EXPECT_NEAR(buffers.distance[middle], 4 - 0.8 - offset, 2e-3);
     EXPECT_NEAR(buffers.value[middle], offset, 1e-6);
   }
-  // f reaches about 1.1·√3 - 0.8 in the corners and nothing more: no surface
+  // In the domain's corners f is greatest, about 1.1·√3 − 0.8 ≈ 1.1: there is no surface at 1.5.
   EXPECT_EQ(hits(renderer->surface({outside, 1.5}, kWidth, kHeight)), 0u);
-  // looking away
+  // This camera looks away from the domain.
   EXPECT_EQ(hits(renderer->surface({lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.1), 0}, kWidth, kHeight)), 0u);
 }
 
@@ -537,11 +537,11 @@ TEST(CpuRenderer, rejectsInvalidViews) {
 
 // --- Cracks --------------------------------------------------------------------------------------------------------
 
-/// A polynomial of degree 2 in a cell: in local coordinates, plain Legendre, lexicographic.
+/// Coefficients of degree 2 in lexicographic order, for products of Legendre polynomials in local coordinates.
 using Quadratic = std::array<double, 10>;
 
-/// 4 × 4 × 4 base cells in [−1, 1]³, some of them divided; each with the polynomial that is given for its centre and
-/// half its size.
+/// Makes 4 × 4 × 4 base cells in [−1, 1]³, some of them divided. `polynomial` returns a cell's coefficients for its
+/// centre and half its edge length.
 Field pieces(const std::function<Quadratic(const Vector3&, double)>& polynomial) {
   FieldData data{.domain = Box(-Vector3::Ones(), Vector3::Ones()),
                  .grid = {4, 4, 4},
@@ -569,19 +569,19 @@ Field pieces(const std::function<Quadratic(const Vector3&, double)>& polynomial)
   return Field(std::move(data));
 }
 
-/// value + slope · (x − center)
+/// Returns the coefficients of value + slope · (x − center).
 Quadratic linear(double value, const Vector3& slope, double half) {
   return {value, slope.z() * half, 0, slope.y() * half, 0, 0, slope.x() * half};
 }
 
-/// (|x|² − r²) / 2r: of slope 1 on a sphere.
+/// Returns the coefficients of (|x|² − r²) / 2r, which has slope 1 on the sphere of radius r.
 Quadratic ball(double radius, const Vector3& center, double half) {
   Quadratic c = linear((center.squaredNorm() + half * half - radius * radius) / (2 * radius), center / radius, half);
   c[2] = c[5] = c[9] = half * half / (3 * radius);
   return c;
 }
 
-/// Both, where there is OpenGL.
+/// Returns the CPU renderer, and the OpenGL renderer if there is OpenGL.
 std::vector<std::unique_ptr<Renderer>> renderersOf(const Field& field) {
   std::vector<std::unique_ptr<Renderer>> result;
   result.push_back(makeCpuRenderer(field));
@@ -593,8 +593,8 @@ std::size_t crackCount(const ViewBuffers& buffers) {
   return std::size_t(std::ranges::count(buffers.crack, std::uint8_t{1}));
 }
 
-/// The same polynomial everywhere, a kink at faces, and a surface that lies in faces, which rays meet just behind them;
-/// solids that the walls cut, so that rays enter within them.
+/// Continuous fields: one polynomial in all cells, a kink at faces, a surface that lies in cell faces, and solids that
+/// extend beyond the domain, so that rays enter the domain inside them.
 TEST(Cracks, areNoneInAContinuousField) {
   struct Continuous {
     const char* name;
@@ -628,7 +628,7 @@ TEST(Cracks, areNoneInAContinuousField) {
   }
 }
 
-/// f = z − 0.1 where x < 0, z + 0.1 elsewhere: seen from above and +x a cliff at x = 0.
+/// The field is z − 0.1 for x < 0, and z + 0.1 elsewhere: seen from above and +x, its surface has a cliff at x = 0.
 TEST(Cracks, areExactlyWhereTheJumpIs) {
   const Field field = pieces(
       [](const Vector3& c, double half) { return linear(c.z() + (c.x() < 0 ? -0.1 : 0.1), Vector3::UnitZ(), half); });
@@ -644,8 +644,8 @@ TEST(Cracks, areExactlyWhereTheJumpIs) {
           const std::size_t i = std::size_t(y) * kWidth + x;
           const Vector3 start = rayStart(camera, kWidth, kHeight, x, y);
           const Vector3 ray = rayDirection(camera, kWidth, kHeight, x, y);
-          const Vector3 at = start - start.x() / ray.x() * ray;  // at x = 0
-          // all rays go down: above the lower floor at x = 0, they have not met it before
+          const Vector3 at = start - start.x() / ray.x() * ray;  // the ray's point at x = 0
+          // All rays go down, so that a ray that is above the lower floor at x = 0 has met no surface before.
           const bool expected = ray.x() < 0 && field.domain().contains(at) && at.z() > -0.1 && at.z() < 0.1;
           if (std::abs(std::abs(at.z()) - 0.1) < 1e-4) continue;
           ASSERT_EQ(buffers.crack[i] != 0, expected) << x << ", " << y;
@@ -665,7 +665,7 @@ TEST(Cracks, areExactlyWhereTheJumpIs) {
       EXPECT_GT(cracks.widest, 0.195);
       EXPECT_LT(cracks.widest, 0.2 + 1e-5);
     }
-    // from high above and −x one looks over the cliff
+    // From high above and from −x, the camera looks over the cliff and cannot see it.
     orbit.azimuthDegrees = -60;
     orbit.elevationDegrees = 50;
     orbit.distance = 0.25;
@@ -678,7 +678,7 @@ TEST(Cracks, areExactlyWhereTheJumpIs) {
   }
 }
 
-/// Steps a little higher than what the march cannot tell from none, and a little lower.
+/// Tests steps slightly above and slightly below the height at which the ray march recognizes a crack.
 TEST(Cracks, needALeastHeight) {
   const auto stepped = [](double step) {
     return pieces([step](const Vector3& c, double half) {
@@ -723,7 +723,7 @@ class Gl : public testing::Test {
   }
 };
 
-/// Squares of such lengths are beyond float.
+/// In single precision, squares of such lengths overflow or vanish.
 TEST_F(Gl, drawsFieldsOfAnySizeAlike) {
   const Field field = randomField(5, {.roughness = 0.05});
   for (const double size : {0x1p-120, 0x1p-70, 0x1p70, 0x1p120}) {
@@ -758,7 +758,7 @@ TEST_F(Gl, drawsFieldsOfAnySizeAlike) {
 
 TEST_F(Gl, drawsSlicesOfBuiltInShapes) {
   BufferTolerance tolerance = kSliceTolerance;
-  tolerance.pixels = 0;  // positions are in double precision on both sides
+  tolerance.pixels = 0;  // both renderers compute positions in double precision
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
     for (int axis = 0; axis < 3; ++axis)
@@ -780,7 +780,7 @@ TEST_F(Gl, drawsSlicesOfDegreesUpTo30) {
 }
 
 TEST_F(Gl, drawsSlicesOfDeepOctreesAndBoxDomains) {
-  // a magnified corner of a tree 12 levels deep
+  // The view magnifies a corner of a tree of depth 12.
   const Field deep =
       randomField(4, {.grid = {3, 3, 3}, .refinement = 0.1, .maxDepth = 12, .deepAt = Vector3(0.1, 0.2, 0.3)});
   int depth = 0;
@@ -830,7 +830,7 @@ TEST_F(Gl, drawsSurfacesOfBuiltInShapesFromAnywhere) {
   }
 }
 
-/// Rays that run along faces of cells: cameras on the axes, pictures with a middle row and column and without.
+/// Rays run along faces of cells: cameras are on the axes, and pictures have odd and even numbers of rows and columns.
 TEST_F(Gl, drawsSurfacesSeenAlongAnAxis) {
   for (const std::string& name : kShapes) {
     const Field& field = shape(name);
@@ -853,7 +853,7 @@ TEST_F(Gl, drawsSurfacesSeenAlongAnAxis) {
         const std::string where = name + " from " + std::to_string(azimuth) + ", " + std::to_string(elevation) +
                                   (projection == Projection::perspective ? "" : ", orthographic");
         EXPECT_TRUE(agree(expected, actual, surfaceTolerance(field), &camera)) << where << ", width " << width;
-        if (name == "torus") continue;  // whose silhouette is not convex
+        if (name == "torus") continue;  // its silhouette is not convex
         EXPECT_EQ(gaps(expected), 0u) << where << ", width " << width;
         EXPECT_EQ(gaps(actual), 0u) << where << ", width " << width;
       }
@@ -871,8 +871,8 @@ TEST_F(Gl, drawsSurfacesOfFieldsWithRandomCoefficients) {
         {.domain = Box(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2)), .grid = {2, 3, 2}, .roughness = 0.5, .maxDepth = 4});
     const auto cpu = makeCpuRenderer(field);
     const auto gl = makeGlRenderer(field, GlChoice::software);
-    // many hits lie on faces between leaves, where f jumps over the offset: they are known across the face, which the
-    // ray may meet at a shallow angle, and the field is steep
+    // Many hits lie on faces between leaves, where f jumps over the offset. Their distance is less accurate, because
+    // rays meet faces at shallow angles and the field is steep.
     BufferTolerance tolerance = surfaceTolerance(field);
     tolerance.value = 1e-4;
     tolerance.position *= 10;
@@ -883,7 +883,7 @@ TEST_F(Gl, drawsSurfacesOfFieldsWithRandomCoefficients) {
   }
 }
 
-/// Degree 30 takes the march many passes: see shaders/surface_march.frag.
+/// At degree 30 the ray march takes many render passes (see shaders/surface_march.frag).
 TEST_F(Gl, drawsSurfacesOfDegree30) {
   const Field field = randomField(9, {.grid = {1, 1, 1}, .maxDepth = 1, .minDegree = 30, .maxDegree = 30});
   const auto cpu = makeCpuRenderer(field);
@@ -894,7 +894,7 @@ TEST_F(Gl, drawsSurfacesOfDegree30) {
   EXPECT_TRUE(agree(expected, gl->surface({camera, 0}, 64, 48), surfaceTolerance(field), &camera));
 }
 
-/// Slightly wrong buffers must not pass: one coefficient of one visible cell is changed a little.
+/// The comparison must reject slightly wrong buffers: one coefficient of a visible cell is changed a little.
 TEST_F(Gl, differsForAWrongField) {
   const Field field = randomField(2);
   const SliceView slice = axisSlice(field.domain(), 2, 0.1, kWidth, kHeight);
@@ -962,7 +962,7 @@ TEST_F(Gl, rejectsInvalidViews) {
   EXPECT_THROW(renderer->surface({cameraOf({}, field.domain(), 8, 8), std::nan("")}, 8, 8), Error);
 }
 
-/// In a fresh process, so that EGL looks for its drivers again: there are none, and the error says all that was tried.
+/// A new process makes EGL search for drivers again and find none; the error must list everything that was tried.
 TEST(GlDeathTest, namesTheDevicesTriedAndTheRemedyWithoutADriver) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto withoutDrivers = [](GlChoice choice) {
@@ -982,7 +982,7 @@ TEST(GlDeathTest, namesTheDevicesTriedAndTheRemedyWithoutADriver) {
               "on a hardware device \\(tried hardware devices: .*surfaceless Mesa: .*--cpu");
 }
 
-/// Only where there is no graphics hardware does the choice fail; elsewhere it must not give a software device.
+/// The hardware device may be refused only if there is no graphics hardware; it must never be a software device.
 TEST(GlHardware, isHardwareOrAnError) {
   try {
     EXPECT_THAT(glDescription(GlChoice::hardware), testing::Not(HasSubstr("llvmpipe")));

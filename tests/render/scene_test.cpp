@@ -1,4 +1,4 @@
-// Planes, cells and arrows in pictures, against oracles that look at each pixel's ray or each edge's points alone.
+// Tests planes, cells and arrows in pictures against references that test each pixel's ray or each edge's points alone.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -43,20 +43,20 @@ Camera cameraAt(const Field& field, Projection projection, double azimuth = 35, 
 
 constexpr Projection kProjections[] = {Projection::perspective, Projection::orthographic};
 
-/// What a ray meets first.
+/// The first thing that a ray meets, as found by the reference.
 struct Seen {
   Shown shown = Shown::surface;
   std::uint32_t cell = kNoCell;
   double distance = kInfinity;
   Vector3 normal = Vector3::Zero();
-  double margin = kInfinity;  ///< to the next thing behind it, or to an edge of it
+  double margin = kInfinity;  ///< distance to the next thing behind it, or to its edge
 };
 
-/// Meets the six faces one by one, each as a rectangle; the distance of the nearest, and how far from its border.
+/// Intersects a ray with the six faces of a box, one by one as rectangles, and updates the nearest hit and its margin.
 void meetBox(const Vector3& eye, const Vector3& ray, const Box& box, const Cell& cell, Seen& nearest) {
   for (int axis = 0; axis < 3; ++axis)
     for (const double side : {-1.0, 1.0}) {
-      if (ray[axis] * side >= 0) continue;  // its back
+      if (ray[axis] * side >= 0) continue;  // the ray meets the back of this face
       const double t = ((side < 0 ? box.min() : box.max())[axis] - eye[axis]) / ray[axis];
       const Vector3 p = eye + t * ray;
       double within = kInfinity;
@@ -79,7 +79,7 @@ bool removed(const SurfaceView& view, const Vector3& p) {
   return beyond * towardsEye[view.clip->axis] > 0 && std::abs(beyond) > 0;
 }
 
-/// The half that a clipping plane keeps of a box.
+/// Returns the part of a box that a clipping plane keeps.
 std::optional<Box> kept(const SurfaceView& view, Box box) {
   if (!view.clip) return box;
   Vector3 above = view.clip->offset * Vector3::Ones();
@@ -158,7 +158,7 @@ TEST(Scene, showsTheNearestOfSurfacePlaneAndBoxesInEachPixel) {
             EXPECT_NEAR(buffers.value[i], field.value(expected.shown == Shown::plane ? onPlane : p), 1e-5);
             EXPECT_EQ(buffers.crack[i], 0);
           }
-        EXPECT_LT(unsure, 20);  // at edges, and where the clipping plane cuts box and solid alike
+        EXPECT_LT(unsure, 20);  // at edges, and where the clipping plane cuts both a box and the solid
       }
   for (const Shown shown : {Shown::surface, Shown::section, Shown::plane, Shown::box})
     EXPECT_GT(seen[shown], 500) << int(shown);
@@ -194,7 +194,7 @@ TEST(Scene, omitsABoxThatContainsTheEye) {
   EXPECT_GT(seen, 1000);
 }
 
-/// Points along a cell's edges, close together.
+/// Visits points along the edges of a box, at small distances.
 template <typename Visit>
 void alongEdges(const Box& box, const Visit& visit) {
   for (int i = 0; i < 8; ++i)
@@ -224,7 +224,7 @@ TEST(CellLines, followTheEdgesThatNothingHides) {
             const int x = int(std::floor(at.x)), y = int(std::floor(at.y));
             if (x < 1 || y < 1 || x + 1 >= kWidth || y + 1 >= kHeight) return;
             const double pixel = pixelSize(view.camera, at.depth, kHeight);
-            const auto ahead = [&](int u, int v) {  // of what is in the picture there
+            const auto ahead = [&](int u, int v) {  // distance from p to what the picture shows there
               const std::size_t i = std::size_t(v) * kWidth + u;
               return buffers.hit(i) ? buffers.distance[i] - at.distance : kInfinity;
             };
@@ -322,7 +322,7 @@ TEST(Pick, tellsTheContentOfEachKindOfPixel) {
   }
 }
 
-/// Whose surface nobody may ask for.
+/// A renderer that must not be used, for pictures without a surface.
 class NoRenderer : public Renderer {
  public:
   ViewBuffers slice(const SliceView&, int, int) override { throw std::logic_error("asked for a slice"); }

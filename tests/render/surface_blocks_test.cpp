@@ -12,12 +12,12 @@
 namespace hpsdf::render {
 namespace surface_blocks_test {
 
-constexpr int kWidth = 203;  // no multiple of a block
+constexpr int kWidth = 203;  // not a multiple of the block size
 constexpr int kHeight = 150;
 
 struct Found {
   float side;
-  std::vector<float> starts;  ///< of every pixel; infinite where it is in no block
+  std::vector<float> starts;  ///< ray start of each pixel; infinite if the pixel is in no block
 };
 
 Found find(const Field& field, const SurfaceView& view) {
@@ -35,8 +35,8 @@ Found find(const Field& field, const SurfaceView& view) {
   return result;
 }
 
-/// No hit lies before its block's start, none outside of the blocks; and up to the start, or all along where there is
-/// no block, the bounds of the leaves that a ray passes say that the field is on the side.
+/// Expects that blocks contain all hits, and that no hit lies before its block's start. Up to this start, or along the
+/// whole ray without a block, the bounds of the leaves must exclude the surface.
 void expectNothingLeftOut(const Field& field, const SurfaceView& view) {
   const Found found = find(field, view);
   const ViewBuffers truth = makeCpuRenderer(field)->surface(view, kWidth, kHeight);
@@ -74,14 +74,14 @@ TEST(SurfaceBlocks, includeAllThatIsVisibleFromAnywhere) {
   std::mt19937 random(17);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (unsigned seed = 0; seed < 4; ++seed) {
-    // an oblong domain, a field that jumps over the offset at faces
+    // The domain is oblong, and the field jumps over the offset at faces of cells.
     const Field field = randomField(seed, {.domain = Box(Vector3(-1, -1.5, -1), Vector3(1, 1, 1.2)),
                                            .grid = {2, 3, 2},
                                            .roughness = seed % 2 ? 1.0 : 0.1,
                                            .maxDepth = 4,
                                            .minDegree = 0});
     for (int i = 0; i < 12; ++i) {
-      // from far away down to within the domain
+      // Eyes range from far away to inside the domain.
       const Vector3 eye = std::exp2(2 - i % 6) * Vector3(unit(random), unit(random), unit(random));
       const Vector3 forward = i % 2 ? Vector3(unit(random), unit(random), unit(random)) : Vector3(-eye);
       Camera camera = lookingAt(eye, forward, 0.3 + 0.5 * (i % 3));
@@ -98,10 +98,10 @@ TEST(SurfaceBlocks, areTheWholeViewForACameraWithoutWidth) {
   for (const float start : find(field, {flat, 0}).starts) EXPECT_LT(start, 3);
 }
 
-/// A sphere in small cells.
+/// Makes a sphere's field with small cells.
 Field sphere() { return randomField(3, {.roughness = 0.02, .refinement = 1, .maxDepth = 4}); }
 
-/// What the blocks are for: few pixels beside the surface are drawn, and rays start close to it.
+/// Expects that blocks contain few pixels beside the surface, and that rays start close to it.
 void expectBlocksHugTheSurface(Projection projection) {
   const Field field = sphere();
   const SurfaceView view{cameraOf({.projection = projection}, field.domain(), kWidth, kHeight), 0};
@@ -134,7 +134,7 @@ TEST(SurfaceBlocks, areNoneWhereNothingIsVisible) {
   };
   const Camera away = lookingAt(Vector3(4, 0, 0), Vector3(1, 0, 0), 0.5);
   EXPECT_EQ(count({away, 0}), 0);
-  // past the sphere, which lies to both sides of the plane through the eye
+  // This camera looks past the sphere, which lies on both sides of the plane through the eye.
   Camera past = lookingAt(Vector3(0.01, 0.02, 0.9), Vector3(1, 0, 0), 0.1);
   EXPECT_EQ(count({past, 0}), 0);
   past.projection = Projection::orthographic;

@@ -13,7 +13,7 @@
 namespace hpsdf::render {
 namespace surface_bounds_test {
 
-// L_i, L_i' and L_i'' for i = 0..degree.
+// The values L_i, L_i' and L_i'' for i = 0..degree.
 struct Legendre {
   Legendre(double x, int degree) : value(degree + 1), first(degree + 1), second(degree + 1) {
     const auto at = [](const std::vector<double>& v, int i) { return i < 0 ? 0.0 : v[i]; };
@@ -72,7 +72,7 @@ Vector3 linearPart(const double* c, int degree) {
   return linear;
 }
 
-// The order of shaders/field.glsl, in its precision.
+// Evaluates the polynomial in the order of operations and the precision of shaders/field.glsl.
 float evaluateSingle(const double* c, int degree, const Eigen::Vector3f& local) {
   const auto advance = [](float& value, float& before, float x, float i) {
     const float product = x * value;
@@ -98,8 +98,8 @@ float evaluateSingle(const double* c, int degree, const Eigen::Vector3f& local) 
   return value;
 }
 
-// With no coefficient below zero, every Legendre polynomial and derivative is largest, and all add up, in the corner
-// (1, 1, 1): there the bounds are reached.
+// Without negative coefficients, all terms and their derivatives are greatest in the corner (1, 1, 1), where they add
+// up: there the bounds are reached.
 Field withoutNegatives(const Field& field) {
   FieldData data = field.data();
   for (double& c : std::get<std::vector<double>>(data.coefficients)) c = std::abs(c);
@@ -141,7 +141,7 @@ TEST(SurfaceBounds, holdAtEveryPointOfALeaf) {
   }
 }
 
-// One pair of axes at a time: f = c·L_1·L_1 has no other second derivatives.
+// The field c·L_1·L_1 of two coordinates has a single second derivative, the mixed one.
 TEST(SurfaceBounds, holdForMixedDerivatives) {
   for (int missing = 0; missing < 3; ++missing) {
     std::vector<double> c;
@@ -187,7 +187,7 @@ TEST(SurfaceBounds, areReachedUpToRounding) {
   }
 }
 
-// Where a ray looks is decided by what single precision makes of the field.
+// The shaders compute the field in single precision, so that the bounds must include its rounding errors.
 TEST(SurfaceBounds, holdForValuesInSinglePrecision) {
   int leaves = 0;
   for (const int degree : {0, 1, 2, 4, 7, 12, 20, 30}) {
@@ -228,7 +228,7 @@ TEST(SurfaceBounds, ofANodeContainThoseOfItsChildren) {
   EXPECT_GT(internal, 20);
 }
 
-// As shaders/field.glsl takes it apart.
+// Unpacks bounds as shaders/field.glsl does: two 16-bit floats in one integer.
 SurfaceBounds unpacked(std::uint32_t packed) {
   return {std::bit_cast<float>(packed << 16), std::bit_cast<float>(packed & 0xffff0000U), 0, 0, 0, {}};
 }

@@ -10,7 +10,7 @@ namespace text_test {
 constexpr Color kPaper = {255, 255, 255};
 constexpr Color kInk = {0, 0, 0};
 
-// The smallest rectangle that holds every pixel other than paper.
+// Returns the smallest rectangle that contains all pixels that are not blank paper.
 PixelRect inkOf(const Image& image) {
   PixelRect ink = {image.width, image.height, 0, 0};
   for (int y = 0; y < image.height; ++y)
@@ -38,7 +38,7 @@ TEST(Text, hasNoInkOutsideOfItsMeasure) {
         const PixelRect ink = inkOf(drawn(text, size, x));
         ASSERT_FALSE(ink.empty()) << text;
         EXPECT_TRUE(measure.ink.contains(ink)) << text << " at size " << size << ", x " << x;
-        // and the measure is no wide guess
+        // The measured box must not be much larger than the ink.
         EXPECT_LE(measure.ink.width() - ink.width(), 2) << text << " at size " << size;
         EXPECT_LE(measure.ink.height() - ink.height(), 2) << text << " at size " << size;
         EXPECT_NEAR(measure.advance, ink.x1 - x, 0.25 * size + 2) << text;
@@ -53,7 +53,7 @@ TEST(Text, advancesInProportionToItsSize) {
 }
 
 TEST(Font, hasTheSignsThatCaptionsUse) {
-  const Image missing = drawn("\uE123", 20);  // of the private use area: no glyph
+  const Image missing = drawn("\uE123", 20);  // a private-use character without a glyph
   std::set<std::vector<Color>> shapes = {missing.pixels};
   for (const char* sign : {"τ", "ε", "°", "·", "−", "–", "…", "×"})
     EXPECT_TRUE(shapes.insert(drawn(sign, 20).pixels).second) << sign;

@@ -18,7 +18,7 @@ using testing::ThrowsMessage;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-const Box kBox(Vector3(-1, -2, 0), Vector3(3, 1, 2));  // 4 × 3 × 2
+const Box kBox(Vector3(-1, -2, 0), Vector3(3, 1, 2));  // size 4 × 3 × 2
 
 Vector3 pixelCenter(const SliceView& view, int width, int height, int x, int y) {
   return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
@@ -95,7 +95,7 @@ TEST(PlaneSlice, showsTheWholeSectionAndLittleElse) {
     EXPECT_NEAR(up.dot(direction.normalized()), 0, 1e-12);
     EXPECT_NEAR(view.right.norm() / 400, view.up.norm() / 300, 1e-12);
     EXPECT_NEAR((view.origin - point).dot(direction.normalized()), 0, 1e-12);
-    // a fine raster of a plane three times as large: all that lies in the box lies in the picture
+    // A fine raster of a larger part of the plane: all points that lie in the box must be in the picture.
     double widest = 0;
     for (int i = 0; i <= 300; ++i)
       for (int j = 0; j <= 300; ++j) {
@@ -117,7 +117,7 @@ TEST(PlaneSlice, rejectsInvalidArguments) {
   EXPECT_THAT([] { planeSlice(kBox, Vector3(9, 9, 9), Vector3(1, 1, 1), 64, 64); },
               ThrowsMessage<Error>(HasSubstr("misses the domain")));
   EXPECT_THROW(planeSlice(kBox, Vector3(0, 0, 2.5), Vector3::UnitZ(), 64, 64), Error);
-  // touches a corner only
+  // This plane touches only a corner of the box.
   EXPECT_THROW(planeSlice(kBox, kBox.max(), Vector3(1, 1, 1), 64, 64), Error);
 }
 
@@ -169,8 +169,7 @@ TEST(Camera, hasOrthogonalRightHandedAxesScaledByTheFieldOfView) {
       }
 }
 
-/// What lies in the plane through the target is where perspective shows it; and rays start before the domain, but not
-/// far from it.
+/// The plane through the target is shown as in perspective. Rays start in front of the domain, but not far from it.
 TEST(OrthographicCamera, keepsTheFramingAndStartsBeforeTheDomain) {
   const double diagonal = kBox.sizes().norm();
   for (const double distance : {0.01, 1.1, 1e9})

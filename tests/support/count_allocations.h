@@ -1,5 +1,5 @@
 #pragma once
-// Counts what a program takes by the global operator new, which is replaced: for one source file of each program.
+// Counts a program's allocations by replacing the global operator new; included by one source file of each program.
 
 #include <atomic>
 #include <cstddef>
@@ -10,7 +10,7 @@ namespace hpsdf::support {
 
 inline std::atomic<std::size_t> allocations = 0;
 
-/// So many while f runs, by all threads.
+/// Returns the number of allocations by all threads while f runs.
 template <typename F>
 std::size_t allocationsOf(F&& f) {
   const std::size_t before = allocations;
@@ -25,11 +25,11 @@ void* operator new(std::size_t size) {
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {  // stable sorts take their buffers here
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {  // used by stable sorts for their buffers
   ++hpsdf::support::allocations;
   return std::malloc(size);
 }
 void operator delete(void* memory) noexcept { std::free(memory); }
-// GCC takes the free of an inlined delete for a mismatch.
+// Prevents GCC's false warning of mismatched new and delete, which an inlined free causes.
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }

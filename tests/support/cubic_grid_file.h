@@ -9,7 +9,7 @@
 
 namespace hpsdf {
 
-/// The bytes that are written of a grid.
+/// Returns the bytes of the file that writeCubicGrid writes.
 inline std::string fileOf(const CubicGrid& grid) {
   const support::TemporaryDirectory folder;
   OutputFile out(folder / "grid.cdf");

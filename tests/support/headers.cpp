@@ -1,1 +1,1 @@
-// Precompiled headers belong to a target, and a target needs a source file.
+// This file is otherwise empty: the CMake target of the precompiled headers needs a source file.

@@ -1,5 +1,5 @@
 #pragma once
-// Meshes made of others, and places to ask in and around them.
+// Meshes made from other meshes, and random points in and around a box.
 
 #include <algorithm>
 #include <cstdint>
@@ -29,7 +29,7 @@ inline TriangleMesh reversed(TriangleMesh mesh) {
   return mesh;
 }
 
-/// Without the triangles all of whose corners are above this z.
+/// Removes the triangles whose corners are all above this z.
 inline TriangleMesh openAbove(TriangleMesh mesh, double z) {
   std::erase_if(mesh.triangles, [&](const auto& triangle) {
     return std::ranges::all_of(triangle, [&](std::uint32_t v) { return mesh.vertices[v].z() > z; });
@@ -37,7 +37,7 @@ inline TriangleMesh openAbove(TriangleMesh mesh, double z) {
   return mesh;
 }
 
-/// A box of size 2, at the origin.
+/// Returns a box with edge length 2, centered at the origin.
 inline TriangleMesh boxOfTwo() { return shapes::mesh("box,width=2,height=2,depth=2"); }
 
 inline TriangleMesh boxBetween(const Vector3& low, const Vector3& high) {
@@ -46,10 +46,10 @@ inline TriangleMesh boxBetween(const Vector3& low, const Vector3& high) {
   return mesh;
 }
 
-/// A box of size 2 without its upper side.
+/// Returns a box with edge length 2, centered at the origin, without its upper side.
 inline TriangleMesh openBox() { return openAbove(boxOfTwo(), 0.999); }
 
-/// In a box and a little around it.
+/// Returns random points in a box and slightly around it.
 inline std::vector<Vector3> placesIn(const Box& box, int count, std::uint64_t seed = 1) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> u(-0.1, 1.1);

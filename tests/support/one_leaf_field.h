@@ -8,7 +8,7 @@
 
 namespace hpsdf {
 
-/// A single polynomial with random coefficients of every degree up to `degree`, over a box that is no cube.
+/// Returns a field of one leaf with random coefficients up to `degree`, over a box that is not a cube.
 inline Field oneLeafField(unsigned seed, int degree) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;

@@ -14,18 +14,18 @@ namespace hpsdf {
 struct RandomFieldOptions {
   Box domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
   std::array<std::uint32_t, 3> grid = {2, 2, 2};
-  double radius = 0.6;      ///< of the sphere about the domain's centre that the field is made from
-  double roughness = 0.2;   ///< of what is added to it, relative to a cell's size
-  double refinement = 0.4;  ///< chance of a cell to be divided
+  double radius = 0.6;      ///< radius of the sphere, about the domain's centre, that the field approximates
+  double roughness = 0.2;   ///< size of the random coefficients that are added, relative to the cell's size
+  double refinement = 0.4;  ///< probability that a cell is divided
   int maxDepth = 4;
-  std::optional<Vector3> deepAt = {};  ///< cells that hold this point are divided down to maxDepth
+  std::optional<Vector3> deepAt = {};  ///< cells that contain this point are divided down to maxDepth
   int minDegree = 1;
   int maxDegree = 6;
-  bool single = false;  ///< coefficients as float
+  bool single = false;  ///< whether coefficients are stored as float
 };
 
-/// The rudest field that the interface allows: the linear part of a sphere's distance in each cell plus random terms of
-/// every degree, so that it jumps from leaf to leaf, is far from 1-Lipschitz and crosses zero wherever it likes.
+/// Makes a field that is as irregular as the interface allows: in each cell the linear part of a sphere's distance plus
+/// random terms of every degree. It jumps from leaf to leaf, is far from 1-Lipschitz, and has zeros in many places.
 inline Field randomField(unsigned seed, const RandomFieldOptions& options = {}) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);

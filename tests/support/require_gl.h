@@ -10,7 +10,7 @@
 
 namespace hpsdf::support {
 
-/// Why the software device that the tests ask for does not serve; empty where it does.
+/// Returns why the software OpenGL device cannot be used; empty if it can.
 inline std::string glProblem() {
   try {
     render::glDescription(render::GlChoice::software);
@@ -20,7 +20,7 @@ inline std::string glProblem() {
   }
 }
 
-/// Set by `.ci/run`, where a test skipped for want of EGL would hide that nothing was tested.
+/// True if a missing OpenGL must fail the tests instead of skipping them: `.ci/run` sets HPSDF_REQUIRE_GL=1.
 inline bool glRequired() {
   const char* value = std::getenv("HPSDF_REQUIRE_GL");
   return value != nullptr && std::string(value) == "1";
@@ -28,8 +28,8 @@ inline bool glRequired() {
 
 }  // namespace hpsdf::support
 
-/// Skips the test where there is no OpenGL, or fails it where HPSDF_REQUIRE_GL=1. Returns: for the body of a test or of
-/// SetUp.
+/// Skips the test without OpenGL, or fails it if HPSDF_REQUIRE_GL=1. It returns from the function that uses it, which
+/// must be the body of a test or SetUp.
 #define HPSDF_REQUIRE_GL()                                                                  \
   do {                                                                                      \
     const std::string hpsdfGlProblem = ::hpsdf::support::glProblem();                       \

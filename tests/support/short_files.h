@@ -4,7 +4,7 @@
 
 namespace hpsdf::support {
 
-/// No file may be longer than that, as long as this lives, by this process and those that it starts.
+/// Limits the size of files that this process and its children write, during its lifetime.
 class ShortFiles {
  public:
   explicit ShortFiles(rlim_t bytes) {

@@ -9,8 +9,7 @@
 
 namespace hpsdf::support {
 
-/// A new, empty directory of its own, removed with all that is in it. Tests run side by side, so that fixed names would
-/// meet.
+/// A new, empty directory with a unique name, because tests run in parallel; removed with its content at the end.
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {

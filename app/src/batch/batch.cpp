@@ -43,9 +43,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kOwnFolder = ".batch";  // subfolder of the output for locks and records of finished fields
-constexpr auto kPollInterval = std::chrono::milliseconds(100);  // between checks while other processes build meshes
+constexpr auto kPollInterval = std::chrono::milliseconds(100);  // wait before locked meshes are tried again
 
-/// How the work on one mesh of the batch ended. After every status but `failed` the mesh's field file exists.
+/// The outcome of the work on one mesh of the batch. After every outcome except `failed`, the mesh's field file exists.
 enum class Status : std::uint8_t {
   built,
   skipped,    ///< the field existed already
@@ -88,8 +88,8 @@ std::string checksumOf(const fs::path& field) {
   return file ? text : std::string();
 }
 
-/// Lists the names of the options that the caller wrote. An option is listed even if its value is the
-/// default, because a written option overrides --paper.
+/// Returns the names of the explicitly given options that affect the field. Options given with their default value are
+/// included, because every explicit option overrides the preset --paper.
 Json givenNames(const Arguments& arguments) {
   Json names = Json::array();
   for (const Parameter& parameter : buildParameters())
@@ -111,16 +111,14 @@ Error cannotWrite(const fs::path& file) {
                fmt::format("cannot be written ({}); check the folder's permissions", std::strerror(errno)));
 }
 
-/// Divides numbered pieces of work among processes that share a lock file. Each piece is locked by a record
-/// lock on one byte of the lock file. The byte's offset follows from the number of the piece, and the byte
-/// need not exist. The system releases a process's locks when the process ends in any way. The lock file is
-/// empty and must never be removed: processes that open a new file of the same name would not see the locks
-/// on the old one.
+/// Divides numbered pieces of work among processes that share a lock file. A process claims a piece by a record lock
+/// (fcntl) on one byte of the file, at an offset that follows from the number of the piece; the byte itself need not
+/// exist. When a process ends, for any reason, the system releases its locks. The lock file is empty and must never be
+/// removed: a process that opened a new file of the same name would not see the locks on the old one.
 class FileLocks {
  public:
-  /// Creates the lock file if it does not exist. Throws `Error` if the lock file cannot be written. A process
-  /// must create only one object for each lock file: record locks belong to the whole process, which loses all
-  /// its locks on a file as soon as it closes the file once.
+  /// Creates the lock file if it does not exist. Throws `Error` if the lock file cannot be written. A process must
+  /// create only one object for each lock file: when it closes a file, it loses all its record locks on this file.
   explicit FileLocks(fs::path file)
       : file_(std::move(file)), descriptor_(open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
     if (descriptor_ < 0) throw cannotWrite(file_);
@@ -147,7 +145,7 @@ class FileLocks {
     struct flock range = {};
     range.l_type = type;
     range.l_whence = SEEK_SET;
-    range.l_start = static_cast<off_t>(number >> 2);  // smaller offsets, which all file servers support
+    range.l_start = static_cast<off_t>(number >> 2);  // keeps offsets below 2^62, which all file servers support
     range.l_len = 1;
     for (;;) {
       if (fcntl(descriptor_, F_SETLK, &range) == 0) return true;
@@ -218,8 +216,8 @@ class Batch {
   fs::path markOf(const BatchMesh& mesh) const { return ownFolder_ / (mesh.name + ".begun"); }
   std::size_t count(Status status) const { return counts_[std::size_t(status)]; }
 
-  /// Builds the meshes in the order of the list. Meshes that other processes are building are tried again until
-  /// all meshes are finished.
+  /// Builds the fields of the meshes in the order of the list. Meshes that are locked by other processes are tried
+  /// again until all meshes are finished.
   void workThrough() {
     std::vector<const BatchMesh*> remaining;
     for (const BatchMesh& mesh : meshes_) remaining.push_back(&mesh);
@@ -233,7 +231,7 @@ class Batch {
     }
   }
 
-  /// Finishes a mesh. Returns false where another process is building it.
+  /// Builds the field of a mesh unless it exists already. Returns false if another process is working on the mesh.
   bool attempt(const BatchMesh& mesh, bool again) {
     if (InterruptGuard::interrupted() || (console_.listener != nullptr && console_.listener->wantsCancel()))
       throw Cancelled();
@@ -254,7 +252,7 @@ class Batch {
       std::optional<CurrentField> field = finished(mesh);
       Made made = field ? Made{again ? Status::elsewhere : Status::skipped, std::move(field)} : built(mesh);
       std::error_code ignored;
-      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // with other options it would stop a later construction
+      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // an old checkpoint would stop a build with other options
       return made;
     } catch (const Cancelled&) {
       throw;
@@ -264,8 +262,8 @@ class Batch {
     }
   }
 
-  /// Returns the existing field of the mesh if its record shows that a new construction would give the same
-  /// field. Returns std::nullopt otherwise.
+  /// Returns the existing field of the mesh if the record stored beside it shows that a new construction would give the
+  /// same field. Returns std::nullopt otherwise.
   std::optional<CurrentField> finished(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh), record = recordOf(mesh);
     if (!fs::exists(output) || !fs::exists(record)) return std::nullopt;
@@ -279,9 +277,9 @@ class Batch {
     }
   }
 
-  /// Removes the half-written files that a dead process left for this mesh. This process holds the mesh's lock,
-  /// so a process that left a mark for the mesh has died, on whatever machine. If there is no mark, there are
-  /// no half-written files, and the folder need not be searched.
+  /// Removes half-written files of this mesh. If a mark file of the mesh exists, the process that created it has died,
+  /// because this process now holds the mesh's lock. Without a mark file there are no half-written files, and the
+  /// folder need not be searched.
   void removeAbandoned(const BatchMesh& mesh) const {
     if (!fs::exists(markOf(mesh))) return;
     const fs::path output = outputOf(mesh);
@@ -295,16 +293,16 @@ class Batch {
     checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
     const BuildMark mark(markOf(mesh));
-    // The file is hashed before it is read as a mesh. If the file changes between the two, the next run notices
-    // it.
+    // Hash the file before reading the mesh: if the file changes in between, the next run notices that the hash
+    // differs.
     const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
     try {
       write(mesh, field, content);
     } catch (const Error&) {
-      // If the file system lost the locks, another process may have regarded this process as dead and removed its
-      // unfinished files. If that other process has finished the mesh, its field is used. Otherwise it removes no
-      // further files, and a second attempt to write succeeds.
+      // If the file system lost the locks, another process may have presumed this process dead and removed its
+      // unfinished files. If that process has finished the mesh, use its field. Otherwise write again: the files are
+      // not removed a second time.
       if (std::optional<CurrentField> other = finished(mesh)) return {Status::elsewhere, std::move(other)};
       write(mesh, field, content);
     }
@@ -317,9 +315,8 @@ class Batch {
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
   }
 
-  /// Returns the record that the present options would produce for the mesh's field file. The record is stored
-  /// beside the field file and compared as a whole. It contains the checksum of the field file, so it matches
-  /// no other field.
+  /// Returns the record of how the mesh's field file was built: program version, mesh, options and checksum of the
+  /// file. An existing field is reused only if the record stored beside it is identical.
   std::string recordText(const BatchMesh& mesh, const std::string& content) const {
     return jsonText({{"program", versionText()},
                      {"mesh", mesh.surface},
@@ -387,7 +384,7 @@ std::vector<BatchMesh> readList(const Console& console, const std::string& list)
 void buildBatch(const Console& console, const Arguments& arguments) {
   requireConsistent(arguments);
   const std::vector<BatchMesh> meshes = readList(console, arguments.text("batch"));
-  const InterruptGuard guard;  // files are written completely or not at all
+  const InterruptGuard guard;  // on Ctrl-C, each file is written completely or not at all
   OutputFolder folder(arguments.text("output"));
   OutputFolder own(folder.path() / kOwnFolder);
   Batch batch(console, arguments, meshes, folder.path());

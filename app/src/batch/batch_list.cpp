@@ -14,12 +14,12 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-constexpr std::size_t kLongestReadable = 100;  // bytes; file systems allow 255 for the name and the text after it
+constexpr std::size_t kLongestReadable = 100;  // bytes; a file name with all its suffixes may have 255
 
-/// Makes a readable file name of the name of a mesh: "torus_major_0.7" for builtin:torus,major=0.7, and
-/// "bunny" for scans/bunny.obj.
+/// Turns the name of a mesh into a readable file name: "torus_major_0.7" for builtin:torus,major=0.7, and "bunny" for
+/// scans/bunny.obj.
 std::string readableName(std::string surface) {
-  std::ranges::replace(surface, ',', '_');  // `plainName` would end at the comma
+  std::ranges::replace(surface, ',', '_');  // `plainName` cuts the name at a comma
   std::string name = plainName(surface).substr(0, kLongestReadable);
   if (name.starts_with('.')) name[0] = '_';  // a leading dot would hide the file
   return name;

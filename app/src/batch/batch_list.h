@@ -11,7 +11,7 @@ namespace hpsdf::app {
 struct BatchMesh {
   std::string surface;       ///< the line of the list: a file, builtin:… or analytic:…
   std::uint64_t number = 0;  ///< hash of `surface`, which identifies the mesh
-  std::string name;          ///< base name of its files: a readable part and the number
+  std::string name;          ///< base name of the mesh's output files: a readable part and the number
 };
 
 /// Parses a list that names one mesh per line. Blanks around a name, empty lines, lines that begin with # and

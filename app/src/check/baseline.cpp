@@ -11,8 +11,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Reads the size of a baseline, an array of two whole numbers. The types are checked here because nlohmann's
-/// JSON would silently convert other numbers.
+/// Reads the size of a baseline (an accepted picture or table) from JSON, an array of two whole numbers. The types are
+/// checked because nlohmann's JSON would silently convert other numbers.
 std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   const auto isWhole = [](const Json& number) { return number.is_number_unsigned(); };
   if (!json.is_array() || json.size() != 2 || !std::ranges::all_of(json, isWhole))
@@ -20,8 +20,8 @@ std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   return json.get<std::array<std::size_t, 2>>();
 }
 
-/// Reads the facts about a baseline from JSON that `saveFacts` wrote. Throws `Error`, or an exception of
-/// nlohmann's JSON, for any other JSON.
+/// Parses the description of a baseline (size, renderer, tolerances) from JSON. Throws `Error`, or an exception of
+/// nlohmann's JSON, if the JSON is not of the form that `saveFacts` writes.
 BaselineFacts factsOf(const std::string& file, const Json& json) {
   BaselineFacts facts;
   for (const auto& [key, value] : json.items()) {

@@ -1,5 +1,6 @@
 #pragma once
-// The facts about a baseline. They are stored in a small JSON file beside it. docs/check.md is the manual.
+// Describes a baseline, an accepted picture or table with which `hpsdf check` compares new results. The description is
+// stored in a small JSON file beside the baseline. docs/check.md is the manual.
 
 #include <array>
 #include <filesystem>
@@ -11,7 +12,7 @@ namespace hpsdf::app {
 struct BaselineFacts {
   std::array<std::size_t, 2> size = {};  ///< width and height of a picture, or columns and rows of raw values
   std::string renderer = {};             ///< renderer that drew the picture; "" for raw values
-  std::string version = {};              ///< version of the program that wrote it
+  std::string version = {};              ///< version of the program that wrote the baseline
   std::optional<double> budget = {};     ///< share of pixels or values that may differ, 0 to 1
   std::optional<double> bound = {};      ///< greatest difference of raw values that is accepted
 };
@@ -20,12 +21,12 @@ struct BaselineFacts {
 /// values of values.csv.
 std::filesystem::path factsFile(const std::filesystem::path& baseline);
 
-/// Loads the facts from the baseline's JSON file. Throws `Error` naming the JSON file if it is missing or
+/// Loads the description of a baseline from its JSON file. Throws `Error` naming the JSON file if it is missing or
 /// malformed.
 BaselineFacts loadFacts(const std::filesystem::path& baseline);
 void saveFacts(const BaselineFacts& facts, const std::filesystem::path& baseline);
 
-/// True if the file's extension is that of a picture or of raw values.
+/// True if the file extension is one for pictures or for raw values.
 bool isComparable(const std::filesystem::path& file);
 
 }  // namespace hpsdf::app

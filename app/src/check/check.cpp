@@ -33,7 +33,8 @@ void setVerdict(CheckedItem& item, Verdict verdict, const std::string& problem) 
   item.problem = problem;
 }
 
-/// Stores in the item how many pixels or values differ. If `problem` is not empty, also stores the verdict.
+/// Stores the results of a comparison in the item: the number of differing pixels or values and, if `problem` is not
+/// empty, the verdict.
 void takeComparison(CheckedItem& item, const auto& comparison, bool sameShape, const std::string& problem) {
   item.compared = comparison.compared;
   item.differing = comparison.differing;
@@ -64,7 +65,7 @@ void judgeData(CheckedItem& item, double bound) {
                           fmt::format("{:.3g}", worst.difference)});
 }
 
-/// Compares an item's actual file with its baseline and sets the item's verdict. Either file may be missing.
+/// Compares the file that a script wrote with its baseline and sets the item's verdict. Either file may be missing.
 void judge(CheckedItem& item) {
   if (!fs::exists(item.actual))
     return setVerdict(item, Verdict::noPicture,
@@ -82,8 +83,8 @@ void judge(CheckedItem& item) {
   if (item.verdict != Verdict::differs || isDataFile(item.picture)) item.difference.clear();
 }
 
-/// Reverses the verdict of a negative control. The control passes if its comparison failed with the verdict
-/// `stated`.
+/// Reverses the verdict on a negative control, a picture that is wrong on purpose. The control passes if its comparison
+/// failed with the verdict `stated`.
 void reverseVerdict(CheckedItem& item, Verdict stated) {
   if (item.verdict == stated)
     setVerdict(item, Verdict::passed, "");
@@ -94,10 +95,10 @@ void reverseVerdict(CheckedItem& item, Verdict stated) {
                fmt::format("it is meant to fail with '{}', but: {}", verdictText(stated), item.problem));
 }
 
-using NegativeControls = std::map<int, Verdict>;  ///< verdicts that negative controls must fail with, by their lines
+using NegativeControls = std::map<int, Verdict>;  ///< expected failures of commands that are wrong on purpose, by line
 
-/// Turns the comments "# wrong REASON: COMMAND" of a script into commands. Every command keeps its line and
-/// column, so that error messages stay correct.
+/// Enables the commands in a script's comments "# wrong REASON: COMMAND", which draw wrong pictures on purpose. Every
+/// command keeps its line and column, so that error messages stay correct.
 NegativeControls enableControls(const std::string& file, std::string& text) {
   NegativeControls controls;
   std::size_t begin = 0;
@@ -201,7 +202,7 @@ class ScriptCheck {
     }
   }
 
-  /// Compares the files that a negative control has just written with the baselines of the same names.
+  /// Compares the files that a command has just written wrongly on purpose with the baselines of the same names.
   void judgeControl(const Session& session, const Call& call, Verdict stated) {
     const fs::path kept = wrong_ / std::to_string(call.line);
     const auto pictures = comparableFiles(wrong_);
@@ -222,8 +223,8 @@ class ScriptCheck {
     }
   }
 
-  /// Compares the files that the script wrote with their baselines. If the script completed, also judges each
-  /// baseline whose file it did not write.
+  /// Compares the files that the script wrote with their baselines. If the script ran to its end, each baseline for
+  /// which it wrote no file counts as a failure.
   void judgePictures(bool completed) {
     std::vector<CheckedItem> judged;
     std::set<std::string> pictures = comparableFiles(actual_);
@@ -271,7 +272,7 @@ void refuseUnknown(const std::vector<std::string>& names, const std::vector<std:
   }
 }
 
-/// Returns one item for each baseline that belongs to no existing script.
+/// Returns a failed item for each baseline whose script does not exist.
 std::vector<CheckedItem> strayBaselines(const CheckRequest& request, const std::vector<std::string>& scripts) {
   std::vector<CheckedItem> items;
   std::error_code ignored;

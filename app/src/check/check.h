@@ -18,12 +18,12 @@ enum class Verdict : std::uint8_t {
   differs,
   otherSize,
   noBaseline,
-  noPicture,     ///< a baseline that no script writes
+  noPicture,     ///< a baseline for which no script writes a file
   unreadable,    ///< a file that cannot be read: the picture, its baseline or the baseline's JSON file
   expected,      ///< a script whose expectation does not hold
   scriptFailed,  ///< a script that ended with an error
-  notNoticed,    ///< a negative control that agrees with the baseline
-  otherReason,   ///< a negative control that fails for another reason than stated
+  notNoticed,    ///< a deliberately wrong picture that agrees with the baseline
+  otherReason,   ///< a deliberately wrong picture that fails for another reason than stated
 };
 std::string verdictText(Verdict verdict);
 
@@ -40,25 +40,25 @@ struct WorstDifference {
 struct CheckedItem {
   std::string script = {};
   std::string picture = {};  ///< file name; "" for a script
-  int controlLine = 0;       ///< line of the negative control that wrote it; 0 for other pictures
+  int controlLine = 0;       ///< script line that drew the picture wrong on purpose; 0 for other pictures
   Verdict verdict = Verdict::passed;
-  std::string problem = {};  ///< one line; "" if it passed
-  std::size_t compared = 0;  ///< number of pixels or values
+  std::string problem = {};  ///< reason of the failure in one line; "" if the item passed
+  std::size_t compared = 0;  ///< number of compared pixels or values
   std::size_t differing = 0;
-  double largest = 0;  ///< largest difference
+  double largest = 0;  ///< largest difference of a pixel or value
   double budget = 0;   ///< share of pixels or values that may differ
   std::string renderer = {};
   std::string baselineRenderer = {};
   std::string where = {};                 ///< "file:line:column" of the command that wrote it
-  std::filesystem::path baseline = {};    ///< file that need not exist
-  std::filesystem::path actual = {};      ///< file that need not exist
-  std::filesystem::path difference = {};  ///< picture of the differences; "" without one
+  std::filesystem::path baseline = {};    ///< path of the accepted file, which may be missing
+  std::filesystem::path actual = {};      ///< path of the new file, which may be missing
+  std::filesystem::path difference = {};  ///< path of a picture of the differences; "" for none
   std::vector<WorstDifference> worst = {};
 
-  /// The name of the item: "gallery/degree.png", or the name of the script for a script's own item.
+  /// The name of the item: "gallery/degree.png" for a picture, or the name of the script if the item is a script.
   std::string name() const { return picture.empty() ? script : script + "/" + picture; }
-  /// The name of the picture: "degree.png", "degree.png, wrong in line 7" for a negative control, or "(script)"
-  /// if the item is a script.
+  /// The name of the picture: "degree.png", "degree.png, wrong in line 7" for a picture that is wrong on purpose, or
+  /// "(script)" if the item is a script.
   std::string pictureText() const;
   /// "SCRIPT/" followed by `pictureText()`, or only the script's name if the item is a script.
   std::string title() const { return picture.empty() ? script : script + "/" + pictureText(); }
@@ -67,14 +67,14 @@ struct CheckedItem {
 struct CheckRequest {
   std::filesystem::path folder;
   std::filesystem::path output;
-  std::vector<std::string> only = {};  ///< names of scripts; empty for all
+  std::vector<std::string> only = {};  ///< names of the scripts to run; empty for all
   Variables variables = {};
   std::filesystem::path junit = {};  ///< JUnit XML file; "" for none
 };
 
 struct CheckOutcome {
-  std::vector<CheckedItem> items = {};         ///< results of all scripts, by the scripts' names
-  std::map<std::string, double> seconds = {};  ///< time that each script took
+  std::vector<CheckedItem> items = {};         ///< results of all scripts, sorted by script name
+  std::map<std::string, double> seconds = {};  ///< time that each script took, by script name
 
   std::size_t failures() const;
   bool scriptFailed() const;

@@ -119,8 +119,8 @@ std::string nameOf(const Json& item) {
   return item.at("script").get<std::string>() + "/" + item.at("picture").get<std::string>();
 }
 
-/// Returns the result of the last check whose name is `name`, of the form SCRIPT/PICTURE. Results of negative
-/// controls are ignored. Throws `Error` if no result has this name.
+/// Returns the result for the picture `name`, of the form SCRIPT/PICTURE, in the last check. Ignores pictures that are
+/// wrong on purpose. Throws `Error` if no result has this name.
 Json resultNamed(const std::string& name, const Json& results, const fs::path& from) {
   std::vector<std::string> names;
   for (const Json& item : results.at("items")) {
@@ -143,7 +143,7 @@ std::array<std::size_t, 2> sizeOf(const fs::path& file) {
 
 Json acceptOne(const Json& item, const fs::path& folder, const fs::path& from, const Arguments& arguments) {
   const fs::path actual = from / "actual" / nameOf(item), baseline = folder / "baselines" / nameOf(item);
-  std::optional<BaselineFacts> older;  // nothing where there is no baseline, or no description of it
+  std::optional<BaselineFacts> older;  // empty if there is no baseline yet, or no JSON file beside it
   if (fs::exists(baseline) && fs::exists(factsFile(baseline))) older = loadFacts(baseline);
   BaselineFacts facts = older.value_or(BaselineFacts{});
   facts.size = sizeOf(actual);
@@ -173,7 +173,7 @@ void runAccept(Session& session, const Arguments& arguments) {
   const fs::path folder = arguments.text("folder");
   const fs::path from = arguments.text("from");
   const Json results = lastResults(folder, from);
-  std::vector<Json> taken;  // all names are checked before the first file is written
+  std::vector<Json> taken;  // results to accept; all names are checked before any file is written
   for (const std::string& name : arguments.texts("names")) taken.push_back(resultNamed(name, results, from));
   Json accepted = Json::array();
   for (const Json& item : taken) accepted.push_back(acceptOne(item, folder, from, arguments));

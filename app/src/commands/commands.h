@@ -12,11 +12,10 @@ void addExportCommand(Registry& registry);
 void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, info, query, load and save
 void addJumpsCommand(Registry& registry);
 void addProbeCommand(Registry& registry);
-void addToolCommands(Registry& registry);  ///< run, mesh, shapes, doctor, set, include, help and docs
+void addToolCommands(Registry& registry);  ///< run, shapes, doctor, set, include, help and docs
 void addVerifyCommand(Registry& registry);
 
-/// Adds the command `mesh`. It takes its camera parameters from the command `render`, which must already be in the
-/// registry.
+/// Adds the command `mesh`. The command `render`, whose camera parameters it shares, must already be in the registry.
 void addMeshCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -41,8 +41,8 @@ struct Exported {
   CubicGridError error;
 };
 
-/// Samples the field on a grid, measures the grid and writes it to `out`. The output file gets its final name
-/// only when the caller commits `out`.
+/// Samples the field on a regular grid, measures how far the grid deviates from the field, and writes the grid to
+/// `out`. The file gets its final name only when the caller commits `out`.
 Exported exportGrid(const Session& session, const Arguments& arguments, OutputFile& out) {
   const Field& field = session.current().field;
   const GridResolution resolution = exportResolution(field.domain(), arguments);
@@ -91,7 +91,7 @@ std::string exportText(const Exported& made, const std::string& file) {
 
 void runExport(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
-  const InterruptGuard guard;  // the file is written completely or not at all
+  const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
   OutputFile out(file);
   useField(session, arguments);
   const Exported made = exportGrid(session, arguments, out);

@@ -49,8 +49,8 @@ Json madeJson(const Session& session, const Arguments& arguments) {
   return json;
 }
 
-/// Replaces the current field by another form of the same field, and saves the new form if an output is
-/// given. Reports it as JSON with the members of `figures`, or as the text that textOf(field) returns.
+/// Replaces the current field by a post-processed version of it, and saves the new field if an output is given. Reports
+/// the new field as JSON that includes `figures`, or as the text that textOf(field) returns.
 void changeCurrent(Session& session, const Arguments& arguments, Field field, const Json& figures, const auto& textOf) {
   const CurrentField& before = session.current();
   session.changeField({std::move(field), arguments.textOr("output", before.name), {}, before.surface});
@@ -112,7 +112,7 @@ void runBuild(Session& session, const Arguments& arguments) {
   const std::string surface = arguments.text("mesh");
   const std::filesystem::path checkpoint = checkpointFile(arguments);
   checkFieldOutput(arguments);
-  const InterruptGuard guard;  // the file is written completely or not at all
+  const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
   BuiltField built = buildAndKeep(console, surface, arguments, checkpoint);
   session.setField({std::move(built.field), arguments.textOr("output", surface), {}, surface});
   session.setExact(std::move(built.exact));
@@ -178,7 +178,7 @@ void runSmooth(Session& session, const Arguments& arguments) {
   if (session.current().field.metadata().settings.continuityWeight)
     throw Error(session.current().name +
                 ": is weakly continuous already; smooth the original field, or build it again");
-  const InterruptGuard guard;  // the file is written completely or not at all
+  const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
   const auto start = std::chrono::steady_clock::now();
   WeaklyContinuous made = withProgress(session.console(), [&](const Progress& progress) {
     return weaklyContinuous(session.current().field, {.weight = arguments.number("continuity-weight")},
@@ -196,7 +196,7 @@ void runSmooth(Session& session, const Arguments& arguments) {
 void runBlend(Session& session, const Arguments& arguments) {
   checkFieldOutput(arguments);
   useField(session, arguments);
-  const InterruptGuard guard;  // the file is written completely or not at all
+  const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
   const double width = arguments.number("width");
   changeCurrent(session, arguments, blended(session.current().field, width), Json::object(), [&](const Field& field) {
     return fmt::format("{}, blended within {} of an edge from faces", fieldLine(field), width);
@@ -208,7 +208,7 @@ void runBounds(Session& session, const Arguments& arguments) {
   useField(session, arguments);
   const CurrentField& from = session.current();
   const Console& console = session.console();
-  const InterruptGuard guard;  // the file is written completely or not at all
+  const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
   const std::string surface = surfaceFor(session.current(), arguments);
   const ReferenceSurface reference = referenceSurface(console, surface, from.field.metadata().source);
   refuseForeign(from, reference, surface);

@@ -45,7 +45,8 @@ struct Row {
   JumpBin bin;
 };
 
-/// Returns the bins of the histogram. If some interfaces have no jump at all, the first row counts them.
+/// Returns a histogram of the jumps across cell faces, one row for each power of ten. If some faces have no jump at
+/// all, an additional first row counts them.
 std::vector<Row> histogramRows(const Jumps& jumps, JumpKind kind) {
   Row exact{"0", 0, {jumps.interfaces.size(), jumps.area}};
   std::vector<Row> rows;

@@ -80,7 +80,7 @@ std::size_t positionLimit(const Arguments& arguments, std::size_t otherwise) {
 
 bool isPoint(const Defect& defect) { return defect.ends[0] == defect.ends[1]; }
 
-/// Returns the first defects of a kind, at most `limit`.
+/// Returns the first `limit` defects of one kind, or all of them if there are fewer.
 std::span<const Defect> firstOf(const MeshDefects& defects, DefectKind kind, std::size_t limit) {
   const std::span<const Defect> all = defects.ofKind(kind);
   return all.first(std::min(limit, all.size()));
@@ -253,7 +253,7 @@ void runMesh(Session& session, const Arguments& arguments) {
   if (arguments.given("repair")) checkMeshWritable(arguments.text("repair"));
   if (arguments.given("picture")) checkWritable(arguments.text("picture"));
   MeshResults results = inspected(session, arguments);
-  std::exception_ptr pictureError;  // is thrown after all other results are printed
+  std::exception_ptr pictureError;  // rethrown after all other results are printed
   try {
     if (arguments.given("picture")) drawPicture(session, arguments, results);
     results.isDrawn = arguments.given("picture");

@@ -20,8 +20,8 @@ constexpr std::string_view kBlanks = " \t\r\v\f";
 
 bool isSeparator(char c) { return c == ',' || c == ';' || kBlanks.find(c) != std::string_view::npos; }
 
-/// Parses exactly three numbers, finite or not. They are separated by blanks and at most one comma or
-/// semicolon. Returns std::nullopt for any other text.
+/// Parses exactly three numbers, infinity and NaN included. Adjacent numbers are separated by blanks and at most one
+/// comma or semicolon. Returns std::nullopt for any other text.
 std::optional<Vector3> parsePoint(std::string_view text) {
   Vector3 point;
   const char* next = text.data();
@@ -39,8 +39,7 @@ std::optional<Vector3> parsePoint(std::string_view text) {
   return next == end ? std::optional(point) : std::nullopt;
 }
 
-/// True for a header line of column names. A header begins with a letter or a quote and is not a point such
-/// as "nan nan nan".
+/// True for a header line of column names: it begins with a letter or a quote and is not a point such as "nan nan nan".
 bool isHeader(std::string_view text) {
   return !text.empty() && (isLetter(text[0]) || text[0] == '"') && !parsePoint(text);
 }
@@ -57,7 +56,7 @@ class Query {
       std::string_view text = line;
       if (number == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark
       take(trimmed(text), number);
-      if (in.rdbuf()->in_avail() <= 0) flush();  // sends earlier answers: another program may wait for them
+      if (in.rdbuf()->in_avail() <= 0) flush();  // before a wait for input: the sender may need the answers first
     }
     if (in.bad()) throw Error(name_ + ": cannot be read");
     flush();

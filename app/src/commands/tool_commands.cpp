@@ -94,8 +94,8 @@ void runShapes(Session& session, const Arguments& arguments) {
   }
 }
 
-/// Returns for each instruction set beyond the baseline whether this processor supports it. Returns an empty
-/// object on architectures other than x86.
+/// Returns whether this processor supports each of the optional x86 instruction sets. Returns an empty object on other
+/// architectures.
 Json simdOfCpu() {
 #if defined(__x86_64__) || defined(__i386__)
   __builtin_cpu_init();

@@ -31,12 +31,12 @@ struct Verified {
   double diagonal;  ///< length of the domain's diagonal
 };
 
-/// A figure of the verification and the option that sets a limit for it.
+/// A measured figure, such as the RMS error, and the option that sets a limit for it.
 struct Threshold {
   const char* option;
   const char* figure;  ///< name of the figure in messages
   const char* help;
-  bool counts;  ///< the figure is a number of points
+  bool counts;  ///< true if the figure is a number of points
   double (*value)(const Verified&);
 };
 
@@ -244,8 +244,7 @@ std::string verifiedText(const Verified& verified) {
   return text + worstText(figures.worst);
 }
 
-/// Returns the text of a script. The script moves the explorer to each of the worst points and takes a
-/// picture there.
+/// Returns a script that moves the explorer to each of the points with the largest errors and takes a picture there.
 std::string worstScript(const Session& session, const Verified& verified, const std::filesystem::path& file) {
   const bool loaded = session.current().fileBytes.has_value();
   std::string text =

@@ -21,7 +21,7 @@ class Failed : public Error {
   int status_;
 };
 
-/// Thrown where work was cancelled after some of its results were kept.
+/// Thrown if work was cancelled after some of its results were kept.
 class CancelledPartway : public Cancelled {
  public:
   explicit CancelledPartway(std::string kept) : kept_(std::move(kept)) {}

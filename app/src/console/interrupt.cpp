@@ -30,7 +30,7 @@ void installInterruptHandlers() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction before = {};
     sigaction(signal, nullptr, &before);
-    if (before.sa_handler == SIG_IGN) continue;  // the caller ignores the signal, as nohup does
+    if (before.sa_handler == SIG_IGN) continue;  // a parent such as nohup wants the signal ignored
     struct sigaction action = {};
     action.sa_handler = onInterrupt;
     action.sa_flags = SA_RESTART;

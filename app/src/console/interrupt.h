@@ -7,8 +7,8 @@ namespace hpsdf::app {
 /// process ignores stay ignored.
 void installInterruptHandlers();
 
-/// While a guard exists, the first signal does not end the process, so that the work can stop in an orderly
-/// way. Guards may be nested.
+/// While a guard exists, the first SIGINT, SIGTERM or SIGHUP does not end the process, so that the work can stop in an
+/// orderly way. Guards may be nested.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -16,7 +16,7 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  /// True after one of the handled signals has arrived. Any thread may call this function.
+  /// True once SIGINT, SIGTERM or SIGHUP has arrived while a guard existed. Any thread may call this function.
   static bool interrupted();
 };
 

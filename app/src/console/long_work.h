@@ -11,8 +11,8 @@
 
 namespace hpsdf::app {
 
-/// Runs work(progress), shows its progress on the console, and returns its result. Throws `Cancelled` after
-/// Ctrl-C or if the console's listener asks for it.
+/// Runs work(progress), shows its progress on the console, and returns its result. Throws `Cancelled` after Ctrl-C or
+/// if the console's listener cancels the work.
 template <typename Work>
 auto withProgress(const Console& console, const Work& work) {
   const InterruptGuard guard;
@@ -34,7 +34,7 @@ auto withProgress(const Console& console, const Work& work) {
           [listener] { return InterruptGuard::interrupted() || (listener != nullptr && listener->wantsCancel()); },
   };
   auto result = work(progress);
-  progress.throwIfCancelled();  // the request may come after the last check within `work`
+  progress.throwIfCancelled();  // Ctrl-C may have come after the last check inside `work`
   return result;
 }
 

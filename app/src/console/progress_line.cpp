@@ -15,7 +15,7 @@ constexpr double kQuietSeconds = 10;
 // Work that takes less than this time shows no progress. The time is longer for logs, where lines cannot be
 // erased.
 constexpr double kQuickSeconds = 0.3, kQuickSecondsInALog = 2;
-constexpr int kBarCells = 24;
+constexpr int kBarColumns = 24;
 
 }  // namespace
 
@@ -45,13 +45,12 @@ void ProgressLine::report(std::string_view task, double fraction, Clock::time_po
   if (!due(fraction, now)) return;
   const double elapsed = Seconds(now - start_).count();
   std::string text = fmt::format("{} {:3.0f} %, {}", task, std::floor(100 * fraction), durationText(elapsed));
-  // The remaining time is shown only after the first moments of the work. An earlier estimate would vary too
-  // much.
+  // Show the remaining time only after the first moments of the work. An earlier estimate would vary too much.
   if (elapsed > 1 && fraction > 0.02 && fraction < 1)
     text += fmt::format(", about {} left", durationText(elapsed * (1 - fraction) / fraction));
   if (redraws_) {
-    const int filled = static_cast<int>(fraction * kBarCells);
-    out_ << fmt::format("{}[{:#<{}}{:.<{}}] {}", kEraseLine, "", filled, "", kBarCells - filled, text);
+    const int filled = static_cast<int>(fraction * kBarColumns);
+    out_ << fmt::format("{}[{:#<{}}{:.<{}}] {}", kEraseLine, "", filled, "", kBarColumns - filled, text);
   } else {
     out_ << text << "\n";
   }

@@ -11,7 +11,7 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr std::uint64_t kDefaultMemory = 100'000'000;  // bytes; the limit of a construction without size limit
+constexpr std::uint64_t kDefaultMemory = 100'000'000;  // bytes; default memory limit if no size limit is given
 
 ParameterKind kindOf(const BuildSetting& setting) {
   using enum BuildSetting::Type;
@@ -94,7 +94,7 @@ Parameter threadsParameter(const std::string& result) {
 }
 
 Parameter pointsParameter(std::string help, std::string count, double minimum) {
-  constexpr double kMost = 1e8;  // one point takes about 100 bytes
+  constexpr double kMost = 1e8;  // needs 10 GB of memory, 100 bytes per point
   return {"points", wholeNumber().within(minimum, kMost).byDefault(std::move(count)), std::move(help)};
 }
 
@@ -181,8 +181,8 @@ Box domainFrom(const Arguments& arguments, const Box& surface) {
       throw Error(fmt::format("domain {}: expected lower corner x0,y0,z0 below upper corner x1,y1,z1", shape));
     return domain;
   }
-  // A normalized mesh gets exactly the cube of the paper. A cube around its bounding box would contain rounding
-  // errors of the mesh.
+  // For a normalized mesh, use exactly the cube of the paper: a cube computed from the mesh's bounding box would
+  // contain rounding errors.
   if (wantsNormalized(arguments)) return Box(Vector3::Constant(-(1 + margin)), Vector3::Constant(1 + margin));
   return domainAround(surface, DomainShape::cube, margin);
 }

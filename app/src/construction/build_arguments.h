@@ -1,6 +1,5 @@
 #pragma once
-// The options of a construction: the parameters that commands take for it, and the values of these parameters
-// in the arguments of a call.
+// The command parameters for the construction of a field, and their conversion into options of the construction.
 
 #include <initializer_list>
 #include <string>
@@ -17,30 +16,31 @@ namespace hpsdf::app {
 /// that are settings of `BuildOptions` come from the table `buildSettings`.
 std::vector<Parameter> buildParameters();
 
-/// Returns the parameters that tell whether the state of a running construction is saved, and how often.
+/// Returns the parameters that choose whether and how often the state of a running construction is saved.
 std::vector<Parameter> checkpointParameters();
 
-/// Returns the names of the parameters that end a construction in one of the ways `endings`.
+/// Returns the names of the parameters that set a stopping criterion of one of the kinds `endings`.
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings);
 
-/// Returns the parameter for the setting `name` of the table `buildSettings`, or only the values that it
-/// accepts.
+/// Returns the command parameter for the setting `name` of the table `buildSettings`. `settingKind` returns only the
+/// values that this parameter accepts.
 Parameter settingParameter(const char* name);
 ParameterKind settingKind(const char* name);
 
-/// Returns the parameter for the number of threads. Its help text says that the result does not depend on the
-/// number of threads. The sentence begins with `result`, such as "The field is".
+/// Returns the parameter for the number of threads. Its help text says that the result is the same for any number of
+/// threads, in a sentence that begins with `result`, such as "The field is".
 Parameter threadsParameter(const std::string& result);
 
-/// Returns the parameter for the number of random points, or for the seed that selects the points.
+/// Returns the parameter for the number of random points. `seedParameter` returns the one for the seed of their random
+/// number generator.
 Parameter pointsParameter(std::string help, std::string count, double minimum);
 Parameter seedParameter(std::string help = "Which points.");
 
-/// Returns the settings of a construction from the arguments of `buildParameters`. Options that the caller
-/// wrote override those of --paper.
+/// Returns the settings of a construction from the arguments of `buildParameters`. Explicitly given options override
+/// the preset --paper.
 BuildOptions buildOptions(const Arguments& arguments);
 
-/// Returns the options of the distance function, with the inside test that the arguments ask for.
+/// Returns the options of the distance function, among them the method that tells inside from outside.
 DistanceOptions distanceOptions(const Arguments& arguments);
 
 /// Returns true if the arguments ask for the mesh to be scaled and centred.
@@ -53,8 +53,7 @@ Box domainFrom(const Arguments& arguments, const Box& surface);
 /// from any surface.
 void requireConsistent(const Arguments& arguments);
 
-/// Throws `Error` if the option `name` is given without the option `owner`. Without `owner`, the option
-/// `name` has no effect.
+/// Throws `Error` if the option `name` is given without the option `owner`, without which it has no effect.
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven);
 
 /// Tells whether the resulting field depends on this parameter of `buildParameters`.

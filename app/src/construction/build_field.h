@@ -17,26 +17,25 @@ namespace hpsdf::app {
 /// construction.
 struct BuildInput {
   std::shared_ptr<const DistanceFunction> exact;
-  std::optional<MeshReport> mesh;  ///< nothing for an analytic shape
+  std::optional<MeshReport> mesh;  ///< empty for an analytic shape
   Box domain;
   BuildOptions options;
-  double setUpSeconds = 0;  ///< time to make the distance
+  double setUpSeconds = 0;  ///< time to set up the distance function
 };
 
-/// Loads a surface, warns about its flaws and makes its exact distance. Throws `Error` naming `surface`.
+/// Loads a surface, warns about its flaws and sets up its exact distance function. Throws `Error` naming `surface`.
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments);
 
 struct BuiltField {
   Field field;
-  std::shared_ptr<const DistanceFunction> exact;  ///< the distance from which the field was made
-  std::optional<MeshReport> mesh;                 ///< nothing for an analytic shape
-  double seconds = 0;                             ///< time of construction and distance
+  std::shared_ptr<const DistanceFunction> exact;  ///< the exact distance that the field approximates
+  std::optional<MeshReport> mesh;                 ///< empty for an analytic shape
+  double seconds = 0;                             ///< time to set up the distance function and build the field
 };
 
-/// Makes the input of the construction and builds the field. Progress and warnings go to the console's `err`.
-/// If `checkpoint` names a file, the construction continues from the state in this file, and the arguments
-/// must contain those of `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled` after
-/// Ctrl-C.
+/// Loads the surface and builds its field. Progress and warnings go to the console's `err`. If `checkpoint` names a
+/// file, the construction continues from the state in this file, and the arguments must contain those of
+/// `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled` after Ctrl-C.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 

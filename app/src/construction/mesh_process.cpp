@@ -37,14 +37,14 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* kCommand = "__read-mesh";  // hidden command; FILE SECONDS BYTES follow
+constexpr const char* kCommand = "__read-mesh";  // hidden command, followed by FILE SECONDS BYTES
 constexpr const char* kSecondsVariable = "HPSDF_IMPORT_SECONDS";
 constexpr const char* kBytesVariable = "HPSDF_IMPORT_BYTES";
-constexpr auto kTick = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
-constexpr double kSilentSeconds = 2;                   // no progress is shown earlier: processes may start slowly
+constexpr auto kInterruptInterval = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
+constexpr double kSilentSeconds = 2;  // time before progress is shown: processes may start slowly
 
-// Limits of time and memory for reading a file. An idle machine reads 20 MB/s and needs 4 to 9 bytes of
-// memory for each byte of the file (docs/meshes.md).
+// Limits of time and memory for reading a mesh file. They are generous: an idle machine reads 20 MB/s and needs 4 to 9
+// bytes of memory for each byte of the file (docs/meshes.md).
 constexpr double kSeconds = 60;
 constexpr double kBytesASecond = 2e6;
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
@@ -61,7 +61,7 @@ std::optional<double> numberOf(const char* variable) {
   return number;
 }
 
-/// The pipe through which the reading process sends its reply to this process.
+/// The pipe through which the process that reads a mesh file sends its reply to this process.
 struct Pipe {
   Pipe() {
     if (pipe2(ends.data(), O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category());
@@ -92,7 +92,7 @@ std::string endText(int status) {
   return fmt::format("signal {}", WTERMSIG(status));
 }
 
-/// One run of the reading process for one file, from the start of the process to its reply.
+/// One run of the process that reads a mesh file, from its start to its reply.
 class Reading {
  public:
   Reading(const fs::path& program, const fs::path& file, const ReadingLimits& limits, const Progress& progress)
@@ -130,7 +130,7 @@ class Reading {
     for (;;) {
       pause();
       pollfd output = {pipe_.ends[0], POLLIN, 0};
-      if (poll(&output, 1, kTick.count()) <= 0) continue;
+      if (poll(&output, 1, kInterruptInterval.count()) <= 0) continue;
       const ssize_t count = read(output.fd, buffer.data(), buffer.size());
       if (count < 0 && errno == EINTR) continue;
       if (count <= 0) return;
@@ -140,8 +140,8 @@ class Reading {
     }
   }
 
-  /// Reads the length of the reply from its header and reserves memory for it. The memory limit applies to this
-  /// process too: a reply may be long although the reading process needed little memory.
+  /// Reads the length of the other process's reply from its header and reserves memory for it. The memory limit applies
+  /// here too: a reply may be long although the other process needed little memory.
   void expectWhole() {
     expected_ = replyBytes(bytes_);
     if (expected_ > limits_.bytes) throw tooLarge();
@@ -176,7 +176,7 @@ class Reading {
   std::uint64_t expected_ = 0;  ///< length of the reply; 0 until its header has arrived
 };
 
-// The following functions run in the reading process.
+// The following functions run in the separate process that reads a mesh file.
 
 void toStandardOutput(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
@@ -187,8 +187,8 @@ void toStandardOutput(std::span<const std::byte> bytes) {
   }
 }
 
-/// Ends the reading process at once when it runs out of memory. If bad_alloc were thrown instead, assimp
-/// would catch it and report damage, or continue.
+/// Ends the process that reads a mesh file at once when it runs out of memory. If bad_alloc were thrown instead, the
+/// importer assimp would catch it and report a damaged file, or continue.
 void onMemoryOut() {
   writeOutOfMemory(toStandardOutput);
   _exit(0);
@@ -205,7 +205,7 @@ void limit(decltype(RLIMIT_CORE) resource, double most) {
 void confine(double seconds, [[maybe_unused]] double bytes) {
 #ifdef __linux__
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  prctl(PR_SET_DUMPABLE, 0);  // the limit below does not apply to cores that are piped to a program
+  prctl(PR_SET_DUMPABLE, 0);  // no core dump; RLIMIT_CORE does not apply to cores piped to a program
 #endif
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, std::ceil(seconds) + 1);  // ends the process even if its parent has died
@@ -265,7 +265,7 @@ int readForOtherProcess(std::span<const std::string> words) {
     writeMesh(withThreads(1, [&] { return importMesh(words[1]); }), toStandardOutput);
   } catch (const Error& error) {
     writeRefusal(error.subject() == words[1] ? error.problem() : error.what(), toStandardOutput);
-  } catch (const std::bad_alloc&) {  // thrown by code that calls malloc, as Eigen does, and bypasses `onMemoryOut`
+  } catch (const std::bad_alloc&) {  // Eigen calls malloc directly and bypasses `onMemoryOut`
     writeOutOfMemory(toStandardOutput);
   } catch (const std::exception& error) {
     writeRefusal(fmt::format("{} (this is a fault of the program)", error.what()), toStandardOutput);

@@ -23,8 +23,7 @@ struct ReadingLimits {
 /// `Error` if one of these variables is not a number above 0.
 ReadingLimits readingLimits(const std::filesystem::path& file);
 
-/// Returns the path of the running program's executable file. Returns an empty path if the system does not
-/// tell it.
+/// Returns the path of the running program's executable file, or an empty path if it cannot be found out.
 std::filesystem::path ownProgram();
 
 /// Calls `importMesh` in a separate process of `program`, which must come from the same build as this
@@ -34,12 +33,12 @@ std::filesystem::path ownProgram();
 ImportedMesh importInSubprocess(const std::filesystem::path& program, const std::filesystem::path& file,
                                 const ReadingLimits& limits, const Progress& progress);
 
-/// Tells whether these command-line words are those with which `importInSubprocess` starts the reading
-/// process.
+/// True if these command-line words are the hidden command with which `importInSubprocess` starts the process that
+/// reads a mesh file.
 bool asksForReading(std::span<const std::string> words);
 
-/// Runs the reading process. It reads the mesh file that the words name, within the limits that the words
-/// give, and writes its reply to standard output (mesh_reply.h). Returns the exit status.
+/// Runs in the separate process. Reads the mesh file that `words` name, within the limits that they give, and writes
+/// the reply to standard output (mesh_reply.h). Returns the exit status.
 int readForOtherProcess(std::span<const std::string> words);
 
 }  // namespace hpsdf::app

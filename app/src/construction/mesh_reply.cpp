@@ -22,23 +22,23 @@ constexpr std::uint64_t kLongestText = 1 << 16;
 using Triangle = std::array<std::uint32_t, 3>;
 static_assert(sizeof(Vector3) == 3 * sizeof(double) && sizeof(Triangle) == 12, "arrays are sent as they lie in memory");
 
-/// Those counts of a `MeshReport` that cannot be recomputed from the mesh.
+/// The counts in a `MeshReport` that cannot be recomputed from the received mesh and are therefore sent with it.
 constexpr std::size_t MeshReport::*kCounts[] = {&MeshReport::components,           &MeshReport::boundaryEdges,
                                                 &MeshReport::nonManifoldEdges,     &MeshReport::inconsistentEdges,
                                                 &MeshReport::unbalancedEdges,      &MeshReport::weldedVertices,
                                                 &MeshReport::unreferencedVertices, &MeshReport::degenerateFaces,
                                                 &MeshReport::flippedFaces,         &MeshReport::duplicateFaces};
 
-/// The header at the beginning of a reply. Vertices, triangles and text follow it. The header needs neither a
-/// version nor a byte order, since the same program on the same machine writes and reads it.
+/// The header of a reply of the process that reads a mesh file. Vertices, triangles and text follow it. The header
+/// needs neither a version nor a byte order, since the same program on the same machine writes and reads it.
 struct Header {
   std::array<char, 8> magic = kMagic;
-  std::uint64_t checksum = 0;  ///< checksum of all bytes after it
+  std::uint64_t checksum = 0;  ///< checksum of all bytes that follow this member
   std::uint64_t kind = 0;
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
   std::uint64_t textBytes = 0;
-  // The following members of the header hold members of the `MeshReport`.
+  // The remaining members transfer members of the `MeshReport`.
   std::array<std::uint64_t, std::size(kCounts)> counts = {};
   std::array<double, 3> degeneratePosition = {};
   std::array<double, 3> duplicatePosition = {};

@@ -18,8 +18,8 @@ namespace hpsdf::app {
 struct MeshReply {
   enum class Kind : std::uint64_t { mesh, refusal, outOfMemory };
   Kind kind = Kind::mesh;
-  ImportedMesh imported;  ///< for `mesh`: the mesh, without a name
-  std::string refusal;    ///< for `refusal`: the reason in one line
+  ImportedMesh imported;  ///< if `kind` is `mesh`: the mesh, without a name
+  std::string refusal;    ///< if `kind` is `refusal`: the reason in one line
 };
 
 /// Thrown for bytes that are not a valid reply. The message gives the reason.
@@ -36,14 +36,14 @@ extern const std::size_t kReplyHeaderBytes;
 /// are not a header.
 std::uint64_t replyBytes(std::span<const std::byte> beginning);
 
-/// Parses a whole reply. Memory is allocated only for elements that `bytes` really contains. The indices,
-/// coordinates, box and checksum of a mesh are checked. Throws `DamagedReply` if a check fails.
+/// Parses a whole reply. Memory is allocated only for elements that are present in `bytes`. The indices, coordinates,
+/// box and checksum of a mesh are checked. Throws `DamagedReply` if a check fails.
 MeshReply parseReply(std::span<const std::byte> bytes);
 
 /// A function that receives the bytes of a reply in pieces.
 using ReplySink = std::function<void(std::span<const std::byte>)>;
 
-/// These functions write a reply. They allocate no memory, so that they work even when no memory is left.
+/// The functions from here on write a reply. They allocate no memory, so that they work even when no memory is left.
 void writeMesh(const ImportedMesh& imported, const ReplySink& sink);
 void writeRefusal(std::string_view reason, const ReplySink& sink);  ///< a very long reason is cut off
 void writeOutOfMemory(const ReplySink& sink);

@@ -20,8 +20,8 @@ DistanceOptions distanceOptions(const Source& source) {
   return {.insideTest = source.insideTest, .thickness = source.thickness};
 }
 
-/// Returns the gradient ∇Φ of a shape in closed form, by central differences. The two points of a difference
-/// are two millionths of the shape's size apart.
+/// Returns the gradient ∇Φ of the distance to an analytic shape, by central differences with a step of one millionth of
+/// the shape's size.
 Vector3 differenceQuotient(const DistanceFunction& distance, const Vector3& x) {
   const double step = 1e-6 * distance.source().box.sizes().maxCoeff();
   std::array<Vector3, 6> points;
@@ -34,14 +34,12 @@ Vector3 differenceQuotient(const DistanceFunction& distance, const Vector3& x) {
   return Vector3(values[0] - values[1], values[2] - values[3], values[4] - values[5]) / (2 * step);
 }
 
-/// Returns the gradient ∇Φ of the exact distance of a mesh. Returns the zero vector if the gradient is
-/// unknown.
+/// Returns the gradient ∇Φ of the exact distance to a mesh, or the zero vector where the gradient is unknown.
 Vector3 exactNormal(const ExactDistance& exact, const Vector3& x, double signedDistance) {
-  const double least = 1e-9 * exact.source().box.sizes().maxCoeff();  // rounding dominates shorter offsets
+  const double least = 1e-9 * exact.source().box.sizes().maxCoeff();  // shorter offsets are mostly rounding error
   const Vector3 offset = x - exact.closestPoint(x).point;
   const double distance = offset.norm(), thickness = exact.source().thickness;
-  // Near a hole of the mesh, the closest part of the surface is the patch that closes the hole. The normal of
-  // this patch is unknown.
+  // Near a hole of the mesh, the closest part of the surface is the patch that closes the hole. Its normal is unknown.
   const bool isBesideHole = std::abs(std::abs(signedDistance + thickness / 2) - distance) > least;
   if (distance < least || isBesideHole) return Vector3::Zero();
   return offset / (thickness == 0 && signedDistance < 0 ? -distance : distance);

@@ -16,14 +16,14 @@ namespace hpsdf::app {
 /// the mesh of the built-in shape of the same name, which differs only slightly from the analytic shape.
 struct ReferenceSurface {
   std::shared_ptr<const DistanceFunction> distance;
-  std::function<Vector3(const Vector3& x, double signedDistance)> normal;  ///< see `VerifiedSurface`
+  std::function<Vector3(const Vector3& x, double signedDistance)> normal;  ///< returns ∇Φ at x, or zero if unknown
   TriangleMesh mesh;
-  std::optional<MeshReport> report;  ///< nothing for an analytic shape
+  std::optional<MeshReport> report;  ///< empty for an analytic shape
   bool fieldIsMadeFromIt = false;
 };
 
-/// Loads a mesh file or a shape, in the units of a field that was made from `source`. Throws `Error` naming
-/// `surface`.
+/// Loads a mesh file or a shape and converts it to the units of a field that was made from `source`. Throws `Error`
+/// naming `surface`.
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
 
 /// Returns the exact distance of a mesh file or a shape, in the units of a field that was made from `source`.

@@ -17,8 +17,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Memory in bytes per mesh face that the making of an exact distance needs. The outer hull needs
-/// kBytesPerHullFace, and additional memory for at most 250,000 pieces of intersected faces.
+/// Memory in bytes per mesh face for setting up an exact distance function. The outer hull needs kBytesPerHullFace, and
+/// additional memory for at most 250,000 pieces of intersected faces.
 constexpr double kBytesPerFace = 520, kBytesPerHullFace = 800;
 
 DistanceFunction normalizedFunction(const DistanceFunction& distance) {
@@ -32,11 +32,11 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
     distance(original, out);
     for (double& value : out) value *= to.scale;
   };
-  return DistanceFunction(std::move(evaluate), source);  // without the move it would refer to a local variable
+  return DistanceFunction(std::move(evaluate), source);  // moved: a reference to the local variable would dangle
 }
 
 void warnOfSpacing(const Console& console, const std::string& surface, const TriangleMesh& mesh) {
-  constexpr double kNegligible = 1e-6;  // share of the mesh's size; scans and fields are less exact
+  constexpr double kNegligible = 1e-6;  // fraction of the mesh's size; scans and fields are less exact
   const Box box = boundingBox(mesh);
   const double spacing = coordinateSpacing(surface, mesh), size = box.sizes().maxCoeff();
   if (!(spacing > kNegligible * size)) return;
@@ -60,9 +60,9 @@ struct SharedDistance {
   std::size_t bytes() const { return exact->bytes(); }
 };
 
-/// Reports which inside test was chosen. A closed mesh without self-intersections needs no report, because
-/// the choice for it is the expected one. The position in `choice` is in the units of the normalized mesh.
-/// The position in `report` is in the units of the file.
+/// Reports which inside test (method to tell inside from outside) was chosen. A closed mesh without self-intersections
+/// needs no report. The position in `choice` is in units of the normalized mesh, the position in `report` in units of
+/// the file.
 void tellInsideTest(const Console& console, const std::string& surface, const MeshReport& report,
                     InsideTestChoice choice, const Normalization& normalization) {
   if (choice.position) choice.position = *choice.position / normalization.scale + normalization.center;

@@ -28,9 +28,9 @@ ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 /// A surface in the units of the field: a mesh, or a distance in closed form.
 struct PreparedSurface {
-  std::optional<DistanceFunction> analytic;  ///< only for an analytic shape; others have a mesh
+  std::optional<DistanceFunction> analytic;  ///< set for an analytic shape; other surfaces have a mesh
   TriangleMesh mesh;
-  std::optional<MeshReport> report;  ///< of the mesh before normalization
+  std::optional<MeshReport> report;  ///< report on the mesh before normalization
   Normalization normalization;
 
   Box box() const { return analytic ? analytic->source().box : boundingBox(mesh); }
@@ -40,26 +40,24 @@ struct PreparedSurface {
 /// and `Cancelled` after Ctrl-C.
 PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes);
 
-/// Throws `Error` if making the exact distance of the mesh needs more memory than is available.
+/// Throws `Error` if the exact distance function of the mesh would need more memory than is available.
 void requireDistanceMemory(const TriangleMesh& mesh, InsideTest insideTest = InsideTest::automatic);
 
-/// Makes the exact distance of a mesh. Throws `Error`, also if the exact distance does not fit in memory, and
-/// `Cancelled` after Ctrl-C.
+/// Sets up the exact distance function of a mesh. Throws `Error`, for instance if the function does not fit in memory,
+/// and `Cancelled` after Ctrl-C.
 std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const TriangleMesh& mesh,
                                                 const DistanceOptions& options = {});
 
-/// Returns a distance function that evaluates `exact`. The source of the distance function records the
-/// normalization of the mesh.
+/// Returns a distance function that evaluates `exact` and records the normalization of the mesh.
 std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<const ExactDistance>& exact,
                                                           const Normalization& normalization);
 
-/// Makes the distance function of a prepared surface. Reports which inside test is used if the choice is not
-/// evident.
+/// Sets up the distance function of a prepared surface. Reports which inside test is used if the choice is not evident.
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options);
 
-/// Calls work() and returns its result. An `Error` that work() throws gets the surface as its subject, but an
-/// `Error` about `other` keeps `other` as its subject.
+/// Calls work() and returns its result. If work() throws an `Error` that names neither `surface` nor `other`, the error
+/// is changed to name `surface`.
 template <typename Work>
 auto namingSurface(const std::string& surface, const Work& work, const std::string& other = "") {
   try {

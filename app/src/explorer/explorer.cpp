@@ -23,9 +23,9 @@ double rounded(double value, double step) { return std::round(value / step) * st
 
 std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
 
-/// Returns the words of a line of script without their values, as the kind of the line. If two lines have the
-/// same kind, the second line alone has the effect of both. Returns "" for a line whose effect depends on the
-/// state that the explorer had before the line.
+/// Returns the command and parameter names of a script line, without values. If two successive lines have the same
+/// names, the second line alone has the effect of both. Returns "" for a line whose effect depends on the explorer's
+/// previous state.
 std::string kindOf(const std::string& line) {
   constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
                                    "arrows", "color",  "panel",   "worst", "settings"};
@@ -87,8 +87,8 @@ Explorer::Explorer(Session& session) : session_(session) {
 }
 
 void Explorer::change(ViewState next) {
-  // A line of script that replaces the previous line of the same gesture starts from the history before the
-  // gesture.
+  // During a gesture, such as the drag of a slider, a command can replace the previous one. It then starts from the
+  // history before the gesture.
   if (!replaces_) before_ = {view_, undone_.size(), redone_};
   undone_.resize(before_.undone);
   redone_ = before_.redone;
@@ -110,8 +110,7 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   const Field& field = current.field;
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
   BuildOptions built = settingsOf(field.data());
-  // If a field has no target error, another limit ended its construction. The error that the field reached then
-  // serves as the target error.
+  // A field without a target error was ended by another limit. The error that it reached then serves as the target.
   if (built.targetError.isNone() && !(built.maxError > 0)) built.targetError = field.metadata().totalError;
   std::map<std::string, std::string> settings;
   for (const BuildSetting& setting : buildSettings()) {
@@ -133,7 +132,7 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
   for (const BuildSetting& setting : buildSettings())
     if (settings_.contains(std::string(setting.name))) settings.erase(std::string(setting.exclusive));
   for (const auto& [name, value] : settings_) settings[name] = value;
-  // If the settings name the kind of continuity, the parameters of the other kind are dropped.
+  // If the settings name a kind of continuity (weak, exact, both or none), drop the parameters of the kinds not named.
   const auto continuity = settings_.find("continuity");
   if (continuity != settings_.end() && continuity->second != "weak" && continuity->second != "both")
     settings.erase("continuity-weight");
@@ -170,7 +169,7 @@ void Explorer::run(const std::string& line) {
   message.clear();
   const std::string kind = ui_.busy() ? kindOf(line) : "";
   replaces_ = !kind.empty() && kind == lastKind_;
-  lastKind_.clear();  // so that the next line does not replace a line that failed
+  lastKind_.clear();  // if this line fails, the next line must not replace it
   running_ = true;
   try {
     runScript(session_, parseScript(session_.registry(), "panel", line, {}));
@@ -193,11 +192,10 @@ void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
-/// Draws the panels several times, until they show the present state. Scroll positions, for instance, depend
-/// on the previous frame.
+/// Draws the panels three times, because scroll positions, for instance, depend on the previous frame.
 void Explorer::settlePanels() {
   for (int i = 0; i < 3; ++i) {
-    std::vector<std::string> ignored;  // commands to scroll back where a column became shorter
+    std::vector<std::string> ignored;  // requests to scroll back columns that became shorter
     drawPanels(nullptr, ignored);
   }
 }
@@ -245,8 +243,8 @@ const std::map<std::string, Widget>& Explorer::widgets() {
   return ui_.widgets();
 }
 
-/// Returns the command for a turn of the mouse wheel by `notches` away from the person. The command zooms the
-/// slice or moves the camera.
+/// Returns the command for a turn of the mouse wheel by `notches` away from the user: a zoom of the slice or a movement
+/// of the camera.
 std::string Explorer::wheelCommand(double notches) const {
   if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, notches));
   const render::OrbitCamera& c = view_.camera;
@@ -302,7 +300,7 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
 }
 
 std::string Explorer::pictureKey() const {
-  ViewState shown = view_;  // the picture does not depend on the parts that are reset here
+  ViewState shown = view_;  // parts on which the picture does not depend are reset below
   const Layout layout = layoutOf(view_);
   shown.open = {};
   shown.scroll = {};
@@ -321,7 +319,7 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
     picture.scale = scale;
     return picture;
   };
-  // The plane and the camera are placed relative to the current field, even if `field` is the field beside it.
+  // Place the plane and the camera relative to the current field, even if `field` is the second field drawn beside it.
   // Both pictures then show the same part of space.
   const Field& current = session_.current().field;
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), reference)
@@ -355,8 +353,8 @@ void Explorer::drawPicture(int shrink) {
   render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
   std::optional<render::Drawn> beside;
   if (other != nullptr) beside = drawBeside(*other, std::move(reference), picture.scale, shrink);
-  // The two pictures are replaced together. After an error in the code above, both are unchanged, and drawnFor_
-  // still describes them.
+  // The pictures of both fields are replaced together. After an error in the code above, both are unchanged, and
+  // drawnFor_ still describes them.
   picture_ = std::move(picture);
   beside_ = std::move(beside);
   shown_ = {picture_->image};

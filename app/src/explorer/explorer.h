@@ -19,8 +19,8 @@ namespace hpsdf::app {
 /// or has no room.
 struct Layout {
   UiRect bar, left, right, readout;
-  UiRect canvas;  ///< the picture of the current field
-  UiRect beside;  ///< the picture of the other field
+  UiRect canvas;  ///< picture of the current field
+  UiRect beside;  ///< picture of a second field beside the current one
 };
 
 /// Computes the layout of a frame, which depends only on the state `view`.
@@ -48,30 +48,28 @@ class Explorer final : public SessionExtension {
   /// Builds the field again with `settings()`. If `maxSteps` is given, the construction ends after that many
   /// refinement steps. Throws `Error` if neither the settings nor the field name a surface.
   void rebuild(std::optional<int> maxSteps);
-  /// The number of refinement steps of the complete construction, or std::nullopt if unknown. The current field
-  /// may result from fewer steps.
+  /// The number of refinement steps of the complete construction, even if the current field was built with fewer;
+  /// std::nullopt if unknown.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
   /// Handles one mouse or keyboard event: draws the panels, then runs the commands that their widgets ask for.
   /// Exceptions of these commands are passed on to the caller. While long work runs, an event can only cancel
   /// the work.
   void input(const Input& event);
-  /// Ends everything that a recorded script cannot reproduce: releases the mouse buttons, closes open lists and
-  /// discards a text that is being typed. The pointer keeps its position. Errors of the commands that run because of
-  /// this are ignored.
+  /// Ends all input that a recorded script cannot reproduce: releases the mouse buttons, closes open lists and discards
+  /// a text that is being typed. The pointer keeps its position. Errors of commands that this triggers are ignored.
   void releaseInput();
 
-  /// Returns the widgets of the present frame. The keys are the paths of the widgets.
+  /// Returns the widgets of the present frame by their paths, such as "bar/undo".
   const std::map<std::string, Widget>& widgets();
   const Ui& ui() const { return ui_; }
   void setClipboard(const std::string& text) { ui_.setClipboard(text); }
 
-  /// Draws the panels, and draws the picture again if it has changed. `shrink` divides the picture's resolution
-  /// along each axis, so that drawing keeps up with a moving mouse. During long work the last picture is shown
-  /// again.
+  /// Draws the panels, and redraws the picture if it is out of date. `shrink` divides the picture's resolution along
+  /// each axis, so that drawing keeps up with a moving mouse. During long work the last picture is shown again.
   render::Image frame(int shrink = 1);
-  /// True if the last picture was drawn at reduced resolution or for a state other than the present one, or if
-  /// there is no picture.
+  /// True if there is no picture, or if the last one was drawn at reduced resolution or for a state other than the
+  /// present.
   bool isStale() const { return !picture_ || shrunk_ != 1 || drawnFor_ != pictureKey(); }
 
   /// Runs one line of script. Widgets act by calling this function.
@@ -85,15 +83,15 @@ class Explorer final : public SessionExtension {
 
   void fieldChanged() override;
 
-  /// Long work that is now running. The panels show its progress. Only the button that cancels the work takes
-  /// input.
+  /// Long work that is now running, such as a construction. The panels show its progress. Only the button that cancels
+  /// the work takes input.
   struct Work {
     std::string task;
-    double fraction = 0;  ///< done, 0 to 1
+    double fraction = 0;  ///< completed share of the work, 0 to 1
     bool cancellable = false;
   };
   std::optional<Work> work;
-  /// The panels set this to true when a person cancels the long work.
+  /// The panels set this to true when the user cancels the long work.
   bool cancelWanted = false;
 
   std::string message;  ///< error or result, shown in the readout panel until the next command
@@ -102,18 +100,18 @@ class Explorer final : public SessionExtension {
   const std::optional<render::Drawn>& picture() const { return picture_; }
   /// Returns statistics of the current field. They are computed at the first call for this field.
   const FieldStatistics& figures();
-  /// Returns the indices of the interfaces with the greatest jumps, in descending order of the jump. Returns
-  /// `count` indices or more, unless the field has fewer interfaces.
+  /// Returns the indices of the cell interfaces with the greatest jumps of the field, in descending order of the jump.
+  /// Returns `count` indices or more, unless the field has fewer interfaces.
   const std::vector<std::size_t>& worst(std::size_t count);
   /// Returns the field's values at the mouse pointer, or std::nullopt if the pointer is not over the field.
   std::optional<Readout> readout();
 
  private:
-  /// Returns to the last state in `from`, and appends the present state to `to`. Returns false if `from` is
-  /// empty.
+  /// Restores the last state of the undo or redo list `from`, and appends the present state to `to`. Returns false if
+  /// `from` is empty.
   bool goBack(std::vector<ViewState>& from, std::vector<ViewState>& to);
   std::string pictureKey() const;
-  /// Returns those parameters of `build` that made the current field and that the field's metadata record.
+  /// Returns the `build` parameters that made the current field, as far as the field's metadata record them.
   std::map<std::string, std::string> settingsOfField() const;
   void drawPicture(int shrink);
   render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
@@ -131,18 +129,18 @@ class Explorer final : public SessionExtension {
   Ui ui_;
   ViewState view_;
   std::vector<ViewState> undone_, redone_;
-  /// The explorer's state and undo history before a mouse gesture. A line of script that replaces the previous
-  /// line of the gesture starts from them.
+  /// The explorer's state and undo history before a mouse gesture. If a command of the gesture replaces the previous
+  /// one, it starts from this state and history.
   struct History {
     ViewState view;
-    std::size_t undone = 0;  ///< size of undone_
+    std::size_t undone = 0;  ///< number of states in `undone_`
     std::vector<ViewState> redone;
   };
   History before_;
   std::map<std::string, std::string> settings_;
-  std::string lastKind_;  ///< kind of the gesture's last line, see `kindOf`
+  std::string lastKind_;  ///< names in the gesture's last command, see `kindOf`
   bool running_ = false;
-  bool replaces_ = false;  ///< the running line replaces the previous one, see onCommand
+  bool replaces_ = false;  ///< true if the running command replaces the previous one
 
   std::optional<std::uint64_t> allSteps_;
   enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< steps: ends early, after a given number of steps
@@ -153,11 +151,11 @@ class Explorer final : public SessionExtension {
   std::optional<JumpKind> worstBy_;  ///< measure by which worst_ is sorted
 
   std::optional<render::Drawn> picture_;
-  std::optional<render::Drawn> beside_;  ///< picture of the other field
+  std::optional<render::Drawn> beside_;  ///< picture of the second field, beside the current one
   std::vector<render::Image> shown_;     ///< images of picture_ and beside_
   std::string drawnFor_;
   int shrunk_ = 1;
-  std::size_t fields_ = 0;  ///< number of fields so far; distinguishes each field from the next
+  std::size_t fields_ = 0;  ///< number of fields so far, which identifies the current field
 
   std::optional<int> dragged_;           ///< mouse button that was pressed over the picture and is held
   std::array<double, 2> dragFrom_ = {};  ///< pointer when the button was pressed, pixels

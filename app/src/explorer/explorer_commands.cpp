@@ -37,15 +37,15 @@ void changeWorst(ViewState& view, const Arguments& arguments, Session&) {
 struct Destination {
   Vector3 point;
   double cellSize;  ///< edge length of a cell at the point, world units
-  int sliceAxis;    ///< axis across which a slice shows the point best
+  int sliceAxis;    ///< axis perpendicular to the slice that shows the point best
 };
 
 double cellSize(const Field& field, int depth) {
   return std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
 }
 
-/// Returns the point of the largest jump on the interface of this rank. The slice through the point is
-/// perpendicular to the interface, so that it shows the cells on both sides.
+/// Returns the point of the largest jump on an interface between cells; the interface with the largest jump has rank 1.
+/// The slice through the point is perpendicular to the interface, so that it shows the cells on both sides.
 Destination worstPoint(Session& session, std::size_t rank) {
   const auto& worst = explorerOf(session).worst(rank);
   if (rank > worst.size())
@@ -134,7 +134,7 @@ void runShot(Session& session, const Arguments& arguments) {
   const render::Image frame = explorer.frame();
   savePng(frame, file);
   render::Drawn picture = *explorer.picture();
-  const UiRect canvas = layoutOf(explorer.view()).canvas;  // `pick` knows only the half of the current field
+  const UiRect canvas = layoutOf(explorer.view()).canvas;  // `pick` works only in the current field's picture
   picture.image = frame;
   picture.corner = {int(canvas.x0), int(canvas.y0)};
   session.setPicture(std::move(picture));
@@ -155,7 +155,6 @@ std::vector<Parameter> panelParameters() {
   std::vector<Parameter> parameters = {{"all", flag(""), "Every part, before the others."}};
   for (std::size_t panel = 0; panel < kPanels; ++panel)
     parameters.push_back({kPanelNames[panel], flag(""), kHelp[panel]});
-  parameterNamed("view", parameters).under(kCamera);  // most of its controls move the camera
   for (const std::string side : {"left", "right"})
     parameters.push_back(
         {side + "-scroll", number().atLeast(0).in("pixels"), fmt::format("How far the {} column is scrolled.", side)});

@@ -105,7 +105,7 @@ void changeColor(ViewState& view, const Arguments& arguments, Session&) {
   const render::ColorBy by = colorNamed(arguments.text("by"));
   if (by == (slice ? render::ColorBy::normal : render::ColorBy::distance))
     throw Error(fmt::format("by: {} is not for a {}; give another colour", colorName(by), slice ? "slice" : "surface"));
-  if (by != colors.by) colors.scale.limits.reset();  // the limits belong to another quantity
+  if (by != colors.by) colors.scale.limits.reset();  // the old limits are for another quantity
   colors.by = by;
   if (arguments.given("other")) colors.other = textOrNone(arguments, "other");
   if (arguments.given("mesh")) colors.mesh = textOrNone(arguments, "mesh");

@@ -59,8 +59,8 @@ void drawDefectSwatches(const std::vector<render::Legend::Defects>& defects) {
   }
 }
 
-/// Draws one column of a histogram, with its percentage above it and its level below it. `bottom` is the
-/// position of the column's lower end and `bar` is its height, both in pixels.
+/// Draws one column of a histogram, with its percentage above it and its level (a degree or depth) below it. `bottom`
+/// is the position of the column's lower end and `bar` is its height, both in pixels.
 void drawHistogramColumn(float x, float width, float bottom, float bar, ImU32 color, int level, double percent) {
   ImGui::GetWindowDrawList()->AddRectFilled({std::round(x) + 2, bottom - bar}, {std::round(x + width) - 2, bottom},
                                             color);
@@ -72,8 +72,8 @@ void drawHistogramColumn(float x, float width, float bottom, float bar, ImU32 co
   centered(std::to_string(level), bottom + 2, kInk);
 }
 
-/// Draws a histogram of `shares` of the volume by level. If `legend` is given, its colours are used for the
-/// columns.
+/// Draws a histogram of the shares of the volume that each level (a degree or depth) takes. If `legend` is given, its
+/// colours are used for the columns.
 void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& shares, const render::Legend* legend) {
   ui.text(title);
   const ImVec2 from = ImGui::GetCursorScreenPos();

@@ -23,7 +23,7 @@ void drawBar(const Controls& controls, const Explorer& explorer) {
   nextTo(2);
   if (ui.button("bar/slice", "slice", view.slice)) commands.push_back("show slice");
   nextTo(24);
-  for (std::size_t panel = 1; panel < kPanels; ++panel) {  // the bar has no button that opens the bar itself
+  for (std::size_t panel = 1; panel < kPanels; ++panel) {  // panel 0 is the bar itself, which needs no button
     const char* name = kPanelNames[panel];
     if (ui.button(fmt::format("bar/{}", name), name, view.open[panel]))
       commands.push_back(fmt::format("panel {}={}", name, !view.open[panel]));

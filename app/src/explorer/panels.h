@@ -69,7 +69,7 @@ struct Controls {
   }
 };
 
-/// Draws the controls of the camera or of the slice plane, and those of the cells and colours.
+/// Draws the controls of the camera or of the slice plane, the cells and the colours.
 void drawViewPanel(const Controls& controls, Explorer& explorer);
 /// Draws the parameters of the next construction, its progress while it runs, and the button that starts it.
 void drawBuildPanel(const Controls& controls, Explorer& explorer);
@@ -78,9 +78,9 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer);
 void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture);
 /// Draws two histograms: the shares of the domain's volume by degree and by depth of the cells.
 void drawHistograms(Ui& ui, Explorer& explorer);
-/// Draws figures of the whole field.
+/// Draws a table of statistics of the field, such as its number of cells.
 void drawStatistics(Ui& ui, Explorer& explorer);
-/// Draws one page of the list of interfaces with the greatest jumps, and the buttons that turn the page.
+/// Draws one page of the list of cell interfaces with the greatest jumps, and the buttons that turn the page.
 void drawWorst(const Controls& controls, Explorer& explorer);
 
 }  // namespace hpsdf::app

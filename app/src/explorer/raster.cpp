@@ -8,7 +8,7 @@ namespace hpsdf::app {
 namespace {
 
 struct Clip {
-  int x0, y0, x1, y1;  ///< pixels, half-open
+  int x0, y0, x1, y1;  ///< pixel range; x1 and y1 are excluded
 };
 
 using Channels = std::array<float, 4>;  ///< red, green, blue, alpha; 0 to 255
@@ -43,8 +43,8 @@ float edge(const ImVec2& a, const ImVec2& b, const ImVec2& p) {
   return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
 
-/// Tells whether an edge with this direction covers the pixels whose centres lie on it (top-left rule). Two
-/// triangles traverse their shared edge in opposite directions, so exactly one of them covers these pixels.
+/// Tells whether the edge from a to b covers the pixels whose centres lie on it (top-left rule). Two triangles traverse
+/// their shared edge in opposite directions, so exactly one of them covers these pixels.
 bool coversItsEdge(const ImVec2& a, const ImVec2& b) { return a.y == b.y ? a.x > b.x : a.y > b.y; }
 
 void paintTriangle(render::Image& image, const Coverage& texture, const Clip& clip, const ImDrawVert* a,

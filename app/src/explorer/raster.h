@@ -11,8 +11,7 @@
 
 namespace hpsdf::app {
 
-/// The only texture that the panels use. It holds the coverage, 0 to 255, of glyphs, of lines and of a white
-/// spot.
+/// The only texture of the panels, Dear ImGui's font atlas: the coverage, 0 to 255, of glyphs, lines and a white spot.
 struct Coverage {
   int width = 0, height = 0;
   std::vector<std::uint8_t> texels;

@@ -57,8 +57,7 @@ void drawPlane(const Controls& controls, const ViewState& view, const Box& domai
   controls.button("view/whole", "whole section", "plane zoom=1 target=center", view.sliceTarget || view.zoom != 1);
 }
 
-/// Draws the controls of the two things that the picture of a surface can also show: a plane and the cells of
-/// the octree.
+/// Draws the controls that show or hide the surface, a plane and the cells of the octree in the picture of a surface.
 void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Box& domain) {
   controls.checkbox("view/surface", "surface", view.surface, "surface shown=");
   ImGui::SameLine();
@@ -70,8 +69,7 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Bo
   controls.field("view/depths", "of depths", levelText(view.cells.depths), "cells depths=");
 }
 
-/// Draws the controls of the limits of the colour scale. `automatic` holds the limits that the present
-/// picture uses.
+/// Draws the controls for the limits of the colour scale. `automatic` holds the limits in the present picture.
 void drawColorRange(const Controls& controls, const Coloring& colors,
                     const std::optional<std::array<double, 2>>& automatic) {
   const auto pin = [&](const std::string& range) {

@@ -13,7 +13,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr float kTextSize = 13;     // pixels per em
-constexpr float kStep = 1.0F / 60;  // seconds per frame; the clock is never read
+constexpr float kStep = 1.0F / 60;  // assumed seconds per frame; no clock is read
 
 struct NamedKey {
   std::string_view name;
@@ -102,7 +102,7 @@ struct Ui::State {
   bool frozen = false;
   std::string clipboard;
   std::string idText;
-  std::pair<std::string, double> held;  ///< path and value of a `When::released` slider that is held
+  std::pair<std::string, double> held;  ///< path and value of a held slider that reports its value on release
 };
 
 Ui::Ui() : state_(std::make_unique<State>()) {
@@ -166,7 +166,7 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
     widgets();
   } catch (...) {
     state_->disabled = false;
-    ImGui::ErrorCheckEndFrameRecover(nullptr);  // closes open windows and groups, or the next frame would be in them
+    ImGui::ErrorCheckEndFrameRecover(nullptr);  // closes windows and groups that the exception left open
     end();
     throw;
   }

@@ -24,16 +24,16 @@ enum class Key : std::uint8_t { enter, escape, backspace, remove, left, right, h
 std::vector<std::string> keyNames();
 std::optional<Key> keyNamed(std::string_view name);
 
-/// One event of mouse or keyboard.
+/// One mouse or keyboard event.
 struct Input {
   enum class Kind : std::uint8_t { move, press, release, wheel, type, key } kind = Kind::move;
   std::array<double, 2> at = {};  ///< for move: new position, pixels from the upper left
   int button = 0;                 ///< for press and release: 0 left, 1 right, 2 middle
-  double turn = 0;                ///< for wheel: notches, positive if turned away from the person
-  std::string text = {};          ///< for type: UTF-8
-  Key key = Key::enter;           ///< for key: it is pressed and released
+  double turn = 0;                ///< for wheel: number of notches, positive if turned away from the user
+  std::string text = {};          ///< for type: the typed text in UTF-8
+  Key key = Key::enter;           ///< for key: the key that is pressed and released
   bool control = false;           ///< for press, release, wheel and key: Ctrl is held
-  bool shift = false;             ///< for the same events: Shift is held
+  bool shift = false;             ///< for press, release, wheel and key: Shift is held
 };
 
 /// A rectangle of a frame in pixels: x in [x0, x1), y in [y0, y1).
@@ -44,9 +44,9 @@ struct UiRect {
   double height() const { return y1 - y0; }
 };
 
-/// A widget of the last frame: its place and the input that it takes.
+/// A widget of the last frame: its rectangle and the input that it takes.
 struct Widget {
-  UiRect rect;             ///< visible part: empty where the widget is scrolled out of its column
+  UiRect rect;             ///< visible part; empty if the widget is scrolled out of its column
   bool enabled = true;     ///< false while the widget takes no input
   bool takesText = false;  ///< true for text fields and sliders
 };
@@ -66,13 +66,13 @@ class Ui {
   /// passed on after the frame has been completed.
   void frame(int width, int height, const Input* input, const std::function<void()>& widgets);
 
-  /// Paints the last frame over a picture of the same size.
+  /// Paints the widgets of the last frame over a picture of the same size.
   void paint(render::Image& image) const;
 
-  /// Returns the widgets of the last frame. The keys are the paths of the widgets.
+  /// Returns the widgets of the last frame by their paths, such as "bar/undo".
   const std::map<std::string, Widget>& widgets() const { return widgets_; }
   std::array<double, 2> pointer() const { return pointer_; }
-  /// True if the mouse pointer is over a panel, or if a widget holds the mouse.
+  /// True if the mouse pointer is over a panel, or if a widget has captured the mouse.
   bool wantsMouse() const;
   /// True while a mouse button is down or a widget is being edited. All changes during this time belong to one
   /// gesture.
@@ -82,9 +82,8 @@ class Ui {
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
 
-  // The function `widgets` that is passed to `frame` calls the following functions. A path has the form
-  // panel/name. A label may be empty. The functions of widgets return the change that the person made in this
-  // frame.
+  // The function `widgets` that is passed to `frame` calls the following functions, which draw widgets. A path has the
+  // form panel/name. A label may be empty. The functions return the change that the user made in this frame.
 
   /// Draws the background of a panel and calls `content` to fill the panel. `scroll` is the scroll position in
   /// pixels, or std::nullopt for a panel that never scrolls. Returns the new scroll position.
@@ -114,7 +113,7 @@ class Ui {
   void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
 
  private:
-  /// Makes this object's context the current one of Dear ImGui.
+  /// Makes this object's context the current context of Dear ImGui.
   ImGuiIO& activate() const;
   void note(const std::string& path, bool takesText = false);
   void setDisabled(bool disabled);

@@ -8,8 +8,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// Formats the coordinates of v with {}, which gives the shortest texts that are read back as the same
-/// numbers.
+/// Formats the coordinates of v with the fewest digits that are read back as the same numbers.
 std::string textOf(const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
 
 std::string planeLine(const ViewState& view) {

@@ -1,5 +1,5 @@
 #pragma once
-// The state of the explorer. If two states are equal and the two fields are equal, the frames are equal.
+// The state of the explorer. Equal states and equal fields give equal frames.
 
 #include <array>
 #include <optional>
@@ -26,23 +26,23 @@ struct Coloring {
 };
 
 struct ViewState {
-  bool slice = false;  ///< shows a plane from the front instead of the surface in space
+  bool slice = false;  ///< true shows a slice of the field, false the surface in space
 
-  int axis = 2;                            ///< axis that the plane is perpendicular to
-  std::optional<double> planeOffset;       ///< world units along the axis; by default 0 or the domain's middle
-  std::optional<render::FreePlane> plane;  ///< used instead of axis and offset if set
-  bool planeInSpace = false;               ///< draws the plane in the surface's picture
+  int axis = 2;                            ///< index of the axis perpendicular to the plane
+  std::optional<double> planeOffset;       ///< position on the axis, world units; by default 0 or the domain's middle
+  std::optional<render::FreePlane> plane;  ///< if set, used instead of `axis` and `planeOffset`
+  bool planeInSpace = false;               ///< also draws the plane in the picture of the surface
   double zoom = 1;                         ///< magnification of the slice; 1 shows the whole section
-  std::optional<Vector3> sliceTarget;      ///< middle of the slice's picture; by default the section's middle
+  std::optional<Vector3> sliceTarget;      ///< centre of the slice's picture; by default the centre of the section
 
   render::OrbitCamera camera;
   double surfaceOffset = 0;  ///< value of the level set that is drawn, world units
   std::optional<render::ClipPlane> clip;
-  bool cracks = false;       ///< marks cracks
+  bool cracks = false;       ///< marks pixels where a ray meets a jump of the field
   std::string defects = {};  ///< mesh whose defects are marked, "own" for the field's own mesh, or empty
   bool surface = true;       ///< draws the surface
   render::ShownCells cells;
-  int arrows = 0;  ///< distance of gradient arrows in pixels; 0 for none
+  int arrows = 0;  ///< spacing of gradient arrows in pixels; 0 for none
 
   std::string beside;  ///< file of another field, drawn beside the current one with the same settings, or empty
 
@@ -67,13 +67,13 @@ struct ViewState {
 render::SlicePicture slicePicture(const ViewState& view, const Field& field);
 render::SurfacePicture surfacePicture(const ViewState& view, const Field& field);
 
-/// Returns a list of levels as text: "2,4", or "all" for an empty list.
+/// Returns a list of degrees or depths as text: "2,4", or "all" for an empty list.
 std::string levelText(const std::vector<int>& levels);
 
-/// Returns a script that sets every part of the state. Each line of the script ends in a newline.
+/// Returns a script that sets every part of the explorer's state. Each line of the script ends in a newline.
 std::string scriptOf(const ViewState& view);
 
-/// Compares two states by the scripts that `scriptOf` makes of them. A script sets every part of a state.
+/// Compares two states by the scripts that `scriptOf` makes of them, which contain every part of a state.
 inline bool operator==(const ViewState& a, const ViewState& b) { return scriptOf(a) == scriptOf(b); }
 
 /// Returns the choice of a renderer as an argument of the command `show`, for instance "cpu=true" or

@@ -9,7 +9,7 @@
 namespace hpsdf::app {
 
 struct DataTable {
-  std::string header = {};  ///< first line of a .csv that holds names of columns; "" without one
+  std::string header = {};  ///< first line of a .csv file if it holds column names, otherwise ""
   std::size_t columns = 0;
   std::size_t rows = 0;  ///< number of rows; in a .pfm file the first row is the lowest
   std::vector<double> values = {};
@@ -30,15 +30,14 @@ struct DataDifference {
 };
 
 struct DataComparison {
-  bool sameShape = false;     ///< true where numbers of rows and names of columns agree
+  bool sameShape = false;     ///< true if the numbers of rows and the column names agree
   std::size_t compared = 0;   ///< number of compared values
-  std::size_t differing = 0;  ///< number of values that differ by more than the bound
+  std::size_t differing = 0;  ///< number of values that differ by more than the accepted bound
   double largest = 0;
   std::vector<DataDifference> worst = {};  ///< largest differences in descending order, at most `kWorstData`
 };
 
-/// Default bound for the difference between two values. It is the value of the two or three lowest bits of a
-/// float near 1.
+/// Default bound for the difference between two values: about eight times the spacing of floats just above 1.
 constexpr double kDataBound = 1e-6;
 constexpr std::size_t kWorstData = 10;
 

@@ -13,9 +13,8 @@
 
 namespace hpsdf::app {
 
-/// A film: a sequence of pictures. It is written to a folder as frame-0000.png, frame-0001.png, …, or encoded
-/// as an MP4 file by ffmpeg. The output is not touched before `publish` is called, so that an older film
-/// there stays intact until then.
+/// A film: a sequence of pictures. It is written to a folder as frame-0000.png, frame-0001.png, …, or encoded as an MP4
+/// file by ffmpeg. Until `publish` is called, an older film at the same place stays intact.
 class Film {
  public:
   /// The output is an MP4 file if `output` ends in .mp4, and otherwise a folder. Throws `Error` if the output
@@ -42,8 +41,8 @@ class Film {
   static std::string frameName(std::size_t frame);
 
   std::filesystem::path output_;
-  std::filesystem::path ffmpeg_;          // empty for a folder
-  std::unique_ptr<OutputFolder> folder_;  // null for an MP4
+  std::filesystem::path ffmpeg_;          // path of ffmpeg; empty if the output is a folder
+  std::unique_ptr<OutputFolder> folder_;  // null if the output is an MP4 file
   TemporaryFolder work_;
   int width_ = 0, height_ = 0;  // size of the last frame
   Json rows_ = Json::array();   // name and figures of each frame

@@ -11,7 +11,7 @@
 namespace hpsdf::app {
 
 struct ReportPicture {
-  std::string file;  ///< name relative to the page
+  std::string file;  ///< file name relative to the page
   std::string title;
   std::string caption;
   std::string command;  ///< command that draws the picture
@@ -21,16 +21,16 @@ struct ReportPage {
   std::string title;
   std::string subtitle;
   std::vector<std::pair<std::string, std::string>> figures = {};
-  std::map<int, double> degrees = {};  ///< shares of the domain's volume, 0 to 1
+  std::map<int, double> degrees = {};  ///< share of the domain's volume by degree, 0 to 1
   std::map<int, double> depths = {};
   std::vector<ReportPicture> pictures = {};
-  std::string buildCommand = {};  ///< "" where the command is unknown
+  std::string buildCommand = {};  ///< "" if the command is unknown
   std::string footer = {};
 };
 
 std::string reportHtml(const ReportPage& page);
 
-/// Returns the beginning, or the end, of an HTML page. `moreStyle` is CSS that is added to the CSS of
+/// Returns the beginning of an HTML page; `htmlFoot` returns its end. `moreStyle` is CSS that is added to the CSS of
 /// reports.
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
 std::string htmlFoot(const std::string& footer);

@@ -112,7 +112,7 @@ std::string runOtherProgram(const fs::path& program, const std::vector<std::stri
     throw Error(ErrorKind::file, program.string(),
                 fmt::format("cannot be started ({}); check the program", error.code().message()));
   }
-  if (cancelled && cancelled()) throw Cancelled();  // Ctrl-C ends the other program too
+  if (cancelled && cancelled()) throw Cancelled();  // Ctrl-C may have ended the other program
   if (*status == 0 && fs::exists(folder / result)) return {};
   return fmt::format("{} failed with status {} ({})", program.filename().string(),
                      WIFSIGNALED(*status) ? 128 + WTERMSIG(*status) : WEXITSTATUS(*status),

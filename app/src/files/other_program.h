@@ -19,8 +19,8 @@ struct ProcessStart {
   std::filesystem::path program;
   std::vector<std::string> arguments;
   int output = -1;                    ///< file descriptor of its standard output
-  bool isQuiet = false;               ///< drops its standard error, else part of the output, and keeps Ctrl-C from it
-  std::filesystem::path folder = {};  ///< in which it runs; empty for that of this process
+  bool isQuiet = false;               ///< discards stderr and blocks Ctrl-C; if false, stderr goes to `output` too
+  std::filesystem::path folder = {};  ///< working directory; empty for the one of this process
 };
 
 /// A process that runs another program. The destructor kills the process if it is still running.

@@ -37,13 +37,13 @@ void OutputFolder::write(const std::string& name, std::string_view bytes) {
 }
 
 void OutputFolder::commit() {
-  const InterruptGuard guard;  // all files are renamed, or none
+  const InterruptGuard guard;  // on Ctrl-C, all files are renamed or none
   for (const auto& file : files_) file->commit();
   files_.clear();
   keep();
 }
 
-/// Removes those folders that the constructor created and that are empty.
+/// Removes the empty folders among those that the constructor created.
 void OutputFolder::removeCreated() {
   std::error_code ignored;
   for (const fs::path& part : created_) fs::remove(part, ignored);

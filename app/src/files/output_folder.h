@@ -36,9 +36,8 @@ class OutputFolder {
   /// results.
   void requireOwn(const std::string& marker) const;
 
-  /// Writes the file `marker` without results, so that a folder of incomplete results is recognized too. Then
-  /// removes the results of earlier runs, which are the files whose names `isResult` accepts. Call `requireOwn`
-  /// first.
+  /// Writes the file `marker`, so that the folder is recognized even if the run ends without results. Then removes the
+  /// results of earlier runs, which are the files whose names `isResult` accepts. Call `requireOwn` first.
   void startAnew(const std::string& marker, const std::function<bool(const std::string&)>& isResult) const;
 
  private:

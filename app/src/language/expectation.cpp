@@ -14,14 +14,14 @@
 namespace hpsdf::app {
 namespace {
 
-struct Source {
+struct DataSource {
   std::string_view name;
   std::string_view arguments;  ///< accepted arguments, as a user writes them
   std::size_t count;
 };
-constexpr Source kSources[] = {{"stats", "", 0}, {"jumps", "", 0}, {"pick", "(x,y)", 2}, {"at", "(x,y,z)", 3}};
+constexpr DataSource kSources[] = {{"stats", "", 0}, {"jumps", "", 0}, {"pick", "(x,y)", 2}, {"at", "(x,y,z)", 3}};
 
-/// Reads the text of an expectation from left to right.
+/// Parses the text of an expectation, such as "stats.leaves < 60000", from left to right.
 class Reader {
  public:
   explicit Reader(std::string_view text) : text_(text) {}
@@ -68,11 +68,11 @@ class Reader {
   std::size_t position_ = 0;
 };
 
-const Source& sourceNamed(const std::string& name, const Reader& reader) {
-  const auto source = std::ranges::find(kSources, name, &Source::name);
+const DataSource& sourceNamed(const std::string& name, const Reader& reader) {
+  const auto source = std::ranges::find(kSources, name, &DataSource::name);
   if (source != std::end(kSources)) return *source;
   std::vector<std::string> known, shown;
-  for (const Source& s : kSources) {
+  for (const DataSource& s : kSources) {
     known.emplace_back(s.name);
     shown.push_back(fmt::format("{}{}", s.name, s.arguments));
   }
@@ -95,7 +95,7 @@ Expectation parseExpectation(std::string_view text) {
   Reader reader(text);
   Expectation expectation;
   expectation.source = reader.name();
-  const Source& source = sourceNamed(expectation.source, reader);
+  const DataSource& source = sourceNamed(expectation.source, reader);
   if (reader.take("(")) {
     do expectation.arguments.push_back(reader.number());
     while (reader.take(","));

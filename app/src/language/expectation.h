@@ -10,10 +10,10 @@ namespace hpsdf::app {
 
 /// An expectation, written as SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER [within NUMBER].
 struct Expectation {
-  std::string source;             ///< stats, jumps, pick, at
+  std::string source;             ///< one of stats, jumps, pick and at
   std::vector<double> arguments;  ///< the numbers in parentheses after the source
-  std::vector<std::string> path;  ///< keys of objects and indices of arrays
-  std::string comparison;         ///< == != < <= > >=
+  std::vector<std::string> path;  ///< JSON keys and array indices that lead to the number
+  std::string comparison;         ///< operator: == != < <= > >=
   double wanted = 0;
   double tolerance = 0;  ///< largest difference that == and != accept as equal
 

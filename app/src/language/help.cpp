@@ -72,8 +72,8 @@ std::string spelling(const Parameter& parameter) {
                      value.empty() ? "" : " ", value);
 }
 
-/// Returns the range, unit, default and second spelling of a parameter in parentheses, so that its help text
-/// need not repeat them.
+/// Returns the range, unit, default and alternative name of a parameter in parentheses, so that its help text need not
+/// repeat them.
 std::string facts(const Parameter& parameter) {
   std::vector<std::string> parts;
   const bool hasRange = parameter.minimum || parameter.maximum;
@@ -166,8 +166,8 @@ std::string markdownNames(const std::vector<const Parameter*>& parameters) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// Describes the parameters that only this command has, by group. For the parameters that it shares with
-/// other commands, refers to their descriptions.
+/// Describes the parameters that only this command has, by group, and refers to the descriptions of parameters that it
+/// shares with other commands.
 std::string markdownParameters(const Registry& registry, const Command& command) {
   std::string text;
   std::vector<const Parameter*> shared;

@@ -10,7 +10,7 @@
 namespace hpsdf::app {
 
 enum class HelpDetail : std::uint8_t {
-  common,  ///< without options of `ParameterKind::isAdvanced`; the last line tells how many were left out
+  common,  ///< without advanced options; the last line tells how many were left out
   all,
 };
 
@@ -25,7 +25,7 @@ std::string commandHelp(const Command& command, HelpDetail detail);
 /// "Shared options".
 std::string commandsMarkdown(const Registry& registry);
 
-/// Returns commands and parameters as JSON.
+/// Describes all commands and their parameters as JSON.
 nlohmann::ordered_json commandsJson(const Registry& registry);
 
 }  // namespace hpsdf::app

@@ -38,8 +38,8 @@ struct ParameterKind {
   ParameterType type = ParameterType::text;
   std::string valueName = {};             ///< name of the value in help texts, e.g. "FILE"; "" for the name of its type
   std::vector<std::string> choices = {};  ///< values of a `choice`, or words that `numbers` accepts instead of numbers
-  std::vector<std::size_t> counts = {};   ///< how many values `numbers` accepts
-  bool whole = false;                     ///< `numbers` accepts whole numbers only
+  std::vector<std::size_t> counts = {};   ///< accepted numbers of values for the type `numbers`
+  bool whole = false;                     ///< true if `numbers` accepts whole numbers only
   std::string defaultText = {};           ///< the default as a user would write it; "" without a default
   std::string unit = {};
   std::optional<double> minimum = {};
@@ -50,7 +50,7 @@ struct ParameterKind {
   bool isRepeatable = false;
   Need need = Need::optional;
   std::string synonym = {};  ///< second accepted name, which help texts prefer; "" without one
-  std::string group = {};    ///< heading above the parameter in help texts; "" for the general one
+  std::string group = {};    ///< heading above the parameter in help texts; "" for "Options"
   bool isAdvanced = false;   ///< help texts show it only where all options are asked for: --help-all, docs/commands.md
 
   ParameterKind& byDefault(std::string text) { return set(defaultText, std::move(text)); }
@@ -101,8 +101,7 @@ inline ParameterKind wholeNumbers(std::string valueName, std::vector<std::size_t
   return {ParameterType::numbers, std::move(valueName), {}, std::move(counts), true};
 }
 inline ParameterKind choice(std::vector<std::string> words) { return {ParameterType::choice, "", std::move(words)}; }
-/// A flag. Its default is "false" unless `byDefault` says otherwise. The default "" means that a command
-/// leaves the present setting unchanged.
+/// A parameter that is true or false. If its default is "", a command without it leaves the present setting unchanged.
 inline ParameterKind flag(std::string byDefault = "false") {
   return {ParameterType::flag, "", {}, {}, false, std::move(byDefault)};
 }

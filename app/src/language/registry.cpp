@@ -66,8 +66,8 @@ std::optional<bool> parseFlag(std::string_view text) {
   return std::nullopt;
 }
 
-/// Describes the numbers of values that a parameter accepts: "a number", "3 numbers with commas between
-/// them". Consecutive numbers of values share one description, such as "2 to 4 numbers".
+/// Describes how many values a parameter accepts: "a number", "3 numbers with commas between them". Consecutive counts
+/// share one description, such as "2 to 4 numbers with commas between them".
 std::vector<std::string> countForms(const Parameter& parameter) {
   const char* kind = parameter.whole ? "whole number" : "number";
   std::vector<std::string> forms;
@@ -85,7 +85,7 @@ std::vector<std::string> countForms(const Parameter& parameter) {
   return forms;
 }
 
-/// Parses the text of a value as numbers. Returns std::nullopt if the parameter does not accept the text.
+/// Parses the value of a parameter as numbers. Returns std::nullopt if the parameter does not accept the text.
 std::optional<std::vector<double>> parseNumbers(const Parameter& parameter, std::string_view text) {
   const bool whole = parameter.whole || parameter.type == ParameterType::wholeNumber;
   std::vector<double> numbers;
@@ -194,8 +194,8 @@ const Command& Registry::command(std::string_view name) const {
       fmt::format("unknown command '{}'; {}", name, didYouMean(name, namesOf(commands_), "'hpsdf --help' lists them")));
 }
 
-/// Builds the `Arguments` of one call of a command. The library CLI11 separates options, their values and
-/// positional words.
+/// Builds the `Arguments` of one call of a command from its words. The library CLI11 separates options, their values
+/// and positional words.
 class ArgumentReader {
  public:
   ArgumentReader(const Command& command, std::span<const Word> words, Origin origin)

@@ -23,9 +23,9 @@ class Session;
 /// The validated argument values of one call of a command.
 class Arguments {
  public:
-  /// True if the caller wrote the parameter. False if the parameter has its default or no value.
+  /// True if the caller gave the parameter explicitly. False if the parameter has its default or no value.
   bool given(std::string_view name) const;
-  /// True if the parameter has a value, whether the caller wrote the value or it is the default.
+  /// True if the parameter has a value, given explicitly or by default.
   bool has(std::string_view name) const;
 
   std::string text(std::string_view name) const;
@@ -56,9 +56,9 @@ class Arguments {
 
 struct Command {
   std::string name = {};
-  std::string summary = {};                ///< one line
+  std::string summary = {};                ///< description in one line
   std::string help = {};                   ///< paragraphs separated by empty lines; see `paragraphs`
-  std::vector<std::string> examples = {};  ///< shell commands; script lines where the command is for scripts only
+  std::vector<std::string> examples = {};  ///< shell commands, or lines of a script if `scriptOnly` is true
   std::vector<Parameter> parameters = {};
   std::function<void(Session&, const Arguments&)> action = {};
   /// Throws `Error` if the arguments contradict each other. All commands of a script are checked before its
@@ -66,7 +66,7 @@ struct Command {
   std::function<void(const Arguments&)> check = {};
   bool scriptOnly = false;
   bool commandLineOnly = false;
-  bool takesVariables = false;    ///< positional `name=value` words are values, not options
+  bool takesVariables = false;    ///< words `name=value` are positional values, not options
   bool definesVariables = false;  ///< the parameter `assignments` defines variables for the rest of the script
   bool includesScript = false;    ///< the command is replaced by the lines of the script that `script` names
 };
@@ -92,7 +92,7 @@ const Parameter* findParameter(const Command& command, std::string_view name);
 /// Joins the lines of each paragraph of a text into one line. Empty lines separate the paragraphs.
 std::string paragraphs(std::string_view text);
 
-/// One word of a call of a command, with its column in the line.
+/// One word of a command line or script line, with its column.
 struct Word {
   std::string text = {};
   int column = 0;  ///< column of the first character, from 1
@@ -107,7 +107,7 @@ enum class Origin : std::uint8_t { commandLine, script };
 class ArgumentError : public Error {
  public:
   ArgumentError(const std::string& message, std::size_t word) : Error(message), word_(word) {}
-  /// Index of the word that is not accepted. If a word is missing, the number of words.
+  /// Index of the word that is not accepted, or the number of words if one is missing.
   std::size_t word() const { return word_; }
 
  private:

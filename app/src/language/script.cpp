@@ -15,11 +15,11 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr std::size_t kDeepestInclude = 16;  // the same limit as for scripts that run each other
-// Limits on the size of a script. Variables that contain variables, and files that include another file
-// twice, let a few lines of script require any amount of memory. These limits stop such scripts.
+constexpr std::size_t kDeepestInclude = 16;  // deepest nesting of `include`, the same as for `run`
+// Limits on the size of a script. Without limits, nested variables and files that include another file twice would let
+// a few lines of script require any amount of memory.
 constexpr std::size_t kMostCalls = 100'000;
-constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // sum over all replacements of $name
+constexpr std::size_t kMostVariableBytes = std::size_t{1} << 24;  // total length of all substituted values of $name
 
 /// True if `name` is a valid name of a variable: letters, digits and _, with no digit at the start.
 bool isIdentifier(std::string_view name) {
@@ -46,8 +46,8 @@ struct Statement {
 /// Splits the text of a script into statements and the statements into words.
 class Scanner {
  public:
-  /// `includedFrom` is appended to every error message (see `Call`). The lengths of all variable values that
-  /// are substituted are added to `variableBytes`.
+  /// `includedFrom` is appended to every error message. The lengths of all variable values that are substituted are
+  /// added to `variableBytes`.
   Scanner(std::string_view name, std::string_view text, std::string_view includedFrom, std::size_t& variableBytes)
       : name_(name), text_(text), includedFrom_(includedFrom), variableBytes_(variableBytes) {}
 
@@ -85,7 +85,7 @@ class Scanner {
     if (next() == '\n') {
       ++line_;
       column_ = 1;
-    } else if ((static_cast<unsigned char>(next()) & 0xc0) != 0x80) {  // continuation bytes of UTF-8 have no column
+    } else if ((static_cast<unsigned char>(next()) & 0xc0) != 0x80) {  // UTF-8 continuation bytes have no column
       ++column_;
     }
     ++position_;
@@ -184,8 +184,8 @@ class ScriptReader {
   }
 
  private:
-  /// A script that is being read. If it is including another script, `where` and `line` hold the position of
-  /// that `include` command.
+  /// A script that is being read. While it includes another script, `where` and `line` hold the position of its
+  /// `include` command.
   struct Open {
     std::string name;
     std::string where = {};
@@ -265,7 +265,7 @@ class ScriptReader {
 
   const Registry& registry_;
   Variables variables_;
-  std::vector<Open> open_;  // the outermost script first
+  std::vector<Open> open_;  // nested scripts that are being read, outermost first
   std::vector<Call> calls_;
   std::size_t variableBytes_ = 0;
 };

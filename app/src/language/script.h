@@ -21,7 +21,7 @@ struct Call {
   const Command* command;
   Arguments arguments;
   std::string where;         ///< "file:line:column" of the verb
-  std::string includedFrom;  ///< end of messages, " (included from file:line:column, …)"; "" in the outermost script
+  std::string includedFrom;  ///< suffix of messages, " (included from file:line:column, …)"; "" in the outermost script
   int line;                  ///< line in the outermost script; for an included call the line of its `include`
 };
 

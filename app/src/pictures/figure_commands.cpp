@@ -13,7 +13,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// Returns the figures of a field at a point within one of its cells, as JSON.
+/// Returns the value, gradient and cell of a field at a point, as JSON.
 Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int degree, int depth,
                   const Vector3& gradient) {
   return {{"position", vectorJson(position)},
@@ -25,9 +25,9 @@ Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int
           {"slope", gradient.norm()}};
 }
 
-/// Returns the figures of the field at a pixel of the last picture, or null if the pixel shows no part of the
-/// field. If `withAll` is true, adds the figures that take long to compute: the exact distance, if it is
-/// known, and the jumps at the nearest face of the cell.
+/// Returns the value, gradient and cell of the field at a pixel of the last picture, or null if the pixel shows no part
+/// of the field. If `withAll` is true, adds figures that take long to compute: the exact distance, if it is known, and
+/// the jumps at the nearest face of the cell.
 Json pickJson(Session& session, int x, int y, bool withAll) {
   const Field& field = session.current().field;
   const auto pick = render::pickAt(field, session.picture(), x, y);
@@ -79,8 +79,8 @@ Json figuresOf(Session& session, const Expectation& expectation) {
   return pick;
 }
 
-/// Returns the number in `json` that the path of the expectation names. If the path names nothing, throws
-/// `Error` with the most similar known name.
+/// Returns the number in `json` at the key path of the expectation, such as stats.leaves. If there is no such key,
+/// throws `Error` with the most similar key.
 double numberAt(Json json, const Expectation& expectation) {
   std::string path = expectation.source;
   for (const std::string& key : expectation.path) {

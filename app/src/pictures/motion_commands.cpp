@@ -44,7 +44,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
   const int frames = arguments.whole("frames");
   Film film(arguments.text("output"));
   useField(session, arguments);
-  const InterruptGuard guard;  // Ctrl-C must not interrupt the film before it is published
+  const InterruptGuard guard;  // on Ctrl-C, the film is published completely or not at all
   const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
@@ -56,7 +56,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
       progress.update("drawing frames", double(frame) / frames);
       picture.camera.azimuthDegrees = first + 360.0 * frame / frames;
       const render::Drawn drawn = render::drawSurface(renderer, field, picture, reference);
-      picture.scale = drawn.scale;  // the colours keep their meaning in all frames
+      picture.scale = drawn.scale;  // all frames use the colour scale of the first
       any |= drawn.seen;
       film.add(drawn.image, {{"azimuth", picture.camera.azimuthDegrees}});
     }
@@ -125,8 +125,8 @@ std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   return steps;
 }
 
-/// Extends the colour scale to all levels that can occur in a frame: from the lowest level of the base cells
-/// to the highest level of the finished field.
+/// Extends the colour scale to all degrees or depths that can occur in a frame: from the lowest in the base cells to
+/// the highest in the finished field.
 void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy color) {
   if (scale.levels.empty()) return;
   const FieldStatistics figures = statistics(base);
@@ -144,7 +144,7 @@ void runFrames(Session& session, const Registry& commands, const Arguments& argu
   const Call call = drawingCall(commands, arguments);
   const std::string surface = arguments.text("mesh");
   Film film(arguments.text("output"));
-  const InterruptGuard guard;  // Ctrl-C must not interrupt the film before it is published
+  const InterruptGuard guard;  // on Ctrl-C, the film is published completely or not at all
   BuiltField built = buildField(session.console(), surface, arguments);
   const std::shared_ptr<const DistanceFunction> exact = built.exact;
   session.setField({std::move(built.field), surface});

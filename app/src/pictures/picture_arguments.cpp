@@ -17,8 +17,7 @@ namespace {
 
 using render::ColorBy;
 
-/// A colour of pictures by the word that commands use. `explanation` is its part of the sentence that explains the
-/// quantities in the help of `color`.
+/// A colour mode of pictures and its name in commands. `explanation` is its part of a sentence in the help of `color`.
 struct NamedColor {
   std::string_view name;
   ColorBy color;
@@ -36,7 +35,7 @@ constexpr NamedColor kColors[] = {
     {"difference", ColorBy::difference, "difference the difference from another field"},
     {"cell-error", ColorBy::cellError, "cell-error the estimated RMS error of a cell"}};
 
-/// Returns the words of all quantities, as in "slope, error and difference".
+/// Returns the names of the colour modes that show a quantity, as in "slope, error and difference".
 std::string quantityNames() {
   std::vector<std::string_view> names;
   for (const NamedColor& named : kColors)
@@ -103,7 +102,7 @@ render::AxisPlane axisPlane(const Arguments& arguments, const char* axisName, co
   return {axis, arguments.given(offsetName) ? arguments.number(offsetName) : defaultOffset(domain, axis)};
 }
 
-/// Sets the size and the samples of a picture.
+/// Sets the size of a picture and its number of samples per pixel.
 template <typename Picture>
 void setPixels(Picture& picture, const Arguments& arguments) {
   picture.width = arguments.size("size")[0];
@@ -163,8 +162,8 @@ std::string quantityHelp() {
 
 std::string_view colorName(ColorBy color) { return std::ranges::find(kColors, color, &NamedColor::color)->name; }
 
-/// Returns the colouring of this name. The search always succeeds, because the registry accepts only the
-/// names in kColors.
+/// Returns the colour mode of this name. The search always succeeds, because the registry accepts only the names in
+/// kColors.
 ColorBy colorNamed(std::string_view name) { return std::ranges::find(kColors, name, &NamedColor::name)->color; }
 
 render::CellStyle cellStyle(std::string_view name) {

@@ -1,6 +1,5 @@
 #pragma once
-// Converts validated arguments of commands, and names of settings as commands spell them, into the renderer's
-// settings.
+// Converts the validated arguments of commands into settings of the renderer.
 
 #include <array>
 #include <memory>
@@ -16,14 +15,14 @@
 
 namespace hpsdf::app {
 
-/// Returns the word by which commands name a colouring: normal, degree, value-jump, ….
+/// Returns the name of a colour mode in commands: normal, degree, value-jump, ….
 std::string_view colorName(render::ColorBy color);
 std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
 
-/// Returns the sentence of help texts that explains the quantities among the colours.
+/// Returns the sentence of help texts that explains the colour modes that show a quantity, such as the error.
 std::string quantityHelp();
 
-/// Returns the colouring of this name, which must be one of `colorNames()`.
+/// Returns the colour mode of this name, which must be one of `colorNames()`.
 render::ColorBy colorNamed(std::string_view name);
 
 /// Returns the names of the camera directions: front, back, ….
@@ -33,25 +32,25 @@ void turnTo(render::OrbitCamera& camera, std::string_view view);
 /// Returns the name of the camera's direction, or "" if the direction has no name.
 std::string viewName(const render::OrbitCamera& camera);
 
-/// Returns the cell style of this name. The names are none, lines and boxes.
+/// Returns the style in which cells are drawn, by its name: none, lines or boxes.
 render::CellStyle cellStyle(std::string_view name);
 std::string cellStyleName(render::CellStyle style);
 
-/// Parses a list of levels such as "2,4-6". Each level must lie between 0 and `most`. Returns an empty list
+/// Parses a list of degrees or depths such as "2,4-6". Each number must lie between 0 and `most`. Returns an empty list
 /// for "". Throws `Error` naming the parameter `name` for any other text.
 std::vector<int> levelList(const std::string& text, const char* name, int most);
 
 /// Returns the value of a parameter of three numbers as a point. The parameter must have a value.
 Vector3 pointOf(const Arguments& arguments, const char* name);
 
-/// A placeholder for the domain of the field, for checking arguments before the field is loaded.
+/// A placeholder for the field's domain, with which arguments can be checked before the field is loaded.
 inline const Box kAnyDomain(Vector3::Constant(-1), Vector3::Constant(1));
 
 /// Returns the settings of a picture from the arguments of `slice`. If no offset is given, the plane is at
 /// `defaultOffset`. Throws `Error` if both a plane and an axis are given.
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
 
-/// Names of those parameters of `render` that every command with a camera takes.
+/// Names of the parameters of `render` that all commands with a camera share.
 inline constexpr std::array kCameraParameters = {"camera", "view",    "target", "projection",
                                                  "size",   "samples", "cpu",    "gl"};
 std::vector<Parameter> cameraParameters(const Registry& registry);
@@ -71,8 +70,8 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& dom
 /// Writes a note to the console if the picture is empty, or if the walls of the domain cut off the surface.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
-/// Returns the reference data that a picture of the session's current field needs. The data comes from the
-/// files that the arguments name.
+/// Returns the data besides the field that a picture of the current field needs, such as the exact distance for error
+/// colours. The data comes from the files that the arguments name.
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SlicePicture& picture);
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,

@@ -42,8 +42,8 @@ std::vector<float> rawValues(const Field& field, const render::SliceView& view, 
   return values;
 }
 
-/// Writes the values as a portable float map with one channel. The map is little-endian, which its negative
-/// scale states. Its rows run from bottom to top. Values outside the domain are NaN.
+/// Writes the values as a portable float map with one channel. The negative scale in its header states that the map is
+/// little-endian. Its rows run from bottom to top. Values outside the domain are NaN.
 void writePfm(const render::ViewBuffers& buffers, std::span<const float> values, OutputFile& out) {
   static_assert(std::endian::native == std::endian::little, "a PFM row is written as it lies in memory");
   out.write(fmt::format("Pf\n{} {}\n-1.0\n", buffers.width, buffers.height));
@@ -52,8 +52,8 @@ void writePfm(const render::ViewBuffers& buffers, std::span<const float> values,
     out.write(std::as_bytes(values.subspan(y * width, width)));
 }
 
-/// Writes a CSV file with one row for each pixel inside the domain. A row holds the pixel's point in world
-/// units, the field value there, and the degree and depth of the cell there.
+/// Writes a CSV file with one row for each pixel inside the domain: the pixel's point in world units, the field value,
+/// and the degree and depth of the cell.
 void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers, OutputFile& out) {
   out.write("x,y,z,value,degree,depth\n");
   for (int y = 0; y < buffers.height; ++y) {
@@ -174,8 +174,8 @@ const std::vector<Parameter> kRenderDrawn = {
      "Draws cells of these polynomial degrees only: numbers and ranges, as in 2,4-6."},
     {"depths", text("LIST").advanced(), "Draws cells of these depths only: numbers and ranges, as in 2,4-6."}};
 
-/// Returns the parameters that choose the colours of a picture. They accept all colours (`ColorBy`) except `left`. The
-/// help text of the first parameter begins with `ofCells`.
+/// Returns the parameters that choose the colours of a picture, with all colour modes (`ColorBy`) except `left`. The
+/// help text of the parameter `color` begins with `ofCells`.
 std::vector<Parameter> colorParameters(ColorBy left, const std::string& ofCells, const std::string& standard) {
   return {
       {"color", choice(colorNames(left)).byDefault(standard), ofCells + " " + quantityHelp()},

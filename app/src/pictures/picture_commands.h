@@ -11,10 +11,10 @@ void addPictureCommands(Registry& registry);
 /// registry must already hold these two commands.
 void addMotionCommands(Registry& registry);
 
-/// Adds `pick` and `expect`, which read and check numbers of the current field and of the last picture.
+/// Adds the commands `pick` and `expect`, which read and check numbers of the current field and of the last picture.
 void addFigureCommands(Registry& registry);
 
-/// Adds `report`, which writes a page about one field.
+/// Adds the command `report`, which writes a page about one field.
 void addReportCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -1,5 +1,5 @@
 #pragma once
-// The figures of a field at the point that a pixel of a picture shows.
+// Values of a field at the point that a pixel of a picture shows.
 
 #include <optional>
 #include <string>
@@ -13,19 +13,19 @@ namespace hpsdf::app {
 struct Readout {
   render::Pick pick;
   Vector3 gradient;
-  double value;                  ///< field at the point, in double precision
-  std::optional<double> exact;   ///< exact distance, if it is known
-  Jump valueJump, gradientJump;  ///< jumps across the cell's nearest face
-  double toFace;                 ///< distance to the cell's nearest face, world units
+  double value;                  ///< value of the field at the point, in double precision
+  std::optional<double> exact;   ///< exact distance, if known
+  Jump valueJump, gradientJump;  ///< jumps across the cell face nearest to the point
+  double toFace;                 ///< distance from the point to the nearest face of its cell, world units
 };
 
 Readout readoutAt(const Field& field, const Jumps& jumps, const DistanceFunction* exact, const render::Pick& pick);
 
-/// Returns the readout of the session's current field at `pick`. Measures the jumps of the field if that has
+/// Returns the values of the session's current field at the picked point. Measures the jumps of the field if that has
 /// not been done yet.
 Readout readoutAt(Session& session, const render::Pick& pick);
 
-/// Returns the readout as two lines of text.
+/// Formats the readout as two lines of text.
 std::vector<std::string> readoutText(const Readout& readout);
 
 }  // namespace hpsdf::app

@@ -41,8 +41,8 @@ std::string buildCommandLine(const std::string& surface, const std::string& file
   return line;
 }
 
-/// Returns the mean time in seconds in which the renderer makes one frame of the surface's buffers. One frame
-/// to warm up is not measured. The mean is taken over eight frames, or over as many as fit into two seconds.
+/// Returns the mean time in seconds in which the renderer traces one frame of the surface, over eight frames or as many
+/// as fit into two seconds. A first frame is drawn to warm up and is not measured.
 double frameSeconds(render::Renderer& renderer, const Field& field, const render::SurfacePicture& picture) {
   using Clock = std::chrono::steady_clock;
   constexpr int kFrames = 8;
@@ -74,8 +74,8 @@ constexpr Drawing kDrawings[] = {
     {"surface-degree", "Degree on the surface", "The degree of the cells that hold the surface.", false,
      ColorBy::degree}};
 
-/// Draws a picture into the folder. The result holds the command that draws the same picture from the field's
-/// file, which the page shows.
+/// Draws a picture into the folder. The result holds the command that draws the same picture from the field's file; the
+/// report shows this command.
 ReportPicture drawInto(const fs::path& folder, Session& session, render::Renderer& renderer,
                        const std::string& fieldFile, const Drawing& drawing, int samples) {
   const Field& field = session.current().field;

@@ -15,13 +15,13 @@ struct Backend {
   bool operator==(const Backend&) const = default;
 };
 
-/// Returns the parameters `cpu` and `gl`.
+/// Returns the parameters `cpu` and `gl`, which choose the renderer.
 std::vector<Parameter> backendParameters();
 
 /// Returns the OpenGL device that the argument `gl` names.
 render::GlChoice glChoice(const Arguments& arguments);
 
-/// Returns the renderer that the arguments choose. Throws `Error` where both `cpu` and `gl` are given.
+/// Returns the renderer that the arguments choose. Throws `Error` if both `cpu` and `gl` are given.
 Backend backend(const Arguments& arguments);
 
 }  // namespace hpsdf::app

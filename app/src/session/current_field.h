@@ -12,8 +12,8 @@ namespace hpsdf::app {
 struct CurrentField {
   Field field;
   std::string name;                              ///< name of the file or mesh that it came from
-  std::optional<std::uintmax_t> fileBytes = {};  ///< size of its file, where it was loaded or saved
-  std::string surface = {};                      ///< mesh file or shape, where it was built in this session
+  std::optional<std::uintmax_t> fileBytes = {};  ///< size of its file, if it was loaded or saved
+  std::string surface = {};                      ///< mesh file or shape, if it was built in this session
 
   /// Returns the mesh file or shape from which the field can be built again. Returns "" if it is unknown.
   const std::string& madeFrom() const { return surface.empty() ? field.metadata().source.name : surface; }

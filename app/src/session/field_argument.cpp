@@ -19,7 +19,7 @@ void loadField(Session& session, const std::string& file) {
 
 void useField(Session& session, const Arguments& arguments) {
   if (arguments.has("field")) return loadField(session, arguments.text("field"));
-  session.current();  // throws where there is no field
+  session.current();  // throws `Error` if there is no field
 }
 
 }  // namespace hpsdf::app

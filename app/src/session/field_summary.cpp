@@ -14,15 +14,15 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr int kBarCells = 40;
+constexpr int kHistogramColumns = 40;
 
-/// Returns a table with one row for each level. A row shows the level's share of the volume, its number of
-/// leaves, and a bar proportional to the share.
+/// Returns a table with one row for each level (a degree or a depth). A row shows the level's share of the volume, its
+/// number of leaves, and a bar proportional to the share.
 std::string histogram(std::string_view name, const std::map<int, double>& volume,
                       const std::map<int, std::size_t>& leaves) {
   std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
   for (const auto& [level, share] : volume) {
-    const int cells = share > 0 ? std::max(1, static_cast<int>(std::lround(share * kBarCells))) : 0;
+    const int cells = share > 0 ? std::max(1, static_cast<int>(std::lround(share * kHistogramColumns))) : 0;
     text +=
         fmt::format("  {:>8} {:>6.2f} % {:>12}  {:▇<{}}\n", level, 100 * share, grouped(leaves.at(level)), "", cells);
   }
@@ -122,8 +122,8 @@ std::string fieldLine(const Field& field) {
                      field.singlePrecision() ? "float" : "double", bytesText(double(figures.bytes)));
 }
 
-/// Returns the settings that a field file stores, except the target error, as text. If `ofWords` is true,
-/// these are only the settings whose values are words, and otherwise only those with numbers.
+/// Returns the build settings that a field file stores, except the target error, as text: settings with words as values
+/// if `ofWords` is true, otherwise settings with numbers.
 std::string settingsText(const BuildOptions& settings, bool ofWords) {
   std::vector<std::string> parts;
   for (const BuildSetting& setting : buildSettings()) {

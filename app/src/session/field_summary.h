@@ -9,8 +9,7 @@
 
 namespace hpsdf::app {
 
-/// Converts values per level to a JSON object. The keys of the object are the levels, which are degrees or
-/// depths.
+/// Converts a map from degrees or depths to values into a JSON object with the degrees or depths as keys.
 template <typename Value>
 Json levelsJson(const std::map<int, Value>& levels) {
   Json json = Json::object();

@@ -16,7 +16,8 @@ std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend
   return backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
 }
 
-/// Returns the jumps of the field. If `known` is empty, measures the jumps and stores them in `known`.
+/// Returns the jumps of the field across cell faces. If `known` is empty, measures the jumps and stores them in
+/// `known`.
 const Jumps& jumpsOf(const Field& field, std::optional<Jumps>& known, const Console& console) {
   if (!known) known = withProgress(console, [&](const Progress& progress) { return findJumps(field, 0, progress); });
   return *known;

@@ -51,22 +51,21 @@ class Session {
   int scriptDepth = 0;
 
   void setField(CurrentField field);
-  /// Replaces the current field by another form of the same field. The exact distance to the field's surface is
-  /// kept.
+  /// Replaces the current field by a post-processed version of it. The exact distance to the field's surface is kept.
   void changeField(CurrentField field);
   bool hasField() const { return field_ != nullptr; }
   /// Returns the current field. Throws `Error` if the session has no field.
   const CurrentField& current() const;
   void setFileBytes(std::uintmax_t bytes);
 
-  /// Returns the jumps of the current field. The first call measures them. Throws `Cancelled` after Ctrl-C.
+  /// Returns the jumps of the current field across cell faces. The first call measures them. Throws `Cancelled` after
+  /// Ctrl-C.
   const Jumps& jumps();
   bool knowsJumps() const { return jumps_.has_value(); }
 
-  /// Returns the exact distance to `surface` and keeps it for later calls. If `surface` is empty, the surface
-  /// is chosen as follows: the one from which the field was made, if that is a shape or if the field was built
-  /// in this session, and otherwise the surface of the previous call. Throws `Error` if no surface is known or
-  /// if the surface cannot be read.
+  /// Returns the exact distance to `surface` and keeps it for later calls. An empty `surface` stands for the surface
+  /// from which the field was made, if that is a shape or if the field was built in this session, and otherwise for the
+  /// surface of the previous call. Throws `Error` if no surface is known or if the surface cannot be read.
   const DistanceFunction& exact(const std::string& surface);
   /// True if `exact` can be called with an empty `surface`.
   bool knowsExact() const;
@@ -75,8 +74,8 @@ class Session {
   /// Returns the last picture of the current field. Throws `Error` if no picture has been drawn.
   const render::Drawn& picture() const;
   void setPicture(render::Drawn picture) { picture_ = std::move(picture); }
-  /// Records the description of the renderer that drew the last picture. Needed if that renderer is not the one
-  /// that `renderer` returns.
+  /// Records the description of the renderer that drew the last picture. Needed only for a renderer other than the one
+  /// that the function `renderer` returns.
   void setLastRenderer(std::string description) { lastRenderer_ = std::move(description); }
 
   /// Returns the session's extension. The first call creates it. All calls must use the same type `Extension`.
@@ -86,9 +85,8 @@ class Session {
     return static_cast<Extension&>(*extension_);
   }
 
-  /// A second field, with which the current field is compared. A second field is read from its file at first
-  /// use and then kept. At most two second fields are kept: one whose picture is shown beside the current
-  /// field's, and one whose difference from the current field is shown.
+  /// A second field, with which the current field is compared. It is read from its file at first use. The two most
+  /// recently used second fields are kept: one may be drawn beside the current field, the other be subtracted from it.
   struct Other {
     std::string file;
     Field field;
@@ -98,15 +96,15 @@ class Session {
     Backend backend = {};
   };
   Other& other(const std::string& file);
-  /// Drops those second fields whose files have been modified. Returns whether any were dropped. A second field
-  /// whose file was deleted is kept.
+  /// Drops the second fields whose files have been modified. Returns whether any were dropped. A second field whose
+  /// file was deleted is kept.
   bool forgetChangedOthers();
   const Jumps& otherJumps(const std::string& file);
   render::Renderer& otherRenderer(const std::string& file, const Backend& backend);
 
-  /// Returns the data that a colouring needs: the jumps, the exact distance to `surface` for errors (see
-  /// `exact`), or the field of the file `other` for differences. The returned data is valid until the next call
-  /// of `reference`.
+  /// Returns the data besides the field that a colour mode needs: the jumps, the exact distance to `surface` for
+  /// errors, or the field of the file `other` for differences. The returned data is valid until the next call of
+  /// `reference`.
   render::ReferenceData reference(render::ColorBy color, const std::string& surface, const std::string& other = "");
 
   /// Returns the defects of the mesh `surface`, in the units of the current field. The name "own" stands for
@@ -124,12 +122,12 @@ class Session {
   const Registry& registry_;
   Console console_;
   bool json_ = false;
-  std::unique_ptr<CurrentField> field_;  // the renderer refers to it: it must not move
+  std::unique_ptr<CurrentField> field_;  // on the heap: the renderer keeps a reference to it
   std::optional<Jumps> jumps_;           // jumps of the current field
   std::optional<render::Drawn> picture_;
   std::optional<MeshDefects> defects_;
   std::string defectsOf_;                                    // surface argument of the call that computed `defects_`
-  std::vector<std::unique_ptr<Other>> others_;               // most recently used first; their renderers refer to them
+  std::vector<std::unique_ptr<Other>> others_;               // most recently used first; renderers keep references
   std::shared_ptr<const DistanceFunction> exact_;            // distance to the field's own surface
   std::shared_ptr<const DistanceFunction> exactOfArgument_;  // distance to `surfaceArgument_`
   std::string surfaceArgument_;

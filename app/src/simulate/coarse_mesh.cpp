@@ -10,7 +10,7 @@ TriangleMesh coarse(const TriangleMesh& mesh, double size) {
   if (!(size > 0)) return mesh;
   TriangleMesh result{.vertices = {}, .triangles = {}, .name = mesh.name};
   std::map<std::array<double, 3>, std::uint32_t> known;  // cubes, numbered in the order of their first vertices
-  std::vector<std::uint32_t> cubes;                      // the cube of each vertex
+  std::vector<std::uint32_t> cubes;                      // number of the cube of each vertex
   std::vector<double> members;                           // number of vertices in each cube
   for (const Vector3& x : mesh.vertices) {
     const std::array<double, 3> cube = {std::floor(x.x() / size), std::floor(x.y() / size), std::floor(x.z() / size)};

@@ -39,7 +39,7 @@ class Scene {
 
   physics::World& world() { return world_; }
   const physics::World& world() const { return world_; }
-  /// Adds to the world those scheduled bodies whose time has come. Called before each simulation step.
+  /// Adds the scheduled bodies whose time has come to the world. Must be called before each simulation step.
   void admit();
 
   /// A body that is added to the world during the simulation.
@@ -50,12 +50,13 @@ class Scene {
     Eigen::Isometry3d worldFromBody;
     physics::Material material;
   };
-  const std::deque<Drop>& drops() const { return drops_; }  ///< bodies not added yet, by ascending time
+  const std::deque<Drop>& drops() const { return drops_; }  ///< bodies not added yet, in the order of their times
   const std::deque<BodyKind>& kinds() const { return kinds_; }
-  std::size_t lost() const;    ///< number of bodies, soft or rigid, with a part below `floor_`
+  std::size_t lost() const;    ///< number of rigid bodies with the centre and soft bodies with a node below `floor_`
   std::size_t moving() const;  ///< number of rigid bodies in the world that are not static
   std::size_t waiting() const { return drops_.size(); }  ///< number of bodies not added yet
-  /// The length with which penetration depths are compared: the radius of a marble, or the size of a body.
+  /// The length with which penetration depths are compared: the radius of a marble, the size of a body or the collision
+  /// margin of a cloth.
   double bodySize() const { return bodySize_; }
 
  protected:
@@ -63,10 +64,10 @@ class Scene {
   /// scaled so that its longest side is `size`. Warns if the mesh is not closed. Throws `Error` naming the mesh
   /// if it cannot be read or has no volume.
   TriangleMesh meshOf(const std::string& name, double size) const;
-  /// Adds a kind of body for the mesh. Its field is loaded from the cache folder. If the folder has no such
-  /// field, the threads of the caller's TBB arena build the field, and it is saved in the folder. `samples` is
-  /// the number of surface samples. `margin` is the collision margin in world units. Throws `Error` if the
-  /// folder cannot be used, or if the file in it holds another field.
+  /// Adds a kind of body for the mesh. Its field is loaded from the cache folder if it is there. Otherwise the threads
+  /// of the caller's TBB arena build the field, and it is saved in the folder. `samples` is the number of surface
+  /// samples. `margin` is the collision margin in world units. Throws `Error` if the folder cannot be used, or if the
+  /// file in it holds another field.
   BodyKind& addKind(TriangleMesh mesh, std::size_t samples, double margin);
   /// Adds a static body of this kind to the world.
   void addStatic(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});
@@ -85,7 +86,7 @@ class Scene {
   SceneRequest request_;
 
  private:
-  Console console_;  ///< the streams that it refers to are used only while the scene is made
+  Console console_;  ///< its streams are used only while the scene is made
 };
 
 /// Makes the scene of this name. Throws `Error` naming the mesh or field that cannot be made.

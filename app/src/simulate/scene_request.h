@@ -12,16 +12,16 @@
 namespace hpsdf::app {
 
 struct SceneRequest {
-  std::size_t bodies = 0;                ///< number of moving bodies, among them the soft bodies of the slope
+  std::size_t bodies = 0;                ///< number of moving bodies, including the soft bodies of the slope scene
   std::size_t nodes = 0;                 ///< least number of nodes of the cloth
-  std::size_t samples = 0;               ///< surface samples of each kind of body
+  std::size_t samples = 0;               ///< number of surface samples of each kind of body
   std::string ground = {};               ///< mesh that bodies fall onto; empty in scenes without one
-  std::vector<std::string> meshes = {};  ///< meshes of the bodies; empty in scenes of marbles
-  bool filesAreYUp = true;               ///< mesh files have y up; shapes always have z up
+  std::vector<std::string> meshes = {};  ///< meshes of moving rigid bodies other than marbles; may be empty
+  bool filesAreYUp = true;               ///< true if mesh files have y up; shapes always have z up
   double targetError = 1e-6;             ///< target error τ of the fields
   std::optional<std::filesystem::path> cache = {};  ///< folder in which fields are kept between runs
   std::uint64_t seed = 1;                           ///< seed of the random positions and orientations
-  double step = 1.0 / 240;                          ///< seconds of simulated time
+  double step = 1.0 / 240;                          ///< time step, seconds of simulated time
   int iterations = 20;                              ///< iterations of the constraint solver in each step
 };
 
@@ -29,7 +29,7 @@ struct SceneKind {
   std::string name;
   std::string help;
   SceneRequest defaults;
-  double seconds;              ///< default duration, simulated time
+  double seconds;              ///< default duration, seconds of simulated time
   std::array<double, 2> view;  ///< default azimuth and elevation of the camera, degrees
 };
 

@@ -22,7 +22,7 @@ using physics::Material;
 
 Eigen::Isometry3d shift(const Vector3& by) { return Eigen::Isometry3d(Eigen::Translation3d(by)); }
 
-/// Random numbers that are the same on every machine, unlike those of the standard library's distributions.
+/// Random number generator with the same numbers on every machine, unlike the standard library's distributions.
 class Random {
  public:
   explicit Random(std::uint64_t start) : engine_(start) {}
@@ -60,7 +60,7 @@ Vector3 restingPosition(const Field& field, const std::string& name, double x, d
 /// Throws `Error` unless the size of the ground suits marbles of this radius. Small ground has no room for the
 /// marbles; on large ground they become so fast that they pass through the ground within one step.
 void requireFitting(const TriangleMesh& ground, const std::string& name, double radius) {
-  constexpr double kLeast = 10, kMost = 400;  // least width and greatest extent, in radii
+  constexpr double kLeast = 10, kMost = 400;  // least width and greatest extent, in marble radii
   const double width = boundingBox(ground).sizes().head<2>().minCoeff();
   if (width < kLeast * radius || boundingBox(ground).sizes().maxCoeff() > kMost * radius)
     throw Error(
@@ -135,8 +135,7 @@ struct BowlScene final : MarbleScene {
 
 struct HelixScene final : MarbleScene {
   HelixScene(const Console& console, const SceneRequest& request) : MarbleScene(console, request, 0.035) {
-    // Drop a marble every 2 s at x = 2/3 and y = 0. There the groove of three turns crosses the line y = 0, away
-    // from the edge of the bowl.
+    // Drop a marble every 2 s into the groove with three turns, at x = 2/3 and y = 0, away from the edge of the bowl.
     for (std::size_t n = 0; n < request.bodies; ++n)
       dropMarble(2.0 * double(n), restingPosition(ground(), request.ground, 2.0 / 3, 0, bodySize_), rollingMaterial());
   }
@@ -220,8 +219,8 @@ struct PolesScene final : PileScene {
   }
 };
 
-/// Makes Bullet solve the contacts of a soft body after its links. In Bullet's own order the links pull nodes
-/// of the soft body into the bodies on which these nodes rest.
+/// Makes Bullet solve the contacts of a soft body after the links between its nodes. In Bullet's own order the links
+/// pull nodes into the bodies on which they rest.
 void solveContactsLast(btSoftBody& body) {
   btAlignedObjectArray<btSoftBody::ePSolver::_>& sequence = body.m_cfg.m_psequence;
   sequence.resize(0);
@@ -292,7 +291,7 @@ struct ClothScene final : PileScene {
     const double top = boundingBox(mesh).sizes().z();
     BodyKind& body = addKind(mesh, request.samples);
     BodyKind& table = addKind(slabMesh({3, 3, 0.2}), 1000);
-    const Material rough{.friction = 1};  // friction keeps nodes on sharp tips, which else would pierce the cloth
+    const Material rough{.friction = 1};  // keeps nodes on sharp tips, which would otherwise pierce the cloth
     addStatic(body, shift({0, 0, stands}), rough);
     addStatic(table, shift({0, 0, -0.1}), rough);
     const int side = std::max(2, int(std::ceil(std::sqrt(double(request.nodes)))));

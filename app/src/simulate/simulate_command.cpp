@@ -146,7 +146,7 @@ SimulationFigures simulateAs(const Console& console, const Arguments& arguments,
                   camera);
 }
 
-/// Returns the camera that the arguments describe. If they do not give its direction or distance, those of the
+/// Returns the camera that the arguments describe. Without arguments for direction or distance, the defaults of the
 /// scene apply.
 SimulationCamera cameraOf(const Arguments& arguments, std::function<void(SimulationShot)> take) {
   render::SurfacePicture look = cameraPicture(arguments);
@@ -159,11 +159,11 @@ SimulationCamera cameraOf(const Arguments& arguments, std::function<void(Simulat
   return {std::move(look), backend(arguments), framesPerSecond(arguments), std::move(take)};
 }
 
-/// The figures of a simulation and the report on the pictures that it drew.
+/// The results of a simulation and a description of the pictures that were drawn.
 struct Outcome {
   SimulationFigures figures;
-  Json pictures = {};     ///< null without pictures
-  std::string line = {};  ///< empty without pictures
+  Json pictures = {};     ///< description as JSON; null if no pictures were drawn
+  std::string line = {};  ///< description in one line; empty if no pictures were drawn
 };
 
 /// Runs a simulation and draws its final state. The field that the picture shows becomes the session's current
@@ -190,7 +190,7 @@ Outcome runStill(Session& session, const Arguments& arguments, const SceneReques
 
 Outcome runFilm(Session& session, const Arguments& arguments, const SceneRequest& request) {
   Film film(arguments.text("output"));
-  const InterruptGuard guard;  // Ctrl-C must not interrupt the film before it is published
+  const InterruptGuard guard;  // on Ctrl-C, the film is published completely or not at all
   const SimulationCamera camera = cameraOf(arguments, [&](SimulationShot shot) {
     film.add(shot.drawn.image, {{"seconds", shot.seconds}, {"contacts", shot.contacts}});
     session.setLastRenderer(shot.renderer);
@@ -223,8 +223,7 @@ void runSimulate(Session& session, const Arguments& arguments) {
   printJson(console.out, json);
 }
 
-/// Returns the camera parameters of the command `render`. The help of `camera` and `target` says what they mean
-/// in simulations.
+/// Returns the camera parameters of the command `render`, with help texts of `camera` and `target` for simulations.
 std::vector<Parameter> sceneCameraParameters(const Registry& registry) {
   std::vector<Parameter> parameters = cameraParameters(registry);
   Parameter& camera = parameterNamed("camera", parameters);

@@ -50,7 +50,7 @@ SimulationFigures run(Scene& scene, const std::string& name, std::uint64_t steps
   const double framesPerSecond = camera != nullptr ? camera->framesPerSecond : 0;
   std::optional<Studio> studio;
   if (camera != nullptr) studio.emplace(scene, name, camera->look, camera->backend);
-  double nextPicture = framesPerSecond > 0 ? 0 : double(steps);  // the step before which it is taken
+  double nextPicture = framesPerSecond > 0 ? 0 : double(steps);  // step before which the next picture is taken
   std::uint64_t pictures = 0;
   const auto takePicture = [&](std::uint64_t step) {
     if (!studio || double(step) < nextPicture) return;

@@ -26,21 +26,21 @@ struct CountPerStep {
   }
 };
 
-/// Figures of a whole simulation. A contact is a sample point, a sphere or a node of a soft body that lies in a
-/// field.
+/// Results of a whole simulation. A contact is a sample point, a sphere or a node of a soft body that lies inside a
+/// field's surface.
 struct SimulationFigures {
   std::size_t bodies = 0, nodes = 0;  ///< number of moving bodies and of nodes of soft bodies
-  std::size_t waiting = 0;            ///< bodies that were never added
-  std::size_t lost = 0;               ///< bodies below the floor at the end
+  std::size_t waiting = 0;            ///< number of bodies that were never added
+  std::size_t lost = 0;               ///< number of bodies below the floor at the end
   std::uint64_t steps = 0;
   double simulated = 0;  ///< simulated time, seconds
   /// Wall-clock times in seconds: of setting up the simulation, of all steps, of all field queries, of the
   /// physics solver, and of the field queries in the step that has the slowest queries.
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
-  CountPerStep penetrating, touching;  ///< contacts in fields, and contacts that the solver treats
-  double size = 0;  ///< length that depths are compared with: a marble's radius, a body's size or a cloth's margin
+  CountPerStep penetrating, touching;  ///< contacts found, and contacts passed to the solver
+  double size = 0;  ///< length to compare depths with: a marble's radius, a body's size or a cloth's margin
   double deepest = 0, sumOfDeepest = 0,
-         deepestAtEnd = 0;  ///< penetration depths, world units; the end is the last second
+         deepestAtEnd = 0;  ///< penetration depths, world units; `deepestAtEnd` covers the last second
   std::uint64_t state = 0;  ///< hash of all positions at the end
 };
 
@@ -50,7 +50,7 @@ struct SimulationCamera {
   /// scene is just in view. A camera without a target looks at the middle of the scene.
   render::SurfacePicture look;
   Backend backend;
-  double framesPerSecond = 0;  ///< frames per simulated second, from the start; 0 for one picture of the end
+  double framesPerSecond = 0;                ///< frames per simulated second; 0 for a single picture at the end
   std::function<void(SimulationShot)> take;  ///< called with each picture
 };
 

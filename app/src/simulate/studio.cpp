@@ -19,7 +19,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr render::Color kLevelGround = {224, 226, 230};
-constexpr double kLevelGroundSide = 8;  // in diagonals of the scene's other bodies
+constexpr double kLevelGroundSide = 8;  // in diagonals of the box around the scene's other bodies
 
 const physics::FieldShape* fieldShape(const btCollisionShape& shape) {
   return dynamic_cast<const physics::FieldShape*>(&shape);
@@ -29,8 +29,8 @@ const BodyKind& kindOf(const Scene& scene, const physics::FieldShape& shape) {
   return *std::ranges::find(scene.kinds(), &shape, [](const BodyKind& kind) { return &kind.shape; });
 }
 
-/// Calls visit(shape, worldFromBody) for every rigid body in the world. Then does so for every rigid body that
-/// is still to be added, with its initial position.
+/// Calls visit(shape, worldFromBody) for every rigid body in the world, and then for every rigid body that is still to
+/// be added, with its initial position.
 template <typename Visit>
 void forEachRigid(const Scene& scene, const Visit& visit) {
   const physics::World& world = scene.world();
@@ -77,10 +77,10 @@ TriangleMesh levelGround(double side) {
   return mesh;
 }
 
-/// Returns points of a shape, in the body's frame. If these points are in view, the whole body is in view.
-/// Level ground has no points.
+/// Returns points that outline a shape, in the body's frame: a camera that sees these points sees the whole body. Level
+/// ground has no points.
 std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape) {
-  constexpr double kDetail = 1.0 / 16;  // in longest sides of the mesh; fine enough for an outline
+  constexpr double kDetail = 1.0 / 16;  // fraction of the mesh's longest side; fine enough for an outline
   std::vector<Vector3> points;
   if (const auto* field = fieldShape(shape)) {
     const TriangleMesh& mesh = kindOf(scene, *field).mesh;
@@ -138,7 +138,7 @@ void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Bo
   const bool parallel = look.camera.projection == render::Projection::orthographic;
   render::SurfacePicture wide = look;
   wide.camera.distance = 1;
-  wide.camera.projection = render::Projection::perspective;  // defines the unit of s
+  wide.camera.projection = render::Projection::perspective;  // the unit of s below is this view's extent at distance 1
   const render::Camera camera = cameraOf(wide, domain);
   const Vector3 middle = look.camera.target.value_or(boxAround(points).center());
   Vector3 target = middle;

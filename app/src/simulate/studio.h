@@ -20,8 +20,8 @@ namespace hpsdf::app {
 /// All other bodies are drawn as meshes, without detail below the size of a pixel.
 class Studio {
  public:
-  /// `look` is that of `SimulationCamera`. The camera is aimed only once, at all bodies of the scene, including
-  /// those that are still to be added. Throws `Error` if no renderer is available.
+  /// `look` is the member `look` of a `SimulationCamera`. The camera is aimed only once, at all bodies of the scene,
+  /// including those that are still to be added. Throws `Error` if no renderer is available.
   Studio(const Scene& scene, std::string name, render::SurfacePicture look, const Backend& backend);
 
   /// Draws a picture of the present state of the scene.
@@ -30,13 +30,13 @@ class Studio {
  private:
   /// The body that is drawn by tracing rays to its field's surface.
   struct Ground {
-    std::size_t body;  ///< index in the world
+    std::size_t body;  ///< index of the body in the physics world
     const Field* field;
     Eigen::Isometry3d fieldFromWorld;  ///< a translation, so that z stays up
   };
   /// The mesh that represents a collision shape in pictures.
   struct Model {
-    std::uint32_t mesh;  ///< index in the body renderer
+    std::uint32_t mesh;  ///< index of the mesh in the body renderer
     Eigen::Isometry3d bodyFromMesh;
   };
 
@@ -51,8 +51,8 @@ class Studio {
   render::SurfacePicture look_;
   Ground ground_;
   std::map<const btCollisionShape*, Model> models_;  ///< meshes of the rigid bodies' shapes
-  std::uint32_t firstSoft_ = 0;                      ///< mesh of the first soft body; the other soft bodies follow
-  std::size_t rigid_;  ///< number of rigid bodies that will move; the colours of soft bodies follow theirs
+  std::uint32_t firstSoft_ = 0;                      ///< index of the first soft body's mesh; the others follow
+  std::size_t rigid_;  ///< number of rigid bodies that will move; soft bodies take the colours after theirs
   std::unique_ptr<render::Renderer> renderer_;
   std::unique_ptr<render::BodyRenderer> bodyRenderer_;
   std::string description_;

@@ -19,7 +19,7 @@ void addStudyCommand(Registry& registry);
 /// A kind of study, which users run by `hpsdf study NAME MESH…`.
 struct Study {
   std::string name = {};
-  std::string help = {};                   ///< one paragraph
+  std::string help = {};                   ///< description in one paragraph
   std::vector<Parameter> parameters = {};  ///< parameters besides kind, mesh and output
   void (*run)(Session&, const Arguments&) = nullptr;
 };
@@ -32,7 +32,7 @@ Study continuityStudy();
 /// a flag, may be given once for all meshes or once for each mesh.
 std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& names);
 
-/// Returns the parameters of the random points at which errors are measured: the number of points and the seed.
+/// Returns the parameters for the random points at which errors are measured: their number and the seed.
 std::vector<Parameter> samplingParameters();
 
 /// Returns random points with their exact distances. If `near` is not 0, all points lie within `near` of the
@@ -45,8 +45,8 @@ ExactSamples exactSamples(const Console& console, const Arguments& arguments, co
 /// each mesh.
 Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh);
 
-/// Returns a different file name for each mesh. Throws `Error` if `buildArguments` would throw for any of the
-/// meshes, so that mistakes are reported before the long work.
+/// Returns a different file name for each mesh. Throws `Error` if `buildArguments` would throw for any of the meshes,
+/// so that mistakes are reported before any field is built.
 std::vector<std::string> checkedNames(const Session& session, const Arguments& arguments);
 
 /// Returns the values of a JSON object as one line of a table. Texts are quoted, because the names of shapes

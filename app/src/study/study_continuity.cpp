@@ -25,7 +25,7 @@ namespace {
 /// Width of the region near the surface, as a fraction of the domain's longest edge.
 constexpr double kNear = 0.01;
 
-/// Measures the continuity of the fields of one mesh.
+/// Measures the jumps and errors of several fields of one mesh, with and without smoothing across cell faces.
 class ContinuityStudy {
  public:
   ContinuityStudy(Session& session, const Arguments& arguments, std::size_t mesh)
@@ -36,8 +36,8 @@ class ContinuityStudy {
         uniform_(samples(0)),
         near_(samples(kNear * input_.domain.sizes().maxCoeff())) {}
 
-  /// Adds one row to `rows` for each field of the mesh. Jumps, errors and bytes also get a ratio to the same
-  /// figure of the mesh's first field, which is neither enriched nor smoothed.
+  /// Adds one row to `rows` for each field of the mesh. Jumps, errors and bytes are also given relative to the mesh's
+  /// first field, which is neither smoothed nor refitted with a higher degree (`BuildOptions::enrich`).
   void addRows(Json& rows) {
     for (const bool enriched : {false, true}) {
       BuildOptions options = input_.options;
@@ -91,7 +91,7 @@ class ContinuityStudy {
   std::string mesh_;
   BuildInput input_;
   ExactSamples uniform_, near_;
-  Json first_;  ///< the mesh's first row; null before
+  Json first_;  ///< row of the mesh's first field; null until it is measured
 };
 
 /// Returns the rows as a CSV table, without the column of construction times.

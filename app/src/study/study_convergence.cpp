@@ -40,7 +40,7 @@ struct LargeEnough {};
 /// inspected than are recorded as stages of the curve.
 std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficients) {
   const double most =
-      double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // fewest coefficients of one step
+      double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // fewest coefficients a step adds
   std::vector<std::uint64_t> steps = {0};
   for (double wanted = 1; wanted <= most; wanted *= growth)
     if (const auto whole = static_cast<std::uint64_t>(std::llround(wanted)); whole > steps.back())
@@ -48,8 +48,8 @@ std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficient
   return steps;
 }
 
-/// Returns the figures of a field during its construction. Errors are converted to a scale at which the longest
-/// side of the mesh is 2.
+/// Measures a field during its construction. Errors are converted to a scale at which the longest side of the mesh is
+/// 2.
 Json stageOf(const Field& field, const ExactSamples& samples, int threads) {
   const double scale = field.metadata().referenceLength / 2;
   const FieldStatistics figures = statistics(field);
@@ -60,8 +60,8 @@ Json stageOf(const Field& field, const ExactSamples& samples, int threads) {
       {"measured_rms", error.rms / scale},    {"measured_max", error.max / scale}};
 }
 
-/// Builds a field by this strategy. Returns the stages of its construction, in ascending order of the number of
-/// coefficients.
+/// Builds a field by this refinement strategy. Returns measurements of the field at several stages of its construction,
+/// in ascending order of the number of coefficients.
 Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& samples, const Arguments& arguments,
              const Progress& progress) {
   const double growth = std::pow(10, 1 / arguments.number("stages"));
@@ -69,7 +69,7 @@ Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& sam
   BuildOptions options = input.options;
   options.strategy = strategy;
   options.coefficients = CoefficientType::float64;
-  options.targetError = std::numeric_limits<double>::min();  // the construction refines until it is ended
+  options.targetError = std::numeric_limits<double>::min();  // never reached: other limits end the construction
   Json stages = Json::array();
   const auto inspect = [&](const Field& field) {
     const std::size_t coefficients = statistics(field).coefficients;
@@ -103,8 +103,8 @@ double commonRms(const Json& curves) {
   return common;
 }
 
-/// Returns the number of coefficients at which a curve reaches the measured RMS error `rms`, interpolated
-/// linearly in logarithms. Returns std::nullopt if the curve does not reach this error or starts below it.
+/// Returns the number of coefficients at which a curve reaches the measured RMS error `rms`, by linear interpolation of
+/// the logarithms. Returns std::nullopt if the curve does not reach this error or starts below it.
 std::optional<double> coefficientsAt(const Json& stages, double rms) {
   for (std::size_t n = 0; n < stages.size(); ++n) {
     const double rmsAfter = numberIn(stages[n], "measured_rms"), after = numberIn(stages[n], "coefficients");
@@ -245,7 +245,7 @@ void runConvergence(Session& session, const Arguments& arguments) {
   }
 
   Json files = Json::array();
-  const InterruptGuard guard;  // Ctrl-C must not interrupt the writing of the files
+  const InterruptGuard guard;  // on Ctrl-C, all files are written or none
   const auto write = [&](const std::string& file, const std::string& bytes) {
     folder.write(file, bytes);
     files.push_back((folder.path() / file).string());

@@ -28,9 +28,9 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr int kThumbnail = 200;  // side of a slice, pixels
-constexpr int kBar = 300;        // length of a bar, which shows the whole volume, pixels
-constexpr int kBarHeight = 18;
+constexpr int kThumbnail = 200;  // side of a slice's picture, pixels
+constexpr int kBar = 300;        // length in pixels of a bar, which stands for the whole volume
+constexpr int kDegreeBarHeight = 18;
 
 using Shares = std::map<int, double>;
 using Colors = std::map<int, render::Color>;
@@ -48,20 +48,20 @@ constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree
 /// A picture of a slice through the middle of the domain, and a bar that shows, in the same colours, the share
 /// of the volume that each level takes.
 struct LevelPicture {
-  std::string png = {};  ///< bytes of the slice's file
-  std::string svg = {};  ///< the bar
-  Colors colors = {};    ///< of the levels of all rows
+  std::string png = {};  ///< bytes of the slice's PNG file
+  std::string svg = {};  ///< the bar as SVG text
+  Colors colors = {};    ///< colours of the levels that occur in any row
 };
 
 /// A mesh and its field, which make one row of the table.
 struct TableRow {
   std::string mesh;
-  std::string name;  ///< name for files
+  std::string name;  ///< name of the mesh in file names
   Field field;
   FieldStatistics figures;
   double seconds;                                              ///< time of the construction
-  ErrorFigures error;                                          ///< measured, in the field's units
-  std::array<LevelPicture, std::size(kLevels)> pictures = {};  ///< one for each of `kLevels`
+  ErrorFigures error;                                          ///< measured error, in the field's units
+  std::array<LevelPicture, std::size(kLevels)> pictures = {};  ///< one picture for each of `kLevels`
 
   double scale() const { return field.metadata().referenceLength / 2; }
   double estimatedRms() const { return field.metadata().rmsEstimate(field.domain()) / scale(); }
@@ -88,7 +88,7 @@ std::string sharesSvg(int width, const Shares& shares, const Colors& colors, boo
     const render::Color& color = colors.at(level);
     parts +=
         fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
-                    width * from, width * share, kBarHeight, colorText(color),
+                    width * from, width * share, kDegreeBarHeight, colorText(color),
                     tellsShares ? fmt::format("{}: {:.2f} %", level, 100 * share) : std::to_string(level));
     const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
     if (width * share > 12)
@@ -99,7 +99,7 @@ std::string sharesSvg(int width, const Shares& shares, const Colors& colors, boo
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
       "font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" text-anchor=\"middle\">{2}</svg>",
-      width, kBarHeight, parts);
+      width, kDegreeBarHeight, parts);
 }
 
 /// Returns an SVG legend of the colours of all levels.
@@ -129,7 +129,7 @@ LevelPicture pictureOf(render::Renderer& renderer, const TableRow& row, const Le
 }
 
 void drawPictures(Session& session, const Backend& backend, std::vector<TableRow>& rows) {
-  std::array<std::set<int>, kLevels.size()> levels;  // those of all rows, so that a colour has one meaning
+  std::array<std::set<int>, kLevels.size()> levels;  // levels of all rows, so that a colour has one meaning
   for (const TableRow& row : rows)
     for (std::size_t k = 0; k < kLevels.size(); ++k)
       for (const auto& [level, share] : row.figures.*kLevels[k].volume) levels[k].insert(level);
@@ -266,7 +266,7 @@ void runTable(Session& session, const Arguments& arguments) {
                {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
                {"meshes", Json::array()}};
   for (const TableRow& row : rows) json["meshes"].push_back(jsonOf(row));
-  const InterruptGuard guard;  // Ctrl-C must not interrupt the writing of the files
+  const InterruptGuard guard;  // on Ctrl-C, all files are written or none
   for (std::size_t k = 0; k < kLevels.size(); ++k) {
     for (const TableRow& row : rows) {
       folder.write(fmt::format("{}-{}.png", row.name, kLevels[k].name), row.pictures[k].png);

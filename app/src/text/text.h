@@ -12,8 +12,8 @@
 
 namespace hpsdf::app {
 
-/// isDigit tells whether a character is an ASCII digit, isLetter whether it is an ASCII letter or an
-/// underscore. Unlike the functions of <cctype>, both are independent of the locale.
+/// True for an ASCII digit. `isLetter` is true for an ASCII letter or an underscore. Unlike the functions of <cctype>,
+/// both functions are independent of the locale.
 constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 constexpr bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 

@@ -3,7 +3,7 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenFrames(50);
+constexpr std::chrono::milliseconds kFrameInterval(50);
 
 }  // namespace
 
@@ -40,14 +40,14 @@ void LiveWork::refreshWhenDue() {
   if (std::this_thread::get_id() != thread_ || refreshing_) return;
   const auto now = Clock::now();
   if (!last_) last_ = now;
-  if (now - *last_ < kBetweenFrames) return;
+  if (now - *last_ < kFrameInterval) return;
   {
     const std::lock_guard lock(mutex_);
     if (!reported_) return;
     explorer_.work = reported_;
   }
-  // Let users cancel the work only while a command runs. A measurement for the frame itself would be started
-  // again by the next frame.
+  // Let users cancel the work only while a command runs. If they cancelled a measurement that the frame itself needs,
+  // the next frame would start it again.
   explorer_.work->cancellable = explorer_.running();
   refreshing_ = true;
   refresh_();

@@ -18,8 +18,8 @@ class Recording {
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
 
-  /// Adds a line that moves the pointer to its present position, because highlights and the readout depend on the
-  /// pointer.
+  /// Records a line that moves the pointer to its present position, because highlights and the readout panel depend on
+  /// the pointer.
   void notePointer();
 
   std::size_t lines() const { return lines_.size(); }
@@ -30,7 +30,7 @@ class Recording {
 
   Explorer& explorer_;
   std::vector<std::string> lines_;
-  std::array<double, 2> pointer_ = {-1, -1};  ///< position after the recorded lines, pixels
+  std::array<double, 2> pointer_ = {-1, -1};  ///< pointer position at the end of the recorded script, pixels
 };
 
 }  // namespace hpsdf::app

@@ -27,7 +27,7 @@ using Clock = std::chrono::steady_clock;
 constexpr double kPollSeconds = 0.2;     // longest wait for an event, because Ctrl-C does not end a wait
 constexpr double kRestSeconds = 0.06;    // time without an event after which a slow picture is drawn in full
 constexpr double kSmoothSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
-constexpr int kLeastSize = 64, kGreatestSize = 8192;  // pixels, the range of `show size`
+constexpr int kLeastSize = 64, kGreatestSize = 8192;  // range of frame sizes, pixels
 
 /// Returns the description of GLFW's last error.
 std::string glfwProblem() {
@@ -134,8 +134,8 @@ std::optional<Key> keyOf(int key, int scancode) {
   return letter == nullptr ? std::nullopt : keyNamed(letter);
 }
 
-/// Removes the script position from the beginning of an error message. Users do not know the internal script in
-/// which a widget's command line stands.
+/// Removes the position in the explorer's internal script, which users do not know, from the beginning of an error
+/// message.
 std::string withoutPosition(std::string message) {
   for (const std::string_view script : {"panel:1:", "rebuild:1:"})
     if (message.starts_with(script)) message.erase(0, message.find(": ") + 2);
@@ -172,7 +172,7 @@ class Window {
     }
   }
 
-  /// Ends the recording and draws the last frame, with which the recorded script ends.
+  /// Ends the user's input and returns the last frame, which the recorded script reproduces.
   render::Image finish() {
     endGestures();
     return frame(1);
@@ -249,7 +249,7 @@ class Window {
           Input{.kind = Input::Kind::key, .key = *known, .control = control, .shift = (mods & GLFW_MOD_SHIFT) != 0});
   }
 
-  /// Handles all waiting input events. Returns false if no event was waiting.
+  /// Handles all waiting input events and a change of the window's size. Returns true if the frame must be drawn again.
   bool takeEvents() {
     bool happened = std::exchange(damaged_, false);
     const auto size = screen_.size();
@@ -299,7 +299,7 @@ class Window {
     }
   }
 
-  /// Draws a frame and returns it. If the picture cannot be drawn, undoes changes of the view until it can.
+  /// Draws a frame and returns it. If the picture cannot be drawn, undoes changes of the view until it can be drawn.
   render::Image frame(int shrink) {
     for (;;) {
       try {
@@ -343,13 +343,13 @@ class Window {
   /// Ends the user's gestures and records the pointer's position, so that the recording leads to the present
   /// frame.
   void endGestures() {
-    attempt([&] { explorer_.releaseInput(); });  // a released slider may start work
-    frame(1);                                    // undoes a view that cannot be drawn, in the recording too
+    attempt([&] { explorer_.releaseInput(); });  // a released slider may start long work
+    frame(1);                                    // if drawing fails, undoes the view, in the recording too
     explorer_.message.clear();
     recording_.notePointer();
   }
 
-  /// Writes the frame to a file under the next unused name.
+  /// Writes the frame to a file with the next unused name.
   void shoot() {
     endGestures();
     attempt([&] {
@@ -364,7 +364,7 @@ class Window {
   Recording recording_;
   LiveWork work_;
   std::deque<std::optional<Input>> events_;  ///< waiting events; an empty one asks for a screenshot
-  bool damaged_ = false;                     ///< the desktop has lost the window's content
+  bool damaged_ = false;                     ///< true if the desktop has lost the window's content
   double fullSeconds_ = 0;                   ///< time that the last picture in full resolution took
 };
 

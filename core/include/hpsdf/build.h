@@ -11,35 +11,36 @@
 
 namespace hpsdf {
 
-/// Throws `Error` for the first setting that is out of range, for a domain that is out of range, and for a base
-/// grid that does not fit into memory. `build` calls this function first.
+/// Checks the arguments of `build`, which calls this function first. Throws `Error` for the first setting that is out
+/// of range, for a domain that is empty, flat or not finite, and for a base grid that does not fit into memory.
 void checkBuild(const Box& domain, const BuildOptions& options);
 
-/// Builds the field of the signed distance Φ over `domain`. The field's metadata stores the source of Φ. If the
-/// source has a box, the longest side of this box is the length L (see `BuildOptions::targetError`).
+/// Builds a field that approximates the signed distance Φ over `domain`. The field's metadata stores the description of
+/// Φ (`DistanceFunction::source`). If this description contains the surface's bounding box, the longest side of the box
+/// is the length L that scales the target error (see `BuildOptions::targetError`).
 ///
-/// Throws `Error` for options or a domain out of range, for an octree that would not fit into memory (the
-/// message says how much memory it would need), and if Φ returns a value that is not finite. Throws `Cancelled`
-/// when `progress` says so.
+/// Throws `Error` for options or a domain out of range, for an octree that would not fit into memory (the message says
+/// how much memory it would need), and if Φ returns a value that is not finite. Throws `Cancelled` when `progress` says
+/// so.
 Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options = {},
             const Progress& progress = {});
 
-/// Builds fields with several numbers of steps in one construction. The numbers in `steps` must not descend.
-/// For each number, `visit` receives the field that `build` returns with this number as `maxSteps`. The next
-/// field is made only after `visit` has returned. Throws as `build` does, `Error` if `steps` descend, and
-/// whatever `visit` throws.
+/// Builds several fields in one construction: one for each number in `steps`, which must be in non-descending order.
+/// For each number, `visit` receives the field that `build` returns with this number as `maxSteps`. The construction
+/// continues only after `visit` has returned. Throws as `build` does, `Error` if `steps` descend, and whatever `visit`
+/// throws.
 void buildStages(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                  std::span<const std::uint64_t> steps, const std::function<void(Field)>& visit,
                  const Progress& progress = {});
 
-/// Builds the same field as `build`, bit for bit, but continues from the state in `checkpoint.file` if this
-/// file exists. The result does not depend on when earlier processes were stopped or on their numbers of
-/// threads. The file holds the growing octree; the final stages of the construction are repeated. The file is
-/// not removed: remove it once the field is saved.
+/// Builds the same field as `build`, bit for bit, but continues from the state in `checkpoint.file` if this file
+/// exists. The result does not depend on when earlier processes were stopped or on their numbers of threads. The file
+/// holds the octree while it is refined; the stages after refinement, such as pruning, are repeated. The caller should
+/// remove the file once the field is saved.
 ///
-/// Throws as `build` does. Also throws `Error`, before anything is built, if the file cannot be written, is
-/// damaged, or was begun by another version of the program or with another Φ, domain or options (`threads` and
-/// `memoryLimit` may differ). Two Φ count as the same if their sources and their values at 4096 points agree.
+/// Throws as `build` does. Also throws `Error`, before anything is built, if the file cannot be written, is damaged, or
+/// was begun by another version of the program or with another Φ, domain or options (`threads` and `memoryLimit` may
+/// differ). Two Φ count as the same if their sources and their values at 4096 points agree.
 Field buildResumably(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                      const Checkpoint& checkpoint, const Progress& progress = {});
 

@@ -15,24 +15,25 @@
 
 namespace hpsdf {
 
-/// How an octree is refined: hp refines the degree and the depth of its leaves; h1 and h2 only split leaves,
-/// whose degree is constant, for comparison.
+/// How the octree is refined: `hp` raises the polynomial degree of leaves or splits them; `h1` and `h2` only split
+/// leaves, whose degree is always 1 or 2, and serve for comparison.
 enum class Strategy : std::uint8_t { hp, h1, h2 };
 
-/// The method that estimates the squared error of a cell, before the error is weighted by nearness.
+/// The method that estimates the squared L2 error of a cell, before the error is weighted by its distance from the
+/// surface.
 enum class Estimator : std::uint8_t {
-  embedded,  ///< ε_e: the norm of the top-degree coefficients (paper, eq. 6)
-  residual,  ///< ∫Φ² − ∫f²: the part of the samples that the fit does not represent
+  embedded,  ///< squared L2 norm of the polynomial's terms of highest degree (ε_e; paper, eq. 6)
+  residual,  ///< ∫Φ² − ∫f²: the part of the sampled Φ that the polynomial f does not represent
 };
 
-/// The criterion by which the degrees and depths of the leaves are chosen.
+/// The criterion by which the polynomial degrees and the depths of the octree's leaves are chosen.
 enum class Criterion : std::uint8_t {
-  paper,    ///< the refinement that reduces the error more for each coefficient (paper, eqs. 7 to 9)
-  optimal,  ///< the paper's criterion beyond the target, then pruning of refinements that reduce the error little
+  paper,    ///< takes the refinement that reduces the error more per coefficient (paper, eqs. 7 to 9)
+  optimal,  ///< refines by the paper's criterion beyond the target error, then undoes the least useful refinements
 };
 
-/// The form of the weight κ(s) of a cell, where s is the cell's mean distance from the surface and d the length
-/// of the domain's diagonal.
+/// The form of the weight κ(s) by which the error of a cell counts, where s is the cell's mean distance from the
+/// surface and d the length of the domain's diagonal.
 enum class NearnessKind : std::uint8_t {
   polynomial,   ///< (1 − s/d)^θ (paper, eq. 10)
   exponential,  ///< exp(−θ s/d) (Koschier et al. 2017)
@@ -42,53 +43,55 @@ enum class NearnessKind : std::uint8_t {
 /// 1 % of the estimated RMS error and, if a maximum error is asked for, by less than 1 % of the maximum error.
 enum class CoefficientType : std::uint8_t { automatic, float32, float64 };
 
-/// The samples for the p-trial, which tentatively fits a polynomial of one degree more to a cell.
+/// The samples of Φ that are used to try a polynomial of one degree more in a cell (p-trial).
 enum class TrialSamples : std::uint8_t {
-  children,  ///< the children's samples: a finer quadrature that refits all coefficients without evaluating Φ again
-  /// Samples of a separate quadrature, which yield only the coefficients of the highest degree, as in the paper.
-  /// The errors of the lower coefficients remain: if `quadrature` is below 4, the error may be far above the
+  children,  ///< samples in the eight child cells, which the trial split takes anyway; all coefficients are refitted
+  /// Additional samples in the cell itself, from which only the coefficients of the highest degree are computed, as in
+  /// the paper. The lower coefficients keep their errors: if `quadrature` is below 4, the error may be far above the
   /// estimate.
   own,
 };
 
-/// The quadrature rule whose points sample a cell.
+/// The kind of quadrature rule that selects the sample points in a cell.
 enum class CubatureKind : std::uint8_t {
-  compact,  ///< rules with few points for their order, which are known up to order 13; `product` for higher orders
+  compact,  ///< symmetric rules with about half as many points as `product` up to order 13; above, as `product`
   product,  ///< the tensor product of Gauss rules (the paper)
 };
 
-/// The greatest weight λ of weak continuity. With this weight a field hardly changes; with a far greater weight
-/// the solver would divide by zero.
+/// Greatest allowed weight λ of weak continuity, a post-process that reduces the jumps of a field between leaves. With
+/// this weight the field hardly changes; with a far greater weight the solver would divide by zero.
 constexpr double kMaxContinuityWeight = 1e9;
 
-/// The default width of blend zones. With this width, queries take at most twice as long on average, and the
-/// gradient is as accurate near the faces of leaves as within leaves (docs/decisions.md).
+/// Default width, relative to the edge of a leaf, of the zones in which neighbouring leaves are blended. With this
+/// width, queries take at most twice as long on average, and the gradient is as accurate near the faces of leaves as
+/// within leaves (docs/decisions.md).
 constexpr double kDefaultBlend = 0.04;
 
-/// Settings of weak continuity, which minimises Σ_F w_F ∫_F jump² dA + λ‖f − f₀‖² (Koschier et al. 2017). F
-/// runs over the interfaces between leaves, w_F is the edge length of the smaller leaf at F, ‖·‖ is the L2 norm
-/// over the domain, and f₀ is the field as fitted leaf by leaf. Because w_F is a length, both terms have the
-/// same unit, and the effect of λ depends neither on cell sizes nor on units.
+/// Settings of weak continuity (Koschier et al. 2017), which reduces the jumps of a field f between leaves. It
+/// minimises Σ_F w_F ∫_F jump² dA + λ‖f − f₀‖², where F runs over the faces between leaves, w_F is the edge length of
+/// the smaller leaf at F, ‖·‖ is the L2 norm over the domain, and f₀ is the field as fitted leaf by leaf. Because w_F
+/// is a length, both terms have the same unit, and the effect of λ depends neither on cell sizes nor on units.
 struct WeakContinuity {
   /// λ, above 0 and at most `kMaxContinuityWeight`. A small λ reduces the jumps more, a large λ changes the field
   /// less. See docs/accuracy-continuity.md.
   double weight = 2.5;
-  /// Residual at which the conjugate gradient method ends, relative to its initial residual, 0 to 1. With the
-  /// default, the jumps and the change of the field agree with those of the exact solution to three digits.
+  /// The conjugate gradient method ends when its residual, relative to the initial residual, is this small, 0 to 1.
+  /// With the default, the jumps and the change of the field agree with those of the exact solution to three digits.
   double tolerance = 1e-3;
-  int maxIterations = 5000;  ///< 1 or more
+  int maxIterations = 5000;  ///< greatest number of iterations, 1 or more
 };
 
 /// Target RMS errors near the surface and far from the surface, in the field's own units. The construction
 /// compares estimated errors with these targets.
 struct NearFarError {
-  double near = 0;          ///< over the cells that may hold points within `nearDistance` of the surface, above 0
-  double far = 0;           ///< over all other cells, at least `near`
-  double nearDistance = 0;  ///< 0: a hundredth of L, see `BuildOptions::targetError`
+  double near = 0;          ///< error in cells that may contain points within `nearDistance` of the surface, above 0
+  double far = 0;           ///< error in all other cells, at least `near`
+  double nearDistance = 0;  ///< greatest distance that counts as near; 0: 1 % of L (see `BuildOptions::targetError`)
 };
 
-/// The error at which a construction ends: τ, errors by distance (`NearFarError`), or no target. τ cannot be
-/// combined with errors by distance, because errors by distance determine θ and τ.
+/// The error at which a construction ends: a single weighted error τ, separate errors near and far from the surface
+/// (`NearFarError`), or no target. τ cannot be combined with `NearFarError`, from which the construction derives τ and
+/// the weight exponent θ.
 class ErrorTarget {
  public:
   /// Takes the target error τ, or 0 for no target. Without a target, the construction needs a maximum error, a
@@ -99,7 +102,7 @@ class ErrorTarget {
   /// Returns the target error τ, or 0 if τ was not given.
   double weighted() const { return isByDistance() ? 0 : std::get<double>(asked_); }
   bool isByDistance() const { return std::holds_alternative<NearFarError>(asked_); }
-  /// Returns the target errors by distance, or zeros if they were not given.
+  /// Returns the target errors near and far from the surface, or zeros if they were not given.
   NearFarError byDistance() const { return isByDistance() ? std::get<NearFarError>(asked_) : NearFarError{}; }
   bool isNone() const { return !isByDistance() && weighted() == 0; }
 
@@ -107,48 +110,48 @@ class ErrorTarget {
   std::variant<double, NearFarError> asked_;
 };
 
-/// Settings of a field's construction (paper, Algorithm 1). The defaults are not those of the paper, which
+/// Settings of a field's construction (paper, Algorithm 1). The defaults differ from the settings of the paper, which
 /// `paperOptions` returns.
 struct BuildOptions {
-  /// The target error: τ, or errors by distance. τ applies at the scale of the paper, at which the longest side
-  /// of the mesh's box is 2. The construction uses τ·(L/2)^5, where L is the length of the longest side in the
-  /// mesh's own units, so that the same τ gives the same cells in any unit. If Φ has no box, L is the domain's
-  /// longest edge divided by 1.1.
+  /// The target error: τ, or errors near and far from the surface. τ is an integral of the weighted squared error at
+  /// the scale of the paper, at which the longest side of the mesh's box is 2. If this side has the length L, the
+  /// construction uses τ·(L/2)^5, so that the same τ gives the same cells in any unit. If the box of the surface is
+  /// unknown, L is the domain's longest edge divided by 1.1.
   ErrorTarget targetError = 1e-6;
-  std::array<std::uint32_t, 3> grid = {6, 6, 6};  ///< base cells along x, y, z
-  double nearness = 4;                            ///< θ, 0 to 1000; 0 weighs all cells alike
+  std::array<std::uint32_t, 3> grid = {6, 6, 6};  ///< number of base cells, the roots of the octree, along x, y, z
+  double nearness = 4;                            ///< exponent θ in `NearnessKind`, up to 1000; 0: no weighting
   NearnessKind nearnessKind = NearnessKind::polynomial;
-  /// Greatest allowed |f − Φ|, in the field's own units; 0: no such limit. Once the target error is reached, the
-  /// error of every cell (of the band, if there is a band) is probed on a lattice of 512 points. A cell is
-  /// refined if its greatest probed error, plus half of the greatest difference between neighbouring points,
-  /// exceeds the limit. This is no proof; for proven bounds see `safe_distance.h`. Cells are probed without
-  /// blending. `FieldMetadata::measuredError` holds the error that remains because of rounding and of the limits
-  /// of degree, depth, steps and bytes.
+  /// Greatest allowed error |f − Φ| of the field f, in the field's own units; 0: no such limit. Once the target error
+  /// is reached, the error of every cell (of the band, if there is a band) is probed on a lattice of 512 points. A cell
+  /// is refined if its greatest probed error, plus half of the greatest difference between neighbouring points, exceeds
+  /// the limit. This is no proof; for proven bounds see `safe_distance.h`. Cells are probed without blending. The
+  /// remaining error is stored in `FieldMetadata::measuredError`; rounding and the limits of degree, depth, steps and
+  /// bytes can keep it above the limit.
   double maxError = 0;
-  /// Greatest number of bytes of the field in memory. The construction builds the best field within this limit
-  /// that the other settings allow. If `maxError` is set too, the construction ends as soon as this error is
-  /// reached. Coefficients of type `automatic` become float32.
+  /// Greatest number of bytes of the field in memory. The construction builds the best field within this limit that the
+  /// other settings allow. If `maxError` is set too, the construction ends as soon as this error is reached. With a
+  /// limit of bytes, `CoefficientType::automatic` chooses float32.
   std::optional<std::uint64_t> maxBytes = {};
   Estimator estimator = Estimator::embedded;
   Criterion criterion = Criterion::paper;
-  int maxDegree = 30;  ///< p_max, 1 to 30
-  int maxDepth = 10;   ///< l_max, 0 to 20
+  int maxDegree = 30;  ///< highest polynomial degree p of a leaf, 1 to 30
+  int maxDepth = 10;   ///< greatest number of levels below a base cell, 0 to 20
   Strategy strategy = Strategy::hp;
-  int quadrature = 3;  ///< order of the quadrature as a multiple of p, 2 to 8; the paper's is 4
+  int quadrature = 3;  ///< order of the quadrature as a multiple of the degree p, 2 to 8; the paper uses 4
   CubatureKind cubature = CubatureKind::compact;
   TrialSamples trialSamples = TrialSamples::children;
   /// Width of the narrow band around the surface, in the field's own units; 0: no band. Cells that lie wholly
   /// outside the band are not refined and do not count towards the estimated error ε.
   double band = 0;
-  /// Greatest number of steps, each of which raises the degree of one leaf or splits one leaf. With 0 steps the
-  /// field consists of the base cells; std::nullopt: no limit.
+  /// Greatest number of steps, each of which raises the degree of one leaf or splits one leaf. With 0 steps the field
+  /// consists of the base cells. With std::nullopt there is no limit.
   std::optional<std::uint64_t> maxSteps = {};
   bool enrich = false;  ///< refits every leaf at the end, one degree higher where `maxDegree` allows it
-  /// Weight λ of weak continuity (`continuity.h`), which is applied at the end of the construction, before
-  /// rounding. With std::nullopt, weak continuity is not applied.
+  /// Weight λ of weak continuity (`continuity.h`), which is applied at the end of the construction, before the
+  /// coefficients are rounded. With std::nullopt, weak continuity is not applied.
   std::optional<double> continuityWeight = {};
-  double blend = 0;     ///< exact continuity: the width of the blend zones (`FieldData::blend`), 0 to `kMaxBlend`
-  bool bounds = false;  ///< keeps proven bounds of each leaf's error and slope, see `safe_distance.h`
+  double blend = 0;     ///< width of the zones in which neighbouring leaves are blended (`FieldData::blend`); 0: none
+  bool bounds = false;  ///< stores proven bounds of each leaf's error and gradient, see `safe_distance.h`
   CoefficientType coefficients = CoefficientType::automatic;
   /// Limit of the memory, in bytes, that the growing octree and Φ (`DistanceFunction::bytes`) take by a generous
   /// estimate. With std::nullopt the limit is `allowedMemory`, which is also the greatest possible limit. `build`
@@ -156,7 +159,7 @@ struct BuildOptions {
   /// will exceed the limit by half. The solver of weak continuity takes about 50 bytes per coefficient in
   /// addition.
   std::optional<std::uint64_t> memoryLimit = {};
-  int threads = 0;  ///< greatest number of threads, up to 1024; 0: all of the machine. The result is the same.
+  int threads = 0;  ///< greatest number of threads, up to 1024; 0: all of the machine. It does not affect the result.
 };
 
 /// Returns the settings of the paper, except the target error τ and the base grid, which have their defaults.
@@ -176,7 +179,7 @@ struct Checkpoint {
   /// The file of the state. It is written under a temporary name and then renamed, so that the file is complete
   /// at any moment. If the file exists, the construction continues from its state.
   std::filesystem::path file;
-  double seconds = 5;  ///< least time between two writes of the state, 0 to 1e9
+  double seconds = 5;  ///< least time in seconds between two writes of the state, 0 to 1e9
   /// Greatest fraction of the construction time that may be spent on writing the state, above 0 up to 1. If
   /// writing takes long, the state is written less often. 1: no limit.
   double share = 0.02;

@@ -11,15 +11,15 @@ namespace hpsdf {
 struct WeaklyContinuous {
   Field field;
   int iterations = 0;
-  double residual = 0;  ///< residual at the end divided by that at the start
-  double change = 0;  ///< RMS change √(‖f − f₀‖²/|Ω|); as f₀ is a projection, error² = error₀² + change²
+  double residual = 0;  ///< final residual of the conjugate gradient method divided by its initial residual
+  double change = 0;  ///< RMS change √(‖f − f₀‖²/|Ω|) over the domain Ω; f₀ is a projection: error² = error₀² + change²
 };
 
-/// Returns the field that minimises the weighted sum of the jumps and of the change of `field` (Koschier et al.
-/// 2017). The result has the same leaves, degrees and bytes as `field`, and does not depend on `threads` (0:
-/// all that the machine offers). Float coefficients are converted to double and rounded again at the end. The
-/// metadata of the result stores the weight λ, and its error estimates grow by the change and by the second
-/// rounding. Bounds are dropped because they do not hold for the new polynomials.
+/// Returns the field that minimises a weighted sum of its squared jumps between leaves and its squared change from
+/// `field` (Koschier et al. 2017). The result has the same leaves, degrees and bytes as `field`, and does not depend on
+/// `threads` (0: all that the machine offers). Float coefficients are converted to double and rounded again at the end.
+/// The metadata of the result stores the weight λ, and its error estimates grow by the change and by the second
+/// rounding. The proven bounds of `field` are dropped because they do not hold for the new polynomials.
 ///
 /// Throws `Error` for options out of range; for a field that is weakly continuous already, because its original
 /// polynomials f₀ are lost; and if the tolerance is not reached within `maxIterations`. Throws `Cancelled` when
@@ -27,11 +27,11 @@ struct WeaklyContinuous {
 WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& options = {}, int threads = 0,
                                   const Progress& progress = {});
 
-/// Returns a field with the same leaves and with blending (`FieldData::blend`), which makes its value and
-/// gradient continuous throughout the domain. `width` is the width of the blend zones in edges of a leaf, up to
-/// `kMaxBlend`: the wider the zones, the smoother the field, and the more queries evaluate several leaves. A
-/// width of 0 removes the blending. Bounds are dropped because they do not hold for the new field. Throws
-/// `Error` for a width out of range.
+/// Returns a copy of `field` in which neighbouring leaves are blended (`FieldData::blend`), so that value and gradient
+/// are continuous throughout the domain. `width` is the width of the blended zones relative to the edge of a leaf, up
+/// to `kMaxBlend`: the wider the zones, the smoother the field, and the more queries evaluate several leaves. A width
+/// of 0 removes the blending. The proven bounds of `field` are dropped because they do not hold for the new field.
+/// Throws `Error` for a width out of range.
 Field blended(const Field& field, double width = kDefaultBlend);
 
 }  // namespace hpsdf

@@ -19,8 +19,8 @@ namespace hpsdf {
 /// The test that decides whether a point is inside.
 enum class InsideTest : std::uint8_t {
   automatic,     ///< `pseudonormal` if it is certain to be right for the mesh, else `winding`
-  pseudonormal,  ///< pseudonormal of the nearest feature: for closed meshes without self-intersections
-  winding,       ///< winding number above ½: for any mesh; closes holes
+  pseudonormal,  ///< pseudonormal of the nearest face, edge or vertex: for closed meshes without self-intersections
+  winding,       ///< inside where the winding number is above ½: works for any mesh and closes holes
   shell,         ///< a wall of constant thickness around the surface, which may be open
   outerHull,     ///< as `winding`, but without the triangles that have the inside on both sides
 };
@@ -36,7 +36,7 @@ struct InsideTestChoice {
 /// distance.
 struct Source {
   std::string name = {};          ///< the mesh file's name without its path, or the shape's specification
-  std::uint64_t fingerprint = 0;  ///< `fingerprint` of the mesh, 0 without a mesh
+  std::uint64_t fingerprint = 0;  ///< 64-bit hash of the mesh (function `fingerprint`), 0 without a mesh
   std::uint64_t vertices = 0;
   std::uint64_t faces = 0;
   Box box = {};                                   ///< smallest box of the surface in world units; empty if unknown

@@ -15,8 +15,8 @@ enum class ErrorKind : std::uint8_t {
   option,   ///< an option, or a parameter of a shape, has a value that is not accepted
   file,     ///< a file cannot be read, is damaged, or cannot be written
   mesh,     ///< a mesh or a shape cannot be used
-  field,    ///< a field cannot be used for what is asked of it
-  limit,    ///< the work would exceed the memory, or a count that the data structures hold
+  field,    ///< a field does not support the operation that the caller asks for
+  limit,    ///< the work would exceed the memory, or the largest count that the data structures can hold
 };
 
 /// Thrown for bad input, such as a file, a mesh or an option. The message is one line that says what is wrong,
@@ -42,15 +42,13 @@ class Error : public std::runtime_error {
   ErrorKind kind_ = ErrorKind::general;
 };
 
-/// Thrown by a long operation if its `Progress` asks it to stop. In this case the operation has written
-/// nothing.
+/// Thrown by a long operation if its `Progress` asks it to stop. The stopped operation has written no output.
 class Cancelled : public std::runtime_error {
  public:
   Cancelled() : std::runtime_error("cancelled") {}
 };
 
-/// The link between a long operation and its caller: progress reports and cancellation. Both callables may be
-/// empty.
+/// The link between a long operation and its caller: progress reports and cancellation. Both functions may be empty.
 struct Progress {
   /// Receives what the operation is doing and the estimated fraction that is done, 0 to 1. Calls never overlap,
   /// even if they come from several threads.

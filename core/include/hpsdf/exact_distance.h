@@ -28,35 +28,34 @@ struct ClosestPoint {
 
 struct DistanceOptions {
   InsideTest insideTest = InsideTest::automatic;
-  double thickness = 0;  ///< thickness of a shell in world units, above 0; 0 for other tests
+  double thickness = 0;  ///< thickness of the wall for `InsideTest::shell`, above 0; 0 for other tests
   int threads = 0;       ///< greatest number of threads, 0 for all; the result does not depend on it
 };
 
 /// Exact signed distance to a triangle mesh in double precision.
 ///
-/// The unsigned distance comes from a search for the nearest triangle in a hierarchy of oriented boxes, which
-/// takes eight points at a time. The sign comes from an inside test:
-/// - `InsideTest::pseudonormal`: the sign of the dot product of x − closest point with the angle-weighted
-///   pseudonormal of the closest feature (Bærentzen & Aanæs 2005). It is right for closed meshes without
-///   self-intersections.
-/// - `InsideTest::winding`: a point is inside if the generalised winding number w is above ½ (Jacobson et al.
-///   2013). The decision is that of the exact sum over all triangles. The surface w = ½ closes holes and counts
-///   as surface; the distance to this surface is |w − ½|/|∇w|, to first order. A closed mesh that is oriented
-///   inward has its inside all around it.
-/// - `InsideTest::outerHull`: the sign is that of `winding`; outside, the distance also is. For points inside,
-///   triangles with the inside on both sides, such as inner walls of overlapping bodies, do not count as
-///   surface. Along intersections this is decided for pieces of 1/512 of the mesh's size.
-/// - `InsideTest::shell`: half of the thickness is subtracted from the unsigned distance. This test suits
-///   sheets.
+/// The unsigned distance comes from a search for the nearest triangle in a hierarchy of oriented boxes, which takes
+/// eight points at a time. The sign comes from an inside test:
+/// - `InsideTest::pseudonormal`: the sign of the dot product of the vector from the closest point to the query point
+///   with the angle-weighted pseudonormal of the closest face, edge or vertex (Bærentzen & Aanæs 2005). It is right
+///   for closed meshes without self-intersections.
+/// - `InsideTest::winding`: a point is inside if the generalised winding number w is above ½ (Jacobson et al. 2013).
+///   The decision is the same as by the exact sum over all triangles. The surface w = ½ closes holes and counts as
+///   surface; the distance to this surface is |w − ½|/|∇w|, to first order. A closed mesh that is oriented inward has
+///   its inside all around it.
+/// - `InsideTest::outerHull`: the sign and the distances of outside points are those of `winding`. For points inside,
+///   triangles with the inside on both sides, such as inner walls of overlapping bodies, do not count as surface.
+///   Along intersections this is decided for pieces of 1/512 of the mesh's size.
+/// - `InsideTest::shell`: half of the thickness is subtracted from the unsigned distance. This test suits sheets.
 /// - `InsideTest::automatic`: `pseudonormal` if this test is certain to be right, else `winding`.
 ///
-/// Among equally near triangles, the one with the lowest index counts. Therefore results depend neither on the
-/// order nor on the grouping of queries, and single and batched queries agree bit for bit.
+/// Among equally near triangles, the one with the lowest index counts. Therefore results depend neither on the order
+/// nor on the grouping of queries, and single and batched queries agree bit for bit.
 ///
 /// A triangle is degenerate if its height is within the rounding errors of its coordinates. The distance to a
-/// degenerate triangle is that to its edges; the triangle does not contribute to pseudonormals. A point that is
-/// not finite gets a value that is not finite. Signs are lost at distances of about 10¹⁵ times the mesh's size,
-/// where all triangles are equally near.
+/// degenerate triangle is the distance to its edges; it does not contribute to pseudonormals. A point that is not
+/// finite gets a value that is not finite. Signs are lost at distances of about 10¹⁵ times the mesh's size, where all
+/// triangles are equally near.
 ///
 /// Objects are const and thread-safe after construction. They keep no reference to the mesh.
 class ExactDistance {
@@ -77,8 +76,8 @@ class ExactDistance {
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
 
   /// Returns the point of the triangles that is nearest to x, together with the signed distance that `operator()`
-  /// returns. For `InsideTest::outerHull` the triangles are those of the outer hull. Near a closed hole and for a
-  /// shell, the signed distance is not the distance to the returned point.
+  /// returns. For `InsideTest::outerHull` the triangles are those of the outer hull. For a shell, and near a hole that
+  /// the winding number closes, the signed distance is not the distance to the returned point.
   ClosestPoint closestPoint(const Vector3& x) const;
 
   const InsideTestChoice& insideTestChoice() const;

@@ -13,24 +13,23 @@
 
 namespace hpsdf {
 
-/// A hierarchical hp-adaptive signed distance field (Koschier, Deul, Bender 2016). Fields are immutable; every
-/// query is const, thread-safe and allocation-free.
+/// A hierarchical hp-adaptive signed distance field (Koschier, Deul, Bender 2016). Fields are immutable; every query
+/// is const, thread-safe and allocation-free.
 ///
-/// Inside the domain the value is the polynomial of the leaf that holds the point. Leaves are half-open, so
-/// that every point lies in exactly one leaf. The field jumps slightly from leaf to leaf unless it is blended
-/// (`FieldData::blend`). A blended field is f = Σ wₙ fₙ / Σ wₙ over the leaves n that have a weight at the
-/// point. Here fₙ is the polynomial of leaf n, continued beyond the box of the leaf, and wₙ is a product of
-/// smooth steps across the leaf's faces. Value and gradient of a blended field are continuous throughout the
-/// domain. Away from the faces it equals the field without blending to the bit.
+/// Inside the domain the value is the polynomial of the leaf that holds the point. Leaves are half-open, so that every
+/// point lies in exactly one leaf. The field jumps slightly from leaf to leaf unless it is blended
+/// (`FieldData::blend`). A blended field is f = Σ wₙ fₙ / Σ wₙ over the leaves n that have a weight at the point. Here
+/// fₙ is the polynomial of leaf n, continued beyond the box of the leaf, and wₙ is a product of smooth steps across the
+/// leaf's faces. Value and gradient of a blended field are continuous throughout the domain. Away from the faces it
+/// equals the field without blending to the bit.
 ///
-/// Outside the domain the value at x is f(q) + |x − q|, where q is the domain's closest point, and the gradient
-/// matches. The value is continuous across the domain's boundary; jumps between leaves at the boundary continue
-/// outwards. The value is an upper bound of a 1-Lipschitz field, and hence no safe step for sphere tracing. At
-/// infinite points the value is infinite and the gradient NaN.
+/// Outside the domain the value at x is f(q) + |x − q|, where q is the domain's closest point to x, and the gradient
+/// is the gradient of this expression. The value is continuous across the domain's boundary; jumps between leaves at
+/// the boundary continue outwards. Even if f is exact, the value is only an upper bound of the distance, and hence no
+/// safe step for sphere tracing. At infinite points the value is infinite and the gradient NaN.
 class Field {
  public:
-  /// Makes a field of finished arrays. Throws `Error` if the arrays violate the layout that `FieldData`
-  /// describes.
+  /// Makes a field from finished arrays. Throws `Error` if the arrays violate the layout that `FieldData` describes.
   explicit Field(FieldData data);
 
   double value(const Vector3& x) const;
@@ -53,7 +52,7 @@ class Field {
   const FieldMetadata& metadata() const { return data_.metadata; }
   bool singlePrecision() const { return data_.coefficients.index() == 1; }
 
-  /// Returns the arrays of the field itself, for files, uploads to a GPU and tests.
+  /// Returns the arrays that make up the field, for files, uploads to a GPU and tests.
   const FieldData& data() const { return data_; }
 
   /// Returns the grid in which queries start their descent of the octree, for uploads to a GPU and tests.
@@ -72,9 +71,9 @@ struct FieldStatistics {
   std::size_t leaves = 0;
   std::size_t nodes = 0;
   std::size_t coefficients = 0;
-  std::size_t bytes = 0;               ///< `Field::bytes`
-  std::map<int, double> degreeVolume;  ///< degree → fraction of the domain's volume
-  std::map<int, double> depthVolume;   ///< depth → fraction of the domain's volume
+  std::size_t bytes = 0;               ///< memory that the field takes (`Field::bytes`)
+  std::map<int, double> degreeVolume;  ///< fraction of the domain's volume, by degree of the leaves
+  std::map<int, double> depthVolume;   ///< fraction of the domain's volume, by depth of the leaves
   std::map<int, std::size_t> degreeLeaves;
   std::map<int, std::size_t> depthLeaves;
 };

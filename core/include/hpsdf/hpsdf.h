@@ -1,5 +1,6 @@
 #pragma once
-// The whole of hpsdf::core: meshes, exact distances, fields, their construction, queries and measures.
+// Includes all public headers of the library hpsdf::core: meshes, exact distances, fields and their construction,
+// queries and error measures.
 
 #include "hpsdf/build.h"
 #include "hpsdf/build_options.h"

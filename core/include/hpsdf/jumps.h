@@ -21,10 +21,9 @@ struct Jump {
   double max = 0;  ///< greatest jump at the quadrature points, including points on the face's edges and corners
 };
 
-/// The face between two neighbouring leaves. If the leaves differ in size, it is a whole face of the smaller
-/// leaf.
+/// The face that two neighbouring leaves share. If the leaves differ in size, it is a whole face of the smaller leaf.
 struct Interface {
-  std::array<std::uint32_t, 2> cells;  ///< `Cell::id` on the lower and on the upper side
+  std::array<std::uint32_t, 2> cells;  ///< `Cell::id` of the leaf on the lower and of the leaf on the upper side
   std::array<std::uint8_t, 2> degrees;
   std::array<std::uint8_t, 2> depths;
   int axis;        ///< axis that is normal to the face: 0, 1 or 2
@@ -41,9 +40,9 @@ struct Interface {
 
 /// All interfaces of a field, with their jumps.
 struct Jumps {
-  std::vector<Interface> interfaces;  ///< in the octree's order of the smaller leaf or, of two equal ones, the lower
+  std::vector<Interface> interfaces;  ///< in octree order of the smaller leaf; for equal leaves, of the lower leaf
   std::size_t hanging = 0;            ///< number of interfaces between leaves of different size
-  double area = 0;                    ///< total area in units²
+  double area = 0;                    ///< total area of the interfaces in units²
   Jump value;                         ///< jumps of f over all interfaces
   Jump gradient;                      ///< jumps of ∇f over all interfaces
 };
@@ -62,8 +61,8 @@ inline const Jump& jumpOf(const Interface& interface, JumpKind kind) {
 /// Interfaces with equal jumps keep their order.
 std::vector<std::size_t> worstInterfaces(const Jumps& jumps, JumpKind kind, std::size_t count);
 
-/// Returns, for each node of the octree by `Cell::id`, the greatest maximum jump (`Jump::max`) on the
-/// interfaces of this leaf. The element is 0 for internal nodes and for leaves without an interface.
+/// Returns, for each node of the octree (indexed by `Cell::id`), the greatest maximum jump (`Jump::max`) on the
+/// interfaces of the node's leaf. The element is 0 for internal nodes and for leaves without an interface.
 std::vector<double> worstJumpOfCells(const Field& field, const Jumps& jumps, JumpKind kind);
 
 /// One bin of a histogram of interfaces.

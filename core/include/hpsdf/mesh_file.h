@@ -10,12 +10,12 @@ namespace hpsdf {
 
 /// Prepares a mesh for distance queries:
 /// - welds vertices of equal position,
-/// - drops degenerate triangles, duplicate triangles and unused vertices. A degenerate triangle that connects
-///   its neighbours is replaced by an edge flip, because dropping it would open the mesh. A wall that two
-///   bodies share keeps both of its triangles, so that each body is closed; a surface that is modelled with
-///   both sides keeps one,
-/// - reverses the whole mesh if its signed volume is negative. Single components are never reversed, because
-///   the triangles of a cavity face inward on purpose.
+/// - drops degenerate triangles, duplicate triangles and unused vertices. A degenerate triangle that connects its
+///   neighbours is replaced by an edge flip, because dropping it would open the mesh. A wall that two bodies share
+///   keeps both of its triangles, so that each body is closed; a double-sided surface keeps one of its sides,
+/// - reverses the whole mesh if its signed volume is negative. The volume of an open mesh counts only if it exceeds
+///   a hundredth of its box's volume. Single components are never reversed, because the triangles of a cavity face
+///   inward on purpose.
 ///
 /// Throws `Error` (mesh) for indices out of range, for coordinates that are not finite or beyond
 /// `kLargestCoordinate`, and if no triangle with an area is left.
@@ -55,8 +55,8 @@ TriangleMesh loadMesh(const std::string& fileOrShape);
 /// another extension, and as `OutputFile` does.
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file);
 
-/// Throws the `Error` that `saveMesh` would throw for this file name, as far as it can be foreseen. Call this
-/// function before long work.
+/// Checks before long work whether `saveMesh` can write this file, as far as this can be foreseen. Throws the `Error`
+/// that `saveMesh` would throw.
 void checkMeshWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

@@ -7,9 +7,9 @@
 namespace hpsdf {
 
 struct RepairedMesh {
-  ImportedMesh imported;            ///< the repaired mesh; its report keeps the counts of cleaning
-  std::size_t reversedFaces = 0;    ///< faces that disagreed with the greater part of their patch
-  std::size_t reversedPatches = 0;  ///< patches of bodies that were oriented inward, reversed as a whole
+  ImportedMesh imported;            ///< the repaired mesh; its report still holds the counts from cleaning
+  std::size_t reversedFaces = 0;    ///< faces reversed because they disagreed with the greater part of their patch
+  std::size_t reversedPatches = 0;  ///< patches reversed as a whole because their body was oriented inward
 };
 
 /// Orients a mesh consistently and outward by reversing triangles. Vertices and triangles are neither added nor
@@ -21,8 +21,8 @@ struct RepairedMesh {
 /// 2. Bodies. A body is a closed patch; or several patches that are closed only in union, with solid material
 ///    between them; or any other patch, which is open.
 /// 3. Signed volumes. A body with a negative signed volume is oriented inward. An open body takes part only if
-///    its volume is large enough to be reliable, by the rule of `cleaned`; otherwise it stays unchanged. If
-///    there is only one body, or none is oriented inward, the volumes decide and the algorithm ends here.
+///    its volume exceeds a hundredth of its box's volume; otherwise it stays unchanged. If there is only one body,
+///    or none is oriented inward, the volumes decide and the algorithm ends here.
 /// 4. Cavities. A cavity is oriented inward on purpose. Therefore the winding number of the imported mesh is
 ///    probed close to both sides of each body, at points spread over its area. Two patterns decide if at least
 ///    three quarters of the points show them:

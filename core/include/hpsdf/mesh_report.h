@@ -17,12 +17,12 @@ namespace hpsdf {
 /// triangles.
 struct MeshReport {
   std::size_t vertices = 0;    ///< vertices after welding that at least one triangle uses
-  std::size_t faces = 0;       ///< triangles kept
+  std::size_t faces = 0;       ///< number of triangles in the mesh
   std::size_t components = 0;  ///< sets of triangles that are connected by shared edges
 
   std::size_t boundaryEdges = 0;      ///< edges of one triangle
   std::size_t nonManifoldEdges = 0;   ///< edges of more than two triangles
-  std::size_t inconsistentEdges = 0;  ///< edges that two triangles run along in the same direction
+  std::size_t inconsistentEdges = 0;  ///< edges that two triangles traverse in the same direction
 
   /// Number of edges that more triangles traverse in one direction than in the other: the boundary of holes, and
   /// edges with a wrong orientation. If there are no such edges, winding numbers are whole numbers, so that
@@ -73,8 +73,8 @@ constexpr std::size_t kMaxCrossings = 1'000'000;  ///< default limit of a search
 enum class DefectKind : std::uint8_t {
   boundaryEdge,      ///< an edge of one triangle: the boundary of a hole or of a sheet
   nonManifoldEdge,   ///< an edge of more than two triangles
-  inconsistentEdge,  ///< an edge of two triangles that run along it in the same direction: one is reversed
-  pinchedVertex,     ///< a vertex at which fans of triangles meet that share no edge there
+  inconsistentEdge,  ///< an edge that its two triangles traverse in the same direction: one of them is reversed
+  pinchedVertex,     ///< a vertex at which fans of triangles meet without a common edge
   crossing,          ///< two triangles that intersect beyond the corners and edges they share
 };
 constexpr std::size_t kDefectKinds = 5;
@@ -89,8 +89,8 @@ struct MeshDefects {
   std::vector<Defect> found;  ///< sorted by kind; edges and vertices by vertex index, crossings by triangle index
   std::array<std::size_t, kDefectKinds> counts = {};
   bool allCrossings = true;  ///< false when the search for crossings stopped at its limit
-  /// Number of crossings between two triangles of the same component, at which the surface passes through itself.
-  /// Shared walls are not counted.
+  /// Number of crossings between two triangles of the same component, at which the surface passes through itself. Walls
+  /// that two bodies share are not counted.
   std::size_t crossingsWithinComponents = 0;
   /// True if reversing triangles can make the orientation consistent at every edge of exactly two triangles;
   /// false for a Möbius strip.

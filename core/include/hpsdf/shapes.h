@@ -25,7 +25,7 @@ struct Shape {
   std::string name;
   std::string help;
   std::vector<Parameter> parameters;
-  bool analytic;  ///< `analytic` accepts this shape
+  bool analytic;  ///< the function `analytic` offers this shape's signed distance in closed form
 };
 
 /// Returns all built-in shapes in the order in which lists show them: sphere, torus, box, gear, helix-bowl,

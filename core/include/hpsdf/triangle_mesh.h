@@ -21,7 +21,7 @@ using Triangle = std::array<std::uint32_t, 3>;
 struct TriangleMesh {
   std::vector<Vector3> vertices;
   std::vector<Triangle> triangles;
-  std::string name;  ///< the file's name without its path, or the shape's spec; for messages and metadata
+  std::string name;  ///< the file's name without its path, or a shape's specification; for messages and metadata
 };
 
 /// Returns the positions of the three vertices of a triangle.

@@ -20,10 +20,10 @@ struct Normalization {
 };
 
 constexpr int kMaxDegree = 30;  ///< highest total degree of a leaf's polynomial
-constexpr int kMaxDepth = 20;   ///< levels below a base cell; a local coordinate keeps 32 of a double's 52 bits there
+constexpr int kMaxDepth = 20;   ///< levels below a base cell, at which local coordinates keep 32 of a double's 52 bits
 
-/// The greatest value of `FieldData::blend`. With a greater value, the blend zones at opposite faces of a cell
-/// could meet.
+/// Greatest width of the zones in which neighbouring leaves are blended (`FieldData::blend`). With a greater width, the
+/// zones at opposite faces of a cell could meet.
 constexpr double kMaxBlend = 0.25;
 
 /// Returns n(p) = (p+1)(p+2)(p+3)/6, the number of coefficients of a polynomial of total degree p (Koschier et

@@ -16,17 +16,17 @@
 
 namespace hpsdf {
 
-/// Figures of the error |f − Φ| over samples, in units of length.
+/// Statistics of the error |f − Φ| of a field f over samples, in units of length.
 struct ErrorFigures {
   std::size_t samples = 0;
   double rms = 0;
   double mean = 0;
   double max = 0;
-  std::map<double, double> percentiles = {};  ///< 50, 90, 99 and 99.9 → percentile
+  std::map<double, double> percentiles = {};  ///< percentiles of the error, by 50, 90, 99 and 99.9
 };
 
-/// Counts samples at which f and Φ have different signs. Such samples are inevitable between the zeros of f and
-/// the zeros of Φ. They are defects only if |Φ| exceeds the field's error.
+/// Counts samples at which f and Φ have different signs. They are inevitable between the zero sets of f and Φ, and are
+/// defects only if |Φ| exceeds the field's error.
 struct SignFigures {
   std::size_t mismatches = 0;
   double farthest = 0;      ///< largest |Φ| of a mismatch
@@ -34,7 +34,7 @@ struct SignFigures {
   std::size_t defects = 0;  ///< number of mismatches with |Φ| above the threshold
 };
 
-/// Figures of the gradient ∇f: its length at all samples, and its angle with ∇Φ at some of the samples.
+/// Statistics of the gradient ∇f: its length at all samples, and its angle with ∇Φ at some of the samples.
 struct GradientFigures {
   double meanLength = 0;
   double lengthErrorRms = 0;  ///< RMS of ‖∇f‖ − 1
@@ -52,8 +52,8 @@ struct SampleFigures {
   GradientFigures gradient;
 };
 
-/// Compares the bounds of cells (`CellBound`) with the errors at samples. Cells that contain no sample do not
-/// count.
+/// Compares the proven bounds of cells (`CellBound`) with the errors and gradients at samples. Cells that contain no
+/// sample do not count.
 struct BoundFigures {
   std::size_t violations = 0;  ///< number of samples whose error or gradient exceeds the bound of their cell
   std::size_t cells = 0;
@@ -76,19 +76,19 @@ struct WorstPoint {
 struct VerifyOptions {
   std::size_t points = 1'000'000;     ///< number of samples, half uniform, half near the surface; at least 2
   std::uint64_t seed = 1;             ///< seed of the random points
-  double near = 0;                    ///< greatest distance of near points; 0: 1 % of the surface's longest side
+  double near = 0;                    ///< greatest distance of near samples; 0: 1 % of the longest side of the surface
   double band = 0;                    ///< greatest |Φ| of samples; 0: samples of the whole domain
-  double signBound = 0;               ///< `SignFigures::threshold`; 0: ten times the RMS error of the near points
-  std::size_t worst = 10;             ///< number of worst points, each in a different cell
+  double signBound = 0;               ///< `SignFigures::threshold`; 0: ten times the RMS error of the near samples
+  std::size_t worst = 10;             ///< number of points with the largest errors, each in a different cell
   std::size_t anglePoints = 100'000;  ///< number of samples at which the directions of gradients are compared
   int threads = 0;                    ///< greatest number of threads; 0: all that the machine offers
 };
 
 struct Verification {
-  double near = 0;                     ///< the `VerifyOptions::near` that was used
-  SampleFigures uniform;               ///< figures over points that are uniform in the domain or the band
-  SampleFigures nearSurface;           ///< figures over points near the surface
-  std::optional<BoundFigures> bounds;  ///< figures over all points; empty if the field has no bounds
+  double near = 0;                     ///< greatest distance of the near samples from the surface
+  SampleFigures uniform;               ///< statistics of points that are uniform in the domain or the narrow band
+  SampleFigures nearSurface;           ///< statistics of points near the surface
+  std::optional<BoundFigures> bounds;  ///< statistics over all points; empty if the field has no bounds
   std::vector<WorstPoint> worst;       ///< points with the greatest |f − Φ|, greatest first
 };
 

@@ -15,10 +15,10 @@ struct Orbit {
   double x, y, z;
 };
 
-// The rules below were found by solving the moment equations over all kinds of orbits by the
-// Levenberg-Marquardt method from random starts. Up to order 11 they have as few points as the rules in F.
-// Witherden, P. Vincent, "On the identification of symmetric quadrature rules for finite element methods",
-// 2015. Tests check the moments.
+// The rules below were found by solving the moment equations with the Levenberg-Marquardt method from random starts,
+// for all combinations of kinds of orbits. Up to order 11 they have as few points as the rules in F. Witherden, P.
+// Vincent, "On the identification of symmetric quadrature rules for finite element methods", 2015. The tests check the
+// moments of the rules.
 constexpr Orbit kOrder5[] = {
     {0.88642659279778391, 0.79582242575422146, 0, 0},
     {0.33518005540166201, 0.75878691063932813, 0.75878691063932813, 0.75878691063932813},

@@ -16,8 +16,8 @@ inline void legendreValues(std::type_identity_t<Number> t, int degree, Number* v
   }
 }
 
-/// Computes values[i] = L_i(t) and derivatives[i] = L_i'(t) for i = 0..degree. The derivatives follow from L_i'
-/// = L_{i-2}' + (2i-1) L_{i-1}, which also holds at t = ±1.
+/// Computes values[i] = L_i(t) and derivatives[i] = L_i'(t) for i = 0..degree. The derivatives follow from the
+/// recurrence L_i' = L_{i-2}' + (2i-1) L_{i-1}, which also holds at t = ±1.
 template <typename Number>
 inline void legendreValuesAndDerivatives(std::type_identity_t<Number> t, int degree, Number* values,
                                          Number* derivatives) {

@@ -19,7 +19,7 @@ Cubature product(const QuadratureRule& axis) {
   return all;
 }
 
-/// A projection at the tensor product of a one-dimensional rule along each axis. Contracting one axis after
+/// An L2 projection from samples at the tensor product of a one-dimensional quadrature rule. Contracting one axis after
 /// another costs O(n⁴) for n points per axis; a matrix product would cost O(n⁶).
 class ProductProjection final : public Projection {
  public:
@@ -94,11 +94,11 @@ class ProductProjection final : public Projection {
     return result;
   }
 
-  int points_;                ///< number of points of the axis rule
-  std::vector<double> rows_;  ///< [i][q] = (2i+1)/2 · w_q · L_i(x_q)
+  int points_;                ///< number of quadrature points along an axis
+  std::vector<double> rows_;  ///< rows_[i][q] = (2i+1)/2 · w_q · L_i(x_q) for the quadrature point x_q with weight w_q
 };
 
-/// A projection at the points of any cubature, stored as one matrix.
+/// An L2 projection from samples at the points of any cubature, stored as one matrix.
 class MatrixProjection final : public Projection {
  public:
   MatrixProjection(const Cubature& cubature, int degree)
@@ -125,7 +125,7 @@ class MatrixProjection final : public Projection {
   }
 
  private:
-  std::vector<double> matrix_;  ///< [q][coefficient]
+  std::vector<double> matrix_;  ///< factor of each sample in each coefficient: [sample][coefficient]
 };
 
 /// Returns the index of the coefficient (i, j, k) in the coefficients of a polynomial of total degree `degree`.

@@ -30,12 +30,12 @@ void forEachCoefficient(int degree, F&& f) {
 /// Returns ∫ (L_i L_j L_k)² over a cell, divided by the volume of the cell.
 inline double squaredNorm(int i, int j, int k) { return 1.0 / ((2 * i + 1) * (2 * j + 1) * (2 * k + 1)); }
 
-/// Returns the squared L2 norm, over a cell of this volume, of those terms of a polynomial whose total degree
-/// is exactly `degree` (Koschier et al. 2016, eq. 6).
+/// Returns the squared L2 norm, over a cell of this volume, of a polynomial's terms of total degree `degree` (Koschier
+/// et al. 2016, eq. 6).
 template <typename T>
 double topDegreeError(const T* coefficients, int degree, double volume) {
   double sum = 0;
-  int end = 0;  // one past the coefficients of (i, j), the last of which has total degree p
+  int end = 0;  // one past the last coefficient with these i and j, whose total degree is `degree`
   for (int i = 0; i <= degree; ++i) {
     for (int j = 0; j <= degree - i; ++j) {
       const int k = degree - i - j;
@@ -69,11 +69,11 @@ class Projection {
   int degree_;
 };
 
-/// Returns a projection at the tensor product of a one-dimensional rule, which is computed by contracting one
-/// axis after another.
+/// Returns an L2 projection from samples at the tensor product of a one-dimensional rule. It contracts one axis after
+/// another.
 std::unique_ptr<const Projection> productProjection(const QuadratureRule& axis, int degree);
 
-/// Returns a projection at the points of any cubature, which is computed as one matrix product.
+/// Returns an L2 projection from samples at the points of any cubature. It multiplies the samples by one matrix.
 std::unique_ptr<const Projection> matrixProjection(const Cubature& cubature, int degree);
 
 /// Returns coefficients of degree p+1: the terms up to total degree p come from `lower`, the terms of total
@@ -85,13 +85,13 @@ std::vector<double> appendTopDegree(std::span<const double> lower, std::span<con
 /// degree `degree`.
 std::vector<double> truncated(std::span<const double> coefficients, int degree, int to);
 
-/// Returns two matrices that join the projections of the lower half [0] and the upper half [1] of an interval
-/// into the projection of the whole interval. Element (i, a), a ≤ i, is the contribution of a half's
-/// coefficient a to coefficient i of the whole.
+/// Returns two matrices that join the projections on the lower half [0] and the upper half [1] of an interval into the
+/// projection on the whole interval. Element (i, a), a ≤ i, is the factor with which coefficient a on the half
+/// contributes to coefficient i on the whole interval.
 std::array<detail::LegendreRows, 2> halfShares();
 
-/// Joins the projections of a cell's eight children (number x + 2y + 4z), all of one degree, into the cell's
-/// projection. The result equals the projection of all samples of the children.
+/// Joins the projections of a cell's eight children (number x + 2y + 4z), all of the same degree, into the projection
+/// of the whole cell. The result equals the projection of the samples of all children.
 std::vector<double> joined(const std::array<std::vector<double>, 8>& children, int degree);
 
 }  // namespace hpsdf::basis

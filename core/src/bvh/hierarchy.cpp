@@ -31,7 +31,7 @@ struct Numbered {
     for (int i = 0; i < branch.count; ++i) {
       const Branch::Child& child = branch.children[i];
       const std::uint32_t index = child.branch ? add(*child.branch) : addBlock(child);
-      children[self][i] = index;  // `add` may have moved `children`, so that it is indexed afterwards
+      children[self][i] = index;  // `add` may reallocate `children`, so that it is indexed afterwards
     }
     return self;
   }
@@ -59,10 +59,10 @@ OrientedBox unreachableBox() {
   return box;
 }
 
-/// Returns the box that has these axes and these extents along the axes.
+/// Returns the oriented box with the given axes and extents along these axes, enlarged by a margin for rounding.
 OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
-  // This margin covers the rounding of points, of their products with the axes and of the sums of the products.
-  // Each of these numbers is at most √3.
+  // The margin covers the rounding of points, of their products with the axes and of the sums of these products.
+  // All of these numbers are at most √3 in magnitude.
   constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
   const Eigen::Matrix3d asRounded = axes.cast<double>();
   const Vector3 low = extents.lower.head<3>().cast<double>(), high = extents.upper.head<3>().cast<double>();
@@ -74,10 +74,10 @@ OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
   return box;
 }
 
-/// Fits the boxes of nodes to triangles. The triangles are in the order of the tree.
+/// Fits the oriented boxes of nodes to their triangles. The triangles are in the order of the tree.
 class BoxFitter {
  public:
-  /// `points` are the vertices in local coordinates. Their fourth lane is 0.
+  /// `points` are the vertices in local coordinates. Their fourth component is 0.
   BoxFitter(const std::vector<Corners>& triangles, const std::vector<Eigen::Array4f>& points)
       : triangles_(triangles), points_(points) {}
 
@@ -111,9 +111,9 @@ class BoxFitter {
     return orientedBox.area() < alignedBox.area() ? orientedBox : alignedBox;
   }
 
-  /// Returns the axes of a box for the triangles of `child`: their mean normal, the direction of the greatest
-  /// extent perpendicular to it, and the direction perpendicular to both. If there are many triangles, a sample
-  /// of them suffices.
+  /// Returns the axes of a box for the triangles of `child`: their mean normal, the direction of greatest
+  /// variance perpendicular to the normal, and the direction perpendicular to both. They are computed from at
+  /// most kSamples triangles.
   Eigen::Matrix3d axesOf(const Branch::Child& child) const {
     const std::uint32_t step = 1 + (child.end - child.begin) / kSamples;
     const Eigen::Vector4f reference = points_[triangles_[child.begin][0]];
@@ -170,8 +170,7 @@ void requireSurface(const TriangleMesh& mesh) {
 }
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
-  // The corners are halved before they are added, because their sum could overflow. The center and size of any
-  // finite box thus are finite.
+  // The box's corners are halved before they are added, because their sum could overflow.
   center_ = box.min() / 2 + box.max() / 2;
   const double half = (box.max() / 2 - box.min() / 2).maxCoeff();
   scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;

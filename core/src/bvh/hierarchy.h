@@ -14,32 +14,32 @@
 
 namespace hpsdf::bvh {
 
-/// Throws `Error` (mesh) unless the mesh has at least one and at most `Hierarchy::kMaxTriangles` triangles, all
-/// their vertices exist, and all coordinates are finite.
+/// Throws `Error` of kind `mesh` unless the mesh has at least one and at most `Hierarchy::kMaxTriangles`
+/// triangles, all their vertices exist, and all coordinates are finite.
 void requireSurface(const TriangleMesh& mesh);
 
 /// The triangle of a mesh that is nearest to a query point.
 struct Nearest {
-  std::uint32_t triangleRef = 0;  ///< reference of the triangle, see `Hierarchy::frameAt`
-  FramePoint point;               ///< the query point relative to that triangle's frame
+  std::uint32_t triangleRef = 0;  ///< block and position of the triangle, see `Hierarchy::frameAt`
+  FramePoint point;               ///< the query point's position relative to the triangle
 };
 
-constexpr int kPacket = 8;  ///< points of a packet
+constexpr int kPacket = 8;  ///< number of query points that search the hierarchy together, in SIMD lanes
 
-/// A node of the hierarchy: four oriented boxes in single precision, 256 bytes. Its local coordinates map the
-/// mesh into [-1, 1]³.
+/// A node of the hierarchy: the oriented boxes of four children in single precision, 256 bytes. The boxes are in
+/// local coordinates, in which the mesh lies in [-1, 1]³.
 struct alignas(64) Node {
   enum Field { center = 0, axes = 3, half = 12, fields = 15 };
   float field[fields][kWidth];
-  /// For each box: the index of a child node; or the index of a block, with kBlockBit set; or kEmpty, whose box
-  /// no search visits.
+  /// For each box: the index of a child node; or the index of a block of triangles, with the bit kBlockBit set;
+  /// or kEmpty for an unused box, which no search visits.
   std::uint32_t child[kWidth];
 };
 constexpr std::uint32_t kBlockBit = 0x80000000;
 constexpr std::uint32_t kEmpty = 0x7fffffff;
 
-/// A squared distance that is greater than that of any point for which the search uses single precision. The
-/// boxes of empty children are even farther away.
+/// An upper bound of all squared distances from points to the mesh that the search computes in single precision. The
+/// boxes of unused children are even farther away.
 constexpr float kOutOfReach = 1e33f;
 
 /// Up to four triangles in single precision and local coordinates, with the fields of `TriangleFrame` except
@@ -57,13 +57,12 @@ struct alignas(32) Block {
     fields
   };
   float field[fields][kWidth];
-  std::uint32_t first;  ///< slot of the first triangle; the others follow it
+  std::uint32_t first;  ///< position of the first triangle in the order of the tree; the others follow it
   std::uint32_t count;
 };
 
-/// An array whose elements are not initialised. The thread that fills a part of the array is the first to touch
-/// its memory pages. Therefore the pages are placed near this thread, and no single thread has to clear them
-/// beforehand.
+/// An array with uninitialised elements. The threads that fill it are the first to touch its memory pages.
+/// Therefore the system places each page near its thread, and no single thread has to clear the array first.
 template <typename T>
 class Array {
  public:
@@ -80,19 +79,17 @@ class Array {
   std::size_t size_ = 0;
 };
 
-/// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children per
-/// node.
+/// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children per node.
 ///
-/// Nodes and blocks only decide which triangles a search skips. They are in single precision, and every bound
-/// allows for the rounding, so that no triangle that may be the nearest is skipped. Among the other triangles,
-/// the search returns the minimum by (squared distance in double, mesh index). The result depends neither on
-/// the tree nor on the triangles from which a search starts nor on the instruction set.
+/// Nodes and blocks are in single precision and only decide which triangles a search skips. Every bound allows for
+/// rounding, so that no triangle that may be the nearest is skipped. Among the remaining triangles, a search returns
+/// the one with the least squared distance in double precision or, among equal distances, the least index in the mesh.
+/// The result depends neither on the tree nor on the triangles from which a search starts nor on the instruction set.
 class Hierarchy {
  public:
   Hierarchy() = default;
 
-  /// Builds the hierarchy of a mesh that meets the conditions of `requireSurface`; `box` is the mesh's bounding
-  /// box.
+  /// Builds the hierarchy of a mesh that meets the conditions of `requireSurface`; `box` is the mesh's bounding box.
   Hierarchy(const TriangleMesh& mesh, const Box& box);
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
@@ -104,16 +101,16 @@ class Hierarchy {
   std::span<const Node> nodes() const { return nodes_; }
   std::span<const Block> blocks() const { return blocks_; }
 
-  /// Returns the slot of a triangle, its position in the order of the hierarchy. The triangles of a block have
+  /// Returns the slot of a triangle: its position in the order of the hierarchy. The triangles of a block have
   /// successive slots.
   std::uint32_t slotAt(std::uint32_t triangleRef) const {
     return blocks_[triangleRef / kWidth].first + triangleRef % kWidth;
   }
 
-  // The arrays of frames and triangles are indexed by slot. Most triangles that are close on the surface are
-  // close in memory.
+  // The arrays of frames and triangles are in the order of the hierarchy, so that most triangles that are close
+  // to each other on the surface are close in memory.
   std::span<const TriangleFrame> frames() const { return frames_; }
-  std::span<const Triangle> triangles() const { return triangles_; }  ///< as indices of `vertices`
+  std::span<const Triangle> triangles() const { return triangles_; }  ///< as indices into `vertices()`
   std::span<const Vector3> vertices() const { return vertices_; }     ///< vertices in use, in the order of first use
 
   std::size_t bytes() const;
@@ -125,7 +122,7 @@ class Hierarchy {
  private:
   /// Fills the members triangles_ and vertices_ from the mesh, in the order of the tree.
   void sortSurface(const TriangleMesh& mesh, const std::vector<std::uint32_t>& order);
-  /// Fills a block with the triangles in the slots from `begin` to `end` - 1.
+  /// Fills a block with the triangles at the positions `begin` to `end` - 1 in the order of the hierarchy.
   void fill(Block& block, std::uint32_t begin, std::uint32_t end) const;
 
   Array<TriangleFrame> frames_;
@@ -134,7 +131,7 @@ class Hierarchy {
   std::vector<Triangle> triangles_;
   std::vector<Vector3> vertices_;
   Vector3 center_;    ///< local coordinates = (x - center_)·scale_
-  double scale_ = 1;  ///< 2 / longest side of the mesh's box
+  double scale_ = 1;  ///< 2 / longest side of the mesh's bounding box
 };
 
 }  // namespace hpsdf::bvh

@@ -36,8 +36,7 @@ struct SquaredBounds {
   hn::Vec<D> lower, upper;
 };
 
-/// Returns the squared distance from a point to an oriented box; `field(i)` is the i-th field of `Node` for
-/// this box.
+/// Returns the squared distance from a point to an oriented box; `field(i)` is the i-th field of `Node` for this box.
 template <class D, class Fields>
 HWY_INLINE hn::Vec<D> boxDistance(D d, const Point<hn::Vec<D>>& p, const Fields& field) {
   const auto wx = p.x - field(Node::center), wy = p.y - field(Node::center + 1), wz = p.z - field(Node::center + 2);
@@ -51,9 +50,9 @@ HWY_INLINE hn::Vec<D> boxDistance(D d, const Point<hn::Vec<D>>& p, const Fields&
   return sum;
 }
 
-/// Returns bounds of the squared distance from a point to a triangle; `field(i)` is the i-th field of `Block`
-/// for this triangle. The bounds include the rounding within this function. They do not include the rounding of
-/// the coordinates of the point and the triangle to float.
+/// Returns bounds of the squared distance from a point to a triangle; `field(i)` is the i-th field of `Block` for
+/// this triangle. The bounds allow for rounding within this function, but not for rounding the coordinates of the
+/// point and the triangle to float.
 template <class D, class Fields>
 HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point, const Fields& field) {
   const auto zero = hn::Zero(d);
@@ -72,8 +71,8 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   const auto fromB = p - length, rightAlong = apexAlong - length;
   const auto right = unit(hn::MulAdd(fromB, rightAlong, q * apexAcross) * field(Block::inverseRight));
   const auto rightP = hn::NegMulAdd(right, rightAlong, fromB), rightQ = hn::NegMulAdd(right, apexAcross, q);
-  // Because of rounding, a point beyond a sharp corner may seem to lie on the inner side of both edges at this
-  // corner. If the point's projection also falls within the base of the triangle, it is inside up to rounding.
+  // Because of rounding, a point beyond a sharp corner may seem to lie on the inner side of both edges at this corner.
+  // The condition `base == zero`, that the point projects onto the base of the triangle, excludes such points.
   const auto inside = hn::And(hn::And(q > zero, base == zero),
                               hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
   const auto side = hn::Min(hn::MulAdd(base, base, q * q), hn::Min(hn::MulAdd(leftP, leftP, leftQ * leftQ),
@@ -85,24 +84,22 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   return {squared - rounding, squared + rounding};
 }
 
-/// Returns (√upper + δ)². If the lower bound of a triangle or box is greater, it is farther away than the
-/// triangle with this upper bound.
+/// Returns (√upper + δ)², where `upper` is an upper bound of the squared distance to a triangle, and δ = `delta`
+/// allows for rounding. A triangle or box with a greater lower bound cannot be the nearest.
 template <class D>
 HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   const auto distance = hn::Sqrt(upper) + hn::Set(d, delta);
   return distance * distance * hn::Set(d, 1.000001f);
 }
 
-/// The result of `locateLanes` for each lane: the squared distance to a triangle, and the members of
-/// `FramePoint`.
+/// The result of `locateLanes` for each lane: the squared distance to a triangle, and the members of `FramePoint`.
 template <class D>
 struct Located {
   hn::Vec<D> squared, height, side[3], inside;
 };
 
-/// Locates points relative to a triangle, as `locate` of triangle_frame.h does. Both functions perform the same
-/// operations in the same order, and no operations are fused, so that every instruction set yields the same
-/// bits.
+/// Locates one point per lane relative to a triangle, as `locate` in triangle_frame.h does. Both functions perform the
+/// same operations in the same order, without fused multiply-add, so that every instruction set yields the same bits.
 template <class D>
 HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::Vec<D>>& point) {
   const auto number = [&](double value) HWY_ATTR { return hn::Set(d, value); };
@@ -128,7 +125,7 @@ HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::V
   return at;
 }
 
-/// Returns true if lower[i] ≤ limit[i] for any point i of the packet.
+/// Returns true if lower[i] ≤ limit[i] for any lane i.
 template <int Lanes>
 HWY_INLINE bool anyInReach(const float* lower, const float* limit) {
   const hn::CappedTag<float, Lanes> d;
@@ -173,7 +170,8 @@ HWY_INLINE void settle(Search<Lanes>& s) {
   s.count = 0;
 }
 
-/// Searches for points whose coordinates exceed the range of float. Every triangle is a candidate.
+/// Finds the nearest triangles of points that are too far away for single precision: measures all triangles in
+/// double precision.
 template <int Lanes>
 void tryAll(Search<Lanes>& s) {
   const auto& blocks = s.hierarchy.blocks();
@@ -194,7 +192,7 @@ HWY_INLINE bool isSeed(const Search<Lanes>& s, std::uint32_t block) {
   return false;
 }
 
-/// Prefetches into the cache an object that is probably needed next.
+/// Prefetches an object that is probably needed next into the cache.
 template <class T>
 HWY_INLINE void prefetch(const T* object) {
   for (std::size_t line = 0; line < sizeof(T); line += 64) hwy::Prefetch(reinterpret_cast<const char*>(object) + line);
@@ -223,9 +221,9 @@ class Stack {
   std::size_t top_ = 0;
 };
 
-/// Returns the ranks of four children by descending key. Children that are out of reach have a negative key and
-/// come last. All pairs of keys are compared without branches, because the processor would mispredict most of
-/// them.
+/// Returns the ranks of a node's four children by descending distance. Children too far away to matter have a
+/// negative key and come last. All pairs of keys are compared without branches, because the processor would
+/// mispredict most branches.
 HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   static_assert(kWidth == 4);
   const bool over10 = key[1] > key[0], over20 = key[2] > key[0], over30 = key[3] > key[0], over21 = key[2] > key[1],
@@ -233,8 +231,8 @@ HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32, !over30 + !over31 + !over32};
 }
 
-/// Traverses the hierarchy. It visits the seed blocks first, then each node or block that is still within reach
-/// when it is popped from the stack. At the end it settles the remaining candidates.
+/// Traverses the hierarchy: visits the seed blocks first, and then each node or block that may still contain the
+/// nearest triangle of a point when it is popped from the stack. At the end, measures the remaining candidates.
 template <int Lanes, class Entry, class VisitNode, class VisitBlock, class InReach>
 HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& visitNode,
                          const VisitBlock& visitBlock, const InReach& inReach) {
@@ -254,7 +252,7 @@ HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode&
   }
 }
 
-/// A child of a node, and a lower bound of the squared distance from the query point to the child's box.
+/// A node or block on the stack, and a lower bound of the squared distance from the query point to its box.
 struct Pending {
   float lower;
   std::uint32_t child;
@@ -304,13 +302,13 @@ void runOne(Search<1>& s) {
 using PacketTag = hn::CappedTag<float, kPacket>;
 constexpr std::size_t kLanes = hn::MaxLanes(PacketTag());
 
-/// A child of a node, and lower bounds of the squared distances from the points of a packet to the child's box.
+/// A node or block on the stack, and lower bounds of the squared distances from a packet's points to its box.
 struct PendingOfPacket {
   alignas(32) float lower[kPacket];
   std::uint32_t child;
 };
 
-/// Returns the least of the lower bounds that do not exceed the limit of their lane, or -1 if all exceed it.
+/// Returns the least among the lower bounds that do not exceed the limit of their lane, or -1 if all exceed it.
 HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limit) {
   const auto none = hn::Set(d, kOutOfReach);
   auto all = none;
@@ -338,9 +336,8 @@ HWY_INLINE PacketPoint pointAt(PacketTag d, const Search<kPacket>& s, std::size_
   return {hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
 }
 
-/// Adds to the candidates those triangles of a block that may be nearest to a point of the packet. The
-/// distances to all triangles are computed before any triangle is rejected, because branches would be
-/// mispredicted.
+/// Adds to the candidates those triangles of a block that may be nearest to a point of the packet. The distances to
+/// all triangles are computed before any triangle is rejected, because branches would be mispredicted.
 HWY_INLINE void visitBlockOfPacket(Search<kPacket>& s, const Arrays& arrays, std::uint32_t blockIndex) {
   const PacketTag d;
   const Block& block = arrays.blocks[blockIndex];
@@ -366,7 +363,7 @@ HWY_INLINE void visitBlockOfPacket(Search<kPacket>& s, const Arrays& arrays, std
   }
 }
 
-/// Pushes those children of a node onto the stack that are within reach of at least one point of the packet.
+/// Pushes onto the stack the children of a node that may contain the nearest triangle of a point of the packet.
 HWY_INLINE void visitNodeOfPacket(const Search<kPacket>& s, const Arrays& arrays, const Node& node,
                                   Stack<PendingOfPacket>& stack) {
   const PacketTag d;
@@ -432,7 +429,7 @@ void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPac
 }
 
 std::string_view instructionSet() {
-  // Highway gives better instruction sets lower bits. The lowest set bit is therefore the best supported set.
+  // Highway gives better instruction sets lower bits: the lowest set bit is the best supported set.
   return hwy::TargetName(static_cast<std::int64_t>(
       std::uint64_t{1} << std::countr_zero(static_cast<std::uint64_t>(hwy::SupportedTargets() & HWY_TARGETS))));
 }
@@ -449,7 +446,7 @@ Search<Lanes>::Search(const Hierarchy& tree, const std::array<Vector3, Lanes>& p
     for (int axis = 0; axis < 3; ++axis) {
       exact[axis][lane] = points[lane][axis];
       point[axis][lane] = static_cast<float>(local[axis]);
-      tooFar |= !(std::abs(local[axis]) < 1e15);  // This is also true for NaN, which std::max ignores.
+      tooFar |= !(std::abs(local[axis]) < 1e15);  // This is also true for NaN, which std::max below ignores.
       largest = std::max(largest, std::abs(local[axis]));
     }
     limit[lane] = kOutOfReach;
@@ -467,7 +464,7 @@ void Search<Lanes>::addSeed(std::uint32_t seedRef) {
 
 template <int Lanes>
 Nearest Search<Lanes>::result(int lane) const {
-  if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {  // The point is not finite.
+  if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {  // The query point is not finite.
     const TriangleFrame& frame = hierarchy.frameAt(0);
     return {0, locate(frame, Vector3(exact[0][lane], exact[1][lane], exact[2][lane]))};
   }

@@ -11,11 +11,11 @@
 
 namespace hpsdf::bvh {
 
-/// State of a search for the nearest triangles of `Lanes` points. Its single-precision distances are squared
-/// and in the local coordinates of the hierarchy.
+/// State of a search for the nearest triangles of `Lanes` points, one per SIMD lane. Its numbers of type `float`
+/// are in the local coordinates of the hierarchy.
 template <int Lanes>
 struct Search {
-  static constexpr int kCapacity = 96;  ///< greatest number of candidates that wait for `settle`
+  static constexpr int kCapacity = 96;  ///< capacity of the list of candidates, which `settle` empties
 
   Search(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points);
 
@@ -27,27 +27,26 @@ struct Search {
   Nearest result(int lane) const;
 
   const Hierarchy& hierarchy;
-  bool tooFar = false;  ///< single precision would overflow, so that all triangles are candidates
+  bool tooFar = false;  ///< a point is so far away that floats would overflow: all triangles are candidates
 
   alignas(64) float point[3][Lanes];      ///< the points in local coordinates
-  alignas(64) float limit[Lanes];         ///< squared distance above which nothing can be nearest
-  float delta;                            ///< bound of the rounding error of a distance
+  alignas(64) float limit[Lanes];         ///< squared distance above which a triangle cannot be nearest
+  float delta;                            ///< bound of the rounding error of a (not squared) distance
   int seeds = 0;                          ///< number of blocks in `seed`
-  std::array<std::uint32_t, Lanes> seed;  ///< distinct blocks to visit first
+  std::array<std::uint32_t, Lanes> seed;  ///< blocks of triangles to visit first, without repetition
 
   int count = 0;                                    ///< number of candidates
-  std::array<std::uint32_t, kCapacity> candidates;  ///< triangle references
+  std::array<std::uint32_t, kCapacity> candidates;  ///< block and position, see `Hierarchy::frameAt`
   alignas(64) float lower[kCapacity][Lanes];        ///< lower bounds of the candidates' squared distances
 
-  // In double precision and mesh units: the query points, and for each point the nearest triangle among the
-  // settled candidates.
+  // The query points, and for each point the nearest triangle found so far, in double precision and mesh units.
   alignas(64) double exact[3][Lanes];
   alignas(64) double squared[Lanes];
-  alignas(64) double triangle[Lanes];  ///< index in the mesh
+  alignas(64) double triangle[Lanes];  ///< index of the triangle in the mesh
   alignas(64) double triangleRef[Lanes];
   alignas(64) double height[Lanes];
   alignas(64) double side[3][Lanes];
-  alignas(64) double inside[Lanes];  ///< 1 or 0
+  alignas(64) double inside[Lanes];  ///< 1 if the point projects into the triangle, else 0
 };
 
 extern template struct Search<1>;
@@ -57,7 +56,7 @@ extern template struct Search<kPacket>;
 void run(Search<1>& search);
 void run(Search<kPacket>& search);
 
-/// The triangle nearest to x.
+/// Returns the triangle nearest to x.
 Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x);
 
 /// Finds the nearest triangle of each point of a packet in one search. The points should be close to each
@@ -66,7 +65,7 @@ Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x);
 void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
                       std::array<Nearest, kPacket>& nearest);
 
-/// The name of the instruction set in use, such as "AVX2".
+/// Returns the name of the SIMD instruction set in use, such as "AVX2".
 std::string_view instructionSet();
 
 }  // namespace hpsdf::bvh

@@ -35,9 +35,10 @@ TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t tri
   frame.origin = a;
   frame.length = base.norm();
   frame.along = frame.length > 0 ? Vector3(base / frame.length) : Vector3::UnitX();
-  // For triangles parallel to two axes the cross product is exact. For a sliver, the component of the cross
-  // product along the base may exceed the rounding errors. This component is removed before and after scaling. An
-  // error across the base moves no point of the triangle by more than a rounding error.
+  // For a sliver, rounding may tilt the computed normal noticeably towards the base. `withoutBase` removes the
+  // component of the normal along the base, before and after scaling to unit length. The remaining error is a
+  // rotation about the base, which moves no point of the triangle by more than a rounding error. For triangles
+  // parallel to a coordinate plane the normal is exact.
   const auto withoutBase = [&](const Vector3& v) -> Vector3 { return v - frame.along * frame.along.dot(v); };
   const Vector3 normal = withoutBase(frame.along.cross(apex));
   const double height = normal.norm();

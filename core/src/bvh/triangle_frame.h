@@ -9,46 +9,43 @@
 
 namespace hpsdf::bvh {
 
-/// A triangle in its own right-handed orthonormal frame. The longest side AB comes first: corner A is the
-/// origin, B is (length, 0), and the apex C is (apexAlong, apexAcross) with 0 ≤ apexAlong ≤ length and
-/// apexAcross ≥ 0.
+/// A triangle in a right-handed orthonormal frame of its own. Its longest side is AB: corner A is the origin, B
+/// is (length, 0), and the apex C is (apexAlong, apexAcross) with 0 ≤ apexAlong ≤ length and apexAcross ≥ 0.
 ///
-/// The frame is orthonormal up to rounding, and the plane coordinates are measured in it. Even for a thin or
-/// collapsed triangle, the frame represents the triangle up to a few roundings of its longest side. Distances
-/// therefore need no special case for slivers. A triangle without area has apexAcross = 0: no point projects
-/// strictly into such a triangle, and its distance is that to its sides.
+/// Even for a thin or collapsed triangle, the frame reproduces the corners up to a few rounding errors of the
+/// longest side, so that distances need no special case for slivers. A triangle without area has apexAcross = 0:
+/// no point projects strictly into it, and its distance is the distance to its sides.
 struct TriangleFrame {
   Vector3 origin;              ///< corner A
   Vector3 along;               ///< unit vector from A to B
-  Vector3 across;              ///< unit vector in the plane, towards C
-  Vector3 normal;              ///< unit normal of the side from which A, B, C are counter-clockwise
+  Vector3 across;              ///< unit vector perpendicular to AB in the triangle's plane, towards C
+  Vector3 normal;              ///< unit normal; A, B, C are counter-clockwise as seen from its tip
   double length;               ///< |AB|
   double apexAlong;            ///< coordinate of C along `along`
   double apexAcross;           ///< coordinate of C along `across`, 0 where the triangle has no area
   double inverseSquaredLeft;   ///< 1/|AC|², 0 where A = C
   double inverseSquaredRight;  ///< 1/|BC|², 0 where B = C
-  std::uint32_t triangle;      ///< index in the mesh
+  std::uint32_t triangle;      ///< index of the triangle in the mesh
   std::uint32_t
       firstCorner;  ///< number (0, 1, 2) of A among the corners of the mesh's triangle; B and C follow cyclically
 };
 
 inline bool hasArea(const TriangleFrame& frame) { return frame.apexAcross > 0; }
 
-/// If a triangle's height is below kFlat times its largest coordinate, its computed normal is only rounding
-/// noise.
+/// If a triangle's height is below kFlat times its largest coordinate, its computed normal is only rounding noise.
 constexpr double kFlat = 4 * std::numeric_limits<double>::epsilon();
 
 TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t triangle);
 
-/// A point in the coordinates of a triangle's frame.
+/// The position of a point relative to a triangle.
 struct FramePoint {
   double height;               ///< signed distance to the triangle's plane
   std::array<double, 3> side;  ///< squared distances of the point's projection to the sides AB, BC and CA
-  bool inside;                 ///< the point projects strictly into the triangle
+  bool inside;                 ///< true if the point projects strictly into the triangle
 };
 
-/// Computes the coordinates of point x in the triangle's frame. search.cpp repeats these operations in SIMD,
-/// and tests compare both versions.
+/// Computes the position of point x relative to a triangle. search.cpp repeats these operations in SIMD, and
+/// tests compare both versions.
 inline FramePoint locate(const TriangleFrame& f, const Vector3& x) {
   const double wx = x[0] - f.origin[0], wy = x[1] - f.origin[1], wz = x[2] - f.origin[2];
   const double p = wx * f.along[0] + wy * f.along[1] + wz * f.along[2];
@@ -73,7 +70,7 @@ inline double squaredDistance(const TriangleFrame& f, const Vector3& x) {
   return point.height * point.height + (point.inside ? 0.0 : nearestSide);
 }
 
-/// The point of segment ab closest to x, as its parameter in [0, 1] from a to b; 0 where a = b.
+/// Returns the parameter in [0, 1] of the point on segment ab closest to x: 0 at a, 1 at b. Returns 0 if a = b.
 inline double closestParameter(const Vector3& x, const Vector3& a, const Vector3& b) {
   const Vector3 direction = b - a;
   const double squaredLength = direction.squaredNorm();

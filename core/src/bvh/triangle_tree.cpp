@@ -11,17 +11,17 @@ namespace {
 
 constexpr std::uint32_t kLeafSize = kWidth;
 constexpr int kBins = 16;
-constexpr float kNarrowest = 1e-30f;  ///< smallest extent of centers that bins can divide
+constexpr float kNarrowest = 1e-30f;  ///< smallest range of triangle centers that is divided into bins
 
-/// From this level of the tree on, ranges of triangles are halved by count. Each further level at least halves
-/// a range of at most 2^32 triangles, so that no input makes the tree deeper than kMaxLevel + 32 levels.
+/// From this level of the tree on, a range of triangles is split into two halves of equal count. As a range has
+/// at most 2^32 triangles, no input makes the tree deeper than kMaxLevel + 32 levels.
 constexpr int kMaxLevel = 32;
 
-constexpr std::uint32_t kSamples = 1024;                              ///< triangles by which a range's split is chosen
+constexpr std::uint32_t kSamples = 1024;                              ///< number of triangles that determine a split
 constexpr float kEmptyCost = std::numeric_limits<float>::infinity();  ///< cost of a part without triangles
-constexpr std::uint32_t kParallel = 4096;  ///< triangles above which the children are built in parallel
+constexpr std::uint32_t kParallel = 4096;  ///< number of triangles above which the children are built in parallel
 
-/// A triangle's box and index.
+/// The bounding box of a triangle and the triangle's index.
 struct Item {
   FloatBox box;
   std::uint32_t triangle;
@@ -29,8 +29,7 @@ struct Item {
   Eigen::Array4f doubledCenter() const { return box.lower + box.upper; }
 };
 
-/// A range of triangles, the bounding box of their boxes, and the bounding box of the doubled centers of their
-/// boxes.
+/// A range of triangles, their bounding box, and the bounding box of the doubled centers of their boxes.
 struct Range {
   std::uint32_t begin = 0, end = 0;
   FloatBox box = {};
@@ -57,8 +56,8 @@ struct Bins {
   Eigen::Array4f origin, perUnit;
 };
 
-/// Builds a tree top-down. The triangle range of a node is split where the cost by the surface-area heuristic
-/// is least. Then the part with the largest surface area is split again until there are four parts.
+/// Builds a tree top-down. The triangles of a node are split in two where the surface-area heuristic has its
+/// least cost. Then the part with the largest surface area is split again, until there are four parts.
 class Builder {
  public:
   explicit Builder(std::vector<Item>& items) : items_(items) {}
@@ -148,8 +147,8 @@ class Builder {
     float cost() const { return count > 0 ? box.area() * static_cast<float>(count) : kEmptyCost; }
   };
 
-  /// Returns the axis of the best split and the first bin of its upper part. The bin is 0 if all centers share
-  /// one bin.
+  /// Returns the axis of the split with the least cost, and the first bin above the split. The bin is 0 if all
+  /// centers share one bin.
   std::pair<int, int> bestCut(const Range& range, const Bins& bins) const {
     Bin filled[3][kBins];
     const std::uint32_t step = 1 + range.size() / kSamples;
@@ -164,7 +163,7 @@ class Builder {
     float bestCost = std::numeric_limits<float>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
       if (bins.perUnit[axis] == 0) continue;
-      std::array<float, kBins> above;  // cost of the part that begins at a bin
+      std::array<float, kBins> above;  // for each bin, the cost of an upper part that begins there
       Bin part;
       for (int bin = bins.count - 1; bin > 0; --bin) {
         part.extend(filled[axis][bin]);

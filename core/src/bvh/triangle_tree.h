@@ -1,6 +1,5 @@
 #pragma once
-// The tree structure of a bounding-volume hierarchy: which triangles belong to each node, before any boxes are
-// fitted.
+// The tree structure of a bounding-volume hierarchy: which triangles belong to each node, before any boxes are fitted.
 
 #include <Eigen/Core>
 #include <array>
@@ -13,9 +12,9 @@
 
 namespace hpsdf::bvh {
 
-constexpr int kWidth = 4;  ///< children of a node, triangles of a block
+constexpr int kWidth = 4;  ///< maximum number of children of a node and of triangles in a block
 
-/// Axis-aligned box in four float lanes, of which the fourth is unused. A new box is empty.
+/// Axis-aligned box whose corners are vectors of four floats, of which the fourth is unused. A new box is empty.
 struct FloatBox {
   Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array4f upper = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());
@@ -28,7 +27,7 @@ struct FloatBox {
     lower = lower.min(point);
     upper = upper.max(point);
   }
-  /// Half of the surface area, as the surface-area heuristic needs it.
+  /// Returns half of the box's surface area, for the surface-area heuristic.
   float area() const {
     const Eigen::Array4f size = upper - lower;
     return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
@@ -43,17 +42,17 @@ struct Branch {
     std::unique_ptr<Branch> branch;  ///< null for a block of at most kWidth triangles
   };
   std::array<Child, kWidth> children;
-  int count = 0;  ///< number of children in use, whose ranges are adjacent
+  int count = 0;  ///< number of children in use; the range of each begins where the previous one ends
 };
 
 struct TriangleTree {
   std::unique_ptr<Branch> root;
-  std::vector<std::uint32_t> order;  ///< triangle indices, contiguous below each branch
+  std::vector<std::uint32_t> order;  ///< triangle indices, sorted so that the triangles below each node are contiguous
 };
 
-/// Builds the tree of triangles with the vertices `points`. Their coordinates have magnitudes of about 1, and
-/// their fourth lane is 0. No input makes the tree deeper than 64 levels. The result does not depend on the
-/// number of threads.
+/// Builds the tree of triangles with the vertices `points`. The coordinates of the vertices have magnitudes of
+/// about 1; the fourth component is 0. No input makes the tree deeper than 64 levels. The result does not depend
+/// on the number of threads.
 TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points, const std::vector<Triangle>& triangles);
 
 }  // namespace hpsdf::bvh

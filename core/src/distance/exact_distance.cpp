@@ -26,7 +26,7 @@
 namespace hpsdf {
 namespace distance {
 
-/// The chosen inside test with the data that it needs. The data of the other inside tests stay empty.
+/// The chosen inside test with the data that it needs. The members for all other inside tests stay empty.
 struct ChosenInsideTest {
   InsideTestChoice choice;
   sign::WindingSign winding = {};
@@ -43,17 +43,17 @@ using sign::BoundaryEdges;
 using sign::Pseudonormals;
 using sign::WindingSign;
 
-constexpr int kLattice = 16;  // points along each axis
-/// If two triangles are nearer to each other than this, their rounded distances from a point may be equal. The
-/// unit is that of coordinates with magnitudes of about 1.
+constexpr int kLattice = 16;  // number of lattice points along each axis
+/// If two triangles are closer to each other than this, their distances from a point may round to the same number. The
+/// length applies to a mesh that is scaled to coordinates of about 1.
 constexpr double kTooNear = 0x1p-44;
-/// The least length of a usable pseudonormal. At a sharp edge the length is the angle between the edge's two
-/// faces. Near the edge a dot product decides the sign. It is half the square of the angle and must be far
-/// above rounding errors.
+/// Least length of the pseudonormal of an edge or vertex that may decide a sign. At a sharp edge the length is about
+/// the angle between the edge's two faces. The dot product that decides the sign near the edge is half the square of
+/// the angle and must be far above rounding errors.
 constexpr double kSharp = 1e-6;
 
-/// Returns true if any point of a lattice is inside an open mesh. The lattice extends beyond the mesh's
-/// bounding box, because the box may be flat.
+/// Returns true if any point of a lattice around an open mesh is inside by the winding number. The lattice extends
+/// beyond the mesh's bounding box, because the box may be flat.
 bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
   const Vector3 beyond = Vector3::Constant(0.1 * mesh.sizes().norm());
   const Box box(mesh.min() - beyond, mesh.max() + beyond);
@@ -67,8 +67,8 @@ bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
   return any;
 }
 
-/// Returns the slot of the largest triangle of each connected component. Two triangles are connected if they
-/// share an edge with no third triangle and are consistently oriented at that edge.
+/// Returns the index, in the hierarchy's order, of the largest triangle of each connected component. Two triangles are
+/// connected if they share an edge that no third triangle uses and are consistently oriented at that edge.
 std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
                                                const std::vector<mesh::DirectedEdge>& sides) {
   const auto frames = hierarchy.frames();
@@ -77,7 +77,7 @@ std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
     if (edge.size() == 2 && edge[0].rising != edge[1].rising) components.join(edge[0].face, edge[1].face);
   });
   const auto area = [&](std::uint32_t slot) { return frames[slot].length * frames[slot].apexAcross; };
-  std::vector<std::uint32_t> largest(frames.size());  // by the component's lowest slot, which is visited first
+  std::vector<std::uint32_t> largest(frames.size());  // indexed by the first triangle of each component
   for (std::uint32_t slot = 0; slot < frames.size(); ++slot) {
     const std::uint32_t first = components.first(slot);
     if (first == slot || area(slot) > area(largest[first])) largest[first] = slot;
@@ -107,15 +107,15 @@ bool isSharp(const Hierarchy& hierarchy, const Pseudonormals& normals, std::uint
              normals.ofEdge(hierarchy, slot, k).norm() < kSharp;
   return sharp;
 }
-/// Chooses pseudonormals if their sign certainly equals that of the winding number, and else the winding
-/// number, which is more expensive.
+/// Chooses the inside test by pseudonormals if their sign certainly equals the sign by the winding number. Otherwise
+/// chooses the test by the winding number, which is more expensive.
 ///
 /// The signs are certainly equal (Bærentzen & Aanæs 2005) if
-/// * every edge is balanced, so that the mesh has no holes;
-/// * the mesh does not intersect itself, and no two parts of it are so close that distances to them may round
-///   to the same number;
-/// * each component has the outside in front of its triangles and the inside behind them. One triangle decides
-///   for a whole component, because edges between two consistently oriented triangles connect the component;
+/// * every edge has as many triangles in one direction as in the other, so that the mesh has no holes;
+/// * the mesh does not intersect itself, and no two parts of it are so close that distances to them may round to the
+///   same number;
+/// * each component has the outside in front of its triangles and the inside behind them. One triangle decides for a
+///   whole component, because edges between two consistently oriented triangles connect the component;
 /// * no edge or vertex is so sharp that rounding errors dominate its pseudonormal.
 ///
 /// Throws `Cancelled`.
@@ -126,7 +126,8 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
   };
   const auto frames = hierarchy.frames();
 
-  // Choose the winding number if the mesh has holes. Holes show as unbalanced edges.
+  // Choose the winding number if the mesh has unbalanced edges, along which more triangles run in one direction than in
+  // the other. The mesh then has holes.
   const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(hierarchy.triangles());
   BoundaryEdges edges(hierarchy, sides);
   if (const std::size_t unbalanced = edges.size(); unbalanced > 0) {
@@ -151,8 +152,8 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
     return byWinding("the mesh intersects itself, so that normals may mislead", crossings.found[0].position,
                      WindingSign(hierarchy, mesh, std::move(edges)));
 
-  // Require that the components are nested and oriented like solids and their cavities. One triangle of each
-  // component decides.
+  // Choose the winding number unless the components are nested and oriented like solids and their cavities. One
+  // triangle of each component decides.
   const std::vector<std::uint32_t> largest = largestOfComponents(hierarchy, sides);
   if (largest.size() > 1) {
     WindingSign winding(hierarchy, mesh, std::move(edges));
@@ -238,7 +239,7 @@ struct ExactDistance::Data {
   /// Computes the distances of points to the nearest triangles of a hierarchy. `resolve` determines the signs.
   void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out) const {
     using bvh::kPacket;
-    std::array<bvh::Nearest, kPacket> nearest{};  // the previous packet's results, which bound the next search
+    std::array<bvh::Nearest, kPacket> nearest{};  // the previous points' results, which bound the next search
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
       const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
       std::array<Vector3, kPacket> packet;
@@ -271,7 +272,7 @@ struct ExactDistance::Data {
   Source source;
   Hierarchy hierarchy;                     ///< the triangles to which distances are measured
   Hierarchy wholeMesh;                     ///< all triangles; only for an outer hull
-  std::vector<std::uint32_t> hullSources;  ///< `OuterHull::sourceTriangles`; only for an outer hull
+  std::vector<std::uint32_t> hullSources;  ///< mesh triangle that each hull triangle comes from; only for an outer hull
   ChosenInsideTest inside;
 
  private:
@@ -283,8 +284,8 @@ struct ExactDistance::Data {
                                                                 : Vector3::Zero();
   }
 
-  /// Returns the closest point with its signed distance. The caller computes `difference`, which is x − closest,
-  /// without the rounding error of `closest`. That error is large far from the origin.
+  /// Returns the closest point with its signed distance. `difference` is x − closest. The caller computes it without
+  /// the rounding error of `closest`, which is large far from the origin.
   static ClosestPoint signedAt(const Vector3& closest, const Vector3& difference, const Vector3& normal,
                                std::uint32_t triangle, Feature feature) {
     const double length = difference.norm();

@@ -12,10 +12,9 @@
 namespace hpsdf {
 namespace {
 
-constexpr std::size_t kSignsPerTask = 16;  // points of one parallel task
+constexpr std::size_t kSignsPerTask = 16;
 
-/// Returns the random point with this number. Points with even numbers lie in the box, those with odd ones near a
-/// triangle.
+/// Returns the random point with this number. Even-numbered points lie in the box, odd-numbered points near a triangle.
 Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random random, std::size_t number) {
   if (number % 2 == 0) return random.inBox(box);
   const auto count = static_cast<double>(mesh.triangles.size());
@@ -31,7 +30,7 @@ struct Tally {
   std::size_t tooNear = 0;
   std::size_t wrong = 0;
   double worstDistance = 0;  ///< greatest distance of a wrong point
-  std::size_t worst = 0;     ///< lowest number of a wrong point at that distance
+  std::size_t worst = 0;     ///< lowest number of a wrong point at the distance `worstDistance`
 
   void add(const Tally& other) {
     tooNear += other.tooNear;
@@ -56,7 +55,7 @@ double windingNumber(const TriangleMesh& mesh, const Vector3& x) {
 SignCheck checkSign(const TriangleMesh& mesh, const ExactDistance& distance, std::size_t points, std::uint64_t seed,
                     const Progress& progress) {
   const MeshReport report = inspect(mesh);
-  const double level = report.unbalancedEdges == 0 && report.volume < 0 ? -0.5 : 0.5;  // -0.5 if oriented inward
+  const double level = report.unbalancedEdges == 0 && report.volume < 0 ? -0.5 : 0.5;  // -0.5 for an inward-facing mesh
   const Box& surface = distance.source().box;
   const double size = surface.sizes().maxCoeff();
   const Vector3 beyond = Vector3::Constant(0.1 * size);

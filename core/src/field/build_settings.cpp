@@ -28,7 +28,7 @@ struct Member {
       value = numbers[0] != 0;
     else if constexpr (std::is_same_v<T, double>)
       value = numbers.empty() ? 0 : numbers[0];
-    else  // converts by way of 64 bits, which hold every number that a damaged file can contain
+    else  // convert via 64 bits, which hold every number that a damaged file can contain
       value = static_cast<T>(static_cast<std::int64_t>(numbers[0]));
   }
 };
@@ -53,8 +53,8 @@ struct Member<std::array<std::uint32_t, 3>> {
   }
 };
 
-/// What values a setting accepts and how it takes part in a construction. The setting's row in the table adds
-/// the rest.
+/// The type, range and unit of a setting, and how it takes part in a construction. The table row of the setting
+/// adds its name, its help text and access to its value.
 struct Kind : BuildSetting {
   Kind& atLeast(double limit) { return with(minimum, limit); }
   Kind& above(double limit) { return atLeast(limit).with(minimumExcluded, true); }
@@ -99,8 +99,8 @@ template <auto kMember, typename M = Member<std::remove_reference_t<decltype(std
 constexpr Access member = {M::isChecked, [](const BuildOptions& options) { return M::get(options.*kMember); },
                            [](BuildOptions& options, Values numbers) { M::set(options.*kMember, numbers); }};
 
-/// Returns the value as the only number of a list, or an empty list if the value is 0. A setting with the value
-/// 0 is unset.
+/// Returns the value as the only number of a list, or an empty list if the value is 0, which stands for an unset
+/// setting.
 Numbers unlessZero(double value) { return value == 0 ? Numbers{} : Numbers{value}; }
 
 /// Functions that read and change a member of `BuildOptions` that is unset if it is 0.
@@ -108,8 +108,8 @@ template <auto kMember>
 constexpr Access positive = {true, [](const BuildOptions& options) { return unlessZero(options.*kMember); },
                              member<kMember>.set};
 
-/// Functions that read and change a member of the target errors by distance (`NearFarError`) that is unset if
-/// it is 0.
+/// Functions that read and change a member of `NearFarError`, the target errors near the surface and far from it.
+/// The member is unset if it is 0.
 template <auto kMember>
 constexpr Access nearFar = {
     true, [](const BuildOptions& options) { return unlessZero(options.targetError.byDistance().*kMember); },
@@ -123,8 +123,8 @@ constexpr Access kWeightedError = {
     true, [](const BuildOptions& options) { return unlessZero(options.targetError.weighted()); },
     [](BuildOptions& options, Values numbers) { options.targetError = numbers.empty() ? 0 : numbers[0]; }};
 
-/// The setting that combines weak and exact continuity. The index of its word has bit 0 set for weak and bit 1
-/// for exact continuity.
+/// The setting that chooses weak and exact continuity. Its number is the index of its word (none, weak, exact,
+/// both), of which bit 0 means weak and bit 1 exact continuity.
 constexpr Access kContinuity = {
     false,
     [](const BuildOptions& options) {

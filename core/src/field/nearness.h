@@ -1,6 +1,6 @@
 #pragma once
-// Errors of cells, weighted by nearness to the surface; the totals of these errors; and the error goal of a
-// construction.
+// Errors of octree cells, their sums, and the error at which the construction of a field ends. Errors near the
+// surface count more than errors far away.
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,11 @@
 
 namespace hpsdf::detail {
 
-/// The weight κ of a cell, which depends on the mean of the field in the cell (paper, eq. 10).
+/// The weight κ of a cell's error (paper, eq. 10). It falls with the cell's distance from the surface, which is
+/// estimated by the mean of the field in the cell.
 struct Nearness {
   NearnessKind kind = NearnessKind::polynomial;
-  double exponent = 0;  ///< θ
+  double exponent = 0;  ///< θ: the greater it is, the less errors far from the surface count
   double diagonal = 1;  ///< d, length of the domain's diagonal
 
   double weight(double mean) const {
@@ -26,15 +27,16 @@ inline Nearness nearnessOf(const BuildOptions& settings, const Box& domain) {
   return {settings.nearnessKind, settings.nearness, domain.diagonal().norm()};
 }
 
-/// The contribution of a cell to the error totals. All numbers are 0 for a cell outside the narrow band.
+/// The error of one cell as it enters the sums over all cells. All numbers are 0 for a cell outside the narrow band.
 struct CellError {
-  double weighted = 0;  ///< ε*_e: the squared error times κ, in units^5
-  double squared = 0;   ///< ε_e, in units^5
+  double weighted = 0;  ///< ε*_e: `squared` times the weight κ
+  double squared = 0;   ///< ε_e: integral of the squared error over the cell
   double volume = 0;
-  bool near = false;  ///< the cell may hold points near the surface, see `NearFarError::nearDistance`
+  bool near = false;  ///< the cell may hold points within `NearFarError::nearDistance` of the surface
 };
 
-/// Sums of the cell errors and of the volumes over all leaves, in units^5 and units^3.
+/// Sums over all leaves: of the weighted errors, and of the squared errors and volumes near the surface and far
+/// from it.
 struct ErrorTotals {
   double weighted = 0;
   double nearSquared = 0, nearVolume = 0;
@@ -47,10 +49,10 @@ struct ErrorTotals {
   }
 };
 
-/// The errors at which the construction ends, in the units of the field.
+/// The errors at which the construction ends. Lengths are in the units of the field.
 struct ErrorGoal {
-  double weighted = 0;                   ///< τ in units^5; 0 where errors by distance are asked for
-  double nearSquare = 0, farSquare = 0;  ///< mean squares to reach, in units^2; 0: not asked for
+  double weighted = 0;  ///< τ: bound of `ErrorTotals::weighted`; 0 if errors by distance are asked for
+  double nearSquare = 0, farSquare = 0;  ///< mean squared errors to reach near the surface and far from it; 0: none
 
   bool byDistance() const { return nearSquare > 0; }
   bool nearReached(const ErrorTotals& totals) const { return totals.nearSquared <= nearSquare * totals.nearVolume; }
@@ -60,8 +62,8 @@ struct ErrorGoal {
   }
   /// Returns the goal with all its squared errors multiplied by `factor`.
   ErrorGoal times(double factor) const { return {weighted * factor, nearSquare * factor, farSquare * factor}; }
-  /// Returns a relaxed goal: each error of the goal, or `factor` times the present error in `totals` if that is
-  /// greater.
+  /// Returns a relaxed goal. Each of its errors is the greater one of this goal's error and `factor` times the
+  /// present error in `totals`.
   ErrorGoal relaxedTo(const ErrorTotals& totals, double factor) const {
     if (!byDistance()) return {std::max(weighted, totals.weighted * factor), 0, 0};
     const auto meanSquare = [](double squared, double volume) { return volume > 0 ? squared / volume : 0; };

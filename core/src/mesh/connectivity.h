@@ -1,6 +1,5 @@
 #pragma once
-// Connectivity of a mesh: the directed edges of its triangles, and the components and patches that edges
-// connect.
+// Connectivity of a mesh: the directed edges of its triangles, and sets of triangles that are connected by edges.
 
 #include <algorithm>
 #include <cstddef>
@@ -13,22 +12,22 @@
 
 namespace hpsdf::mesh {
 
-/// One edge of one triangle, with its direction.
+/// An edge of one triangle with its direction (half-edge).
 struct DirectedEdge {
-  std::uint64_t edge;  ///< key of the undirected edge: lower vertex in the high half, higher vertex in the low half
+  std::uint64_t edge;  ///< undirected edge: smaller vertex index in the high half, greater one in the low half
   std::uint32_t face;  ///< index of the triangle
-  bool rising;         ///< the direction is from the lower to the higher vertex
+  bool rising;         ///< true if the edge runs from its smaller to its greater vertex index
 
   std::uint32_t low() const { return static_cast<std::uint32_t>(edge >> 32); }
   std::uint32_t high() const { return static_cast<std::uint32_t>(edge); }
 };
 
-/// The directed edges of all triangles, sorted by undirected edge and then by face. Edges between equal vertices are
-/// left out.
+/// Returns the directed edges of all triangles, sorted by undirected edge and then by triangle. Edges that begin
+/// and end at the same vertex are left out.
 std::vector<DirectedEdge> directedEdgesOf(std::span<const Triangle> triangles);
 
-/// Calls visit once for each undirected edge of the mesh, with all directed edges that belong to it. The given
-/// list must be sorted by undirected edge.
+/// Calls visit(half-edges) once for each undirected edge of a mesh, with all directed edges (half-edges) along
+/// it. The list `edges` must be sorted by undirected edge.
 template <typename Visit>
 void forEachEdge(std::span<const DirectedEdge> edges, const Visit& visit) {
   for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
@@ -37,14 +36,15 @@ void forEachEdge(std::span<const DirectedEdge> edges, const Visit& visit) {
   }
 }
 
-/// Disjoint sets of the numbers below `elements`, by union-find with path halving. Each number starts in its own set.
+/// Union-find with path halving: disjoint sets of the numbers from 0 up to a given count. Each number starts in a
+/// set of its own.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t elements) : parent_(elements), sets_(elements) {
     std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
   }
 
-  /// Unites the sets of two elements.
+  /// Unites the sets that contain a and b.
   void join(std::uint32_t a, std::uint32_t b) {
     a = first(a);
     b = first(b);
@@ -67,23 +67,22 @@ class DisjointSets {
   std::size_t sets_;
 };
 
-/// Returns the components of a surface. A component is a set of triangles that are connected by edges, however
-/// many triangles share an edge. `edges` are the directed edges of `faces` triangles, sorted by undirected
-/// edge.
+/// Returns the connected components of a surface: sets of triangles that are connected by shared edges, no matter
+/// how many triangles share an edge. `faces` is the number of triangles, and `edges` holds their directed edges,
+/// sorted by undirected edge.
 DisjointSets componentsOf(std::size_t faces, std::span<const DirectedEdge> edges);
 
-/// The patches of a surface. A patch is a set of triangles that are connected by edges of exactly two
-/// triangles. Reversing some triangles of a patch can make all its orientations consistent, unless the patch is
-/// one-sided like a Möbius strip.
+/// The patches of a surface. A patch is a set of triangles that are connected across edges of exactly two triangles. A
+/// patch can be oriented consistently by reversing some of its triangles, unless it is one-sided like a Möbius strip.
 struct Patches {
   std::size_t count = 0;
-  std::vector<std::uint32_t> patchOf;  ///< the patch of each triangle; patches are numbered by their lowest triangles
-  std::vector<char> against;           ///< 1 for triangles oriented opposite to their patch's lowest triangle
-  std::vector<char> oneSided;          ///< 1 for patches that have no consistent orientation
+  std::vector<std::uint32_t> patchOf;  ///< index of each triangle's patch; patches are sorted by their first triangle
+  std::vector<char> against;           ///< 1 for a triangle oriented opposite to the first triangle of its patch
+  std::vector<char> oneSided;          ///< 1 for a patch that has no consistent orientation
 };
 
-/// Returns the patches of a surface. `edges` are the directed edges of `faces` triangles, sorted by undirected
-/// edge.
+/// Returns the patches of a surface. `faces` is the number of triangles, and `edges` holds their directed edges,
+/// sorted by undirected edge.
 Patches patchesOf(std::size_t faces, std::span<const DirectedEdge> edges);
 
 }  // namespace hpsdf::mesh

@@ -14,35 +14,34 @@ Triangle sorted(Triangle t) {
   return t;
 }
 
-/// Returns true if an even number of exchanges sorts the corners. Triangles with the same corners have the same
-/// orientation if both are even or both are odd.
+/// Returns true if the corners are an even permutation of their ascending order. Triangles with the same corners
+/// have the same orientation if both are even or both are odd.
 bool isEven(const Triangle& t) { return (t[0] < t[1]) == ((t[1] < t[2]) == (t[0] < t[2])); }
 
 /// A group of duplicates: all triangles with the same three corners.
 struct Group {
-  std::uint32_t first;          ///< the lowest triangle
-  std::uint32_t firstReversed;  ///< the lowest triangle oriented opposite to `first`, or `first` if there is none
+  std::uint32_t first;          ///< lowest index of a triangle in the group
+  std::uint32_t firstReversed;  ///< lowest index of a triangle oriented opposite to `first`; `first` if there is none
   int same = 1;                 ///< number of triangles with the orientation of `first`
   int reversed = 0;             ///< number of triangles with the opposite orientation
 
   bool hasBothOrientations() const { return reversed > 0; }
   /// Returns the first triangle of the group that has the more frequent orientation.
   std::uint32_t representative() const { return reversed > same ? firstReversed : first; }
-  /// Returns by how much the triangles with the representative's orientation outnumber those with the opposite
-  /// one.
+  /// Returns how many more triangles have the more frequent orientation than the opposite one.
   int excess() const { return std::abs(same - reversed); }
 };
 
 struct Groups {
   std::vector<Group> all;
-  std::vector<std::uint32_t> groupOf;  ///< the group of each triangle
-  std::vector<DirectedEdge> edges;     ///< edges of the groups' representatives; `DirectedEdge::face` is the group
+  std::vector<std::uint32_t> groupOf;  ///< index of each triangle's group in `all`
+  std::vector<DirectedEdge> edges;     ///< edges of one triangle per group; `DirectedEdge::face` is the group's index
 };
 
-/// Groups triangles that have the same corners. The edges of the groups stay empty if no two triangles have the
-/// same corners.
+/// Groups the triangles that have the same corners. `Groups::edges` stays empty if no two triangles have the same
+/// corners.
 Groups groupsOf(std::span<const Triangle> triangles) {
-  std::vector<std::array<std::uint32_t, 4>> order(triangles.size());  // sorted corners, and the triangle
+  std::vector<std::array<std::uint32_t, 4>> order(triangles.size());  // the sorted corners and the triangle's index
   for (std::uint32_t f = 0; f < triangles.size(); ++f) {
     const auto [a, b, c] = sorted(triangles[f]);
     order[f] = {a, b, c, f};
@@ -68,9 +67,9 @@ Groups groupsOf(std::span<const Triangle> triangles) {
   return groups;
 }
 
-/// Calls visit(set, directed edges) for each undirected edge that has a chosen group, that is, a group whose
-/// entry in `chosen` is 1. The directed edges are all that belong to the undirected edge. `set` is the set of
-/// the first chosen group among them.
+/// Calls visit(set, directed edges) for each undirected edge at which there is a chosen group, that is, a group g
+/// with chosen[g] = 1. `set` is the index of the set that contains the first chosen group, and the second
+/// argument lists all directed edges along the undirected edge.
 template <typename Visit>
 void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, DisjointSets& sets, const Visit& visit) {
   forEachEdge(groups.edges, [&](std::span<const DirectedEdge> edge) {
@@ -79,7 +78,7 @@ void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, Disjoi
   });
 }
 
-/// Returns the disjoint sets of chosen groups that are connected by edges.
+/// Returns the disjoint sets of groups that are connected by edges. Only groups g with chosen[g] = 1 are connected.
 DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen) {
   DisjointSets sets(groups.all.size());
   forEachEdgeOf(groups, chosen, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
@@ -89,21 +88,22 @@ DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen
   return sets;
 }
 
-/// Returns 1 or −1, which a directed edge adds to the balance of its undirected edge. The balance is 0 if
-/// equally many triangles run along the undirected edge in both directions.
+/// Returns +1 or −1 for the direction of a directed edge. The balance of an undirected edge is the sum of these
+/// numbers; it is 0 if equally many triangles run along the edge in both directions.
 int direction(const DirectedEdge& edge) { return edge.rising ? 1 : -1; }
 
-/// Returns 1 for each group that is part of a shared wall, else 0. A connected set of groups with both
-/// orientations is a wall if it has surrounding triangles and these balance its edges. It suffices that they do
-/// so counted once for each group, or counted with all their duplicates.
+/// Returns 1 for each group in a shared wall of two bodies, else 0. A connected set of groups with both
+/// orientations is such a wall if other triangles adjoin it and, without the triangles of the set, equally many
+/// run along each edge of the set in both directions. Duplicates among the adjoining triangles may be counted
+/// once or all; it suffices that one of these counts balances all edges.
 std::vector<char> wallsOf(const Groups& groups) {
   std::vector<char> both(groups.all.size());
   for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].hasBothOrientations();
   DisjointSets sets = connectedSets(groups, both);
   struct Surroundings {
     bool exist = false;                   // A group with one orientation shares an edge with the set.
-    bool unbalanced = false;              // Counted once each, these groups unbalance an edge.
-    bool unbalancedByDuplicates = false;  // Counted with duplicates, they unbalance an edge.
+    bool unbalanced = false;              // An edge is unbalanced if each adjoining group counts once.
+    bool unbalancedByDuplicates = false;  // An edge is unbalanced if all adjoining triangles count.
   };
   std::vector<Surroundings> surroundings(groups.all.size());
   forEachEdgeOf(groups, both, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
@@ -125,18 +125,20 @@ std::vector<char> wallsOf(const Groups& groups) {
   return walls;
 }
 
-/// How many triangles of a group are kept.
+/// The numbers of triangles that are kept from a group of duplicates.
 struct Kept {
-  int same = 1;      ///< triangles with the representative's orientation
-  int reversed = 0;  ///< triangles with the opposite orientation
+  int same = 1;      ///< number of triangles with the group's more frequent orientation
+  int reversed = 0;  ///< number of triangles with the opposite orientation
 
   int excess() const { return same - reversed; }
 };
 
-/// Drops duplicates from the groups that are marked in `several`, as long as that reduces the number of
-/// unbalanced edges. A connected set of such groups shrinks from its outline inwards.
+/// Drops duplicates from the groups g with several[g] = 1, as long as this reduces the number of unbalanced edges,
+/// along which more triangles run in one direction than in the other. Thus a connected set of these groups shrinks
+/// from its boundary inwards.
 void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& several, std::vector<Kept>& kept) {
-  // Number the undirected edges, and compute the balance of each edge.
+  // Compute the balance of each undirected edge: the number of triangles that run along it in one direction minus
+  // the number that run in the other.
   std::vector<int> balances;
   std::vector<std::array<std::size_t, 3>> edgesOfGroup(groups.all.size());
   std::vector<std::array<int, 3>> directions(groups.all.size());
@@ -162,8 +164,8 @@ void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& se
     --kept[g].same;
     return true;
   };
-  // Repeat until no duplicate can be dropped. Each round but the last reduces the number of unbalanced edges, so
-  // that the loop ends.
+  // Repeat until no duplicate can be dropped. The loop ends because each round but the last reduces the number of
+  // unbalanced edges.
   for (bool any = true; any;) {
     any = false;
     for (std::size_t g = 0; g < groups.all.size(); ++g)
@@ -171,12 +173,12 @@ void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& se
   }
 }
 
-/// Returns how many triangles of each group are kept. At least one is kept, or one of each orientation in a
-/// shared wall. If dropping all others from a connected set of groups would leave more edges unbalanced, bodies
-/// share these groups. In that case only duplicates that unbalance edges are dropped.
+/// Returns how many triangles of each group are kept: at least one, or one of each orientation in a shared wall.
+/// In a connected set of groups more are kept if this minimum would leave more edges unbalanced, because several
+/// bodies share the triangles. In that case only duplicates that unbalance edges are dropped.
 std::vector<Kept> keptOf(const Groups& groups, const std::vector<char>& walls) {
-  // Mark in `several` the groups with more triangles than necessary, and drop duplicates that unbalance edges
-  // from them.
+  // Mark in `several` the groups with more triangles than the minimum, and drop from these groups the duplicates
+  // that unbalance edges.
   std::vector<char> several(groups.all.size());
   std::vector<Kept> least(groups.all.size()), kept(groups.all.size());
   for (std::uint32_t g = 0; g < several.size(); ++g) {
@@ -188,8 +190,7 @@ std::vector<Kept> keptOf(const Groups& groups, const std::vector<char>& walls) {
   }
   dropUnbalancingDuplicates(groups, several, kept);
 
-  // Reduce each connected set of groups to its fewest triangles, unless that unbalances more edges than it
-  // balances.
+  // Reduce each connected set of groups to its minimum, unless that unbalances more edges than it balances.
   DisjointSets sets = connectedSets(groups, several);
   std::vector<int> unbalancedByLeast(groups.all.size());
   forEachEdgeOf(groups, several, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {

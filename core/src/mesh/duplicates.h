@@ -7,20 +7,21 @@
 
 namespace hpsdf::mesh {
 
-/// Returns true for triangles with the same corners, whatever their orientation.
+/// Returns true if two triangles have the same three vertices, in any order.
 bool haveSameCorners(const Triangle& one, const Triangle& other);
 
-/// Returns 1 for each triangle to drop and 0 for each triangle to keep. Only triangles that share their three
-/// corners with another triangle are dropped.
+/// Returns 1 for each triangle to drop and 0 for each triangle to keep. Only duplicates are dropped: triangles
+/// that share their three corners with another triangle. An edge is balanced if equally many triangles run along
+/// it in both directions.
 ///
-/// If all triangles with the same corners have the same orientation, one is kept. More are kept if bodies share
-/// them, so that dropping them would leave more edges unbalanced. Of those, duplicates that unbalance edges are
-/// dropped.
+/// If all triangles with the same corners have the same orientation, one is kept. More are kept if several bodies
+/// share the triangles, so that dropping them would leave more edges unbalanced. In this case only duplicates
+/// that unbalance edges are dropped.
 ///
-/// If the triangles with the same corners have both orientations, the set of such triangles that are connected
-/// by edges is one of two things:
-/// - a shared wall, if the surrounding triangles balance its edges without it. One triangle of each orientation
-///   is kept, so that each body is closed;
+/// Triangles with the same corners and both orientations form sets that are connected by edges. Each set is one
+/// of two things:
+/// - a shared wall of two bodies, if the surrounding triangles balance the edges of the set without it. One
+///   triangle of each orientation is kept, so that each body is closed;
 /// - otherwise a surface that is modelled with both sides, as drawing programs do. One triangle is kept: the
 ///   first one with the more frequent orientation.
 std::vector<char> redundantFaces(std::span<const Triangle> triangles);

@@ -21,8 +21,7 @@ std::size_t countUsedVertices(const TriangleMesh& mesh) {
   return static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
 }
 
-/// Returns the defect of an undirected edge, or std::nullopt if the edge has no defect. `edge` holds its
-/// directed edges.
+/// Returns the defect of an undirected edge, or std::nullopt if it has none. `edge` holds the directed edges along it.
 std::optional<DefectKind> defectOf(std::span<const DirectedEdge> edge) {
   if (edge.size() == 1) return DefectKind::boundaryEdge;
   if (edge.size() > 2) return DefectKind::nonManifoldEdge;
@@ -39,17 +38,17 @@ void addEdges(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, std
   });
 }
 
-/// Returns the number of the corner that the triangle `face` has at the vertex `vertex`. The corners of all
-/// triangles of the mesh are numbered consecutively.
+/// Returns the index of the corner of triangle `face` at the vertex `vertex`. The corners of triangle n are numbered
+/// from 3n on.
 std::uint32_t cornerOf(const TriangleMesh& mesh, std::uint32_t face, std::uint32_t vertex) {
   const auto& triangle = mesh.triangles[face];
   return 3 * face + static_cast<std::uint32_t>(std::ranges::find(triangle, vertex) - triangle.begin());
 }
 
-/// Appends a defect to `found` for each vertex at which more than one fan of triangles meets. Corners of a
-/// vertex belong to one fan if their triangles share an edge at the vertex.
+/// Appends a defect to `found` for each vertex at which more than one fan of triangles meets. Triangles belong to
+/// the same fan if they are connected by edges at the vertex.
 void addPinchedVertices(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, std::vector<Defect>& found) {
-  // Join the corners at each vertex into fans, where two triangles share an edge at the vertex.
+  // Unite corners at the same vertex if their triangles share an edge there. The resulting sets are the fans.
   mesh::DisjointSets fans(3 * mesh.triangles.size());
   mesh::forEachEdge(edges, [&](std::span<const DirectedEdge> edge) {
     for (const DirectedEdge& other : edge.subspan(1))
@@ -57,7 +56,7 @@ void addPinchedVertices(const TriangleMesh& mesh, std::span<const DirectedEdge> 
         fans.join(cornerOf(mesh, edge.front().face, vertex), cornerOf(mesh, other.face, vertex));
   });
 
-  // At each vertex, find a corner that belongs to another fan than the vertex's first corner.
+  // Find, for each vertex, its first corner and a corner that belongs to a different fan than the first one.
   constexpr std::uint32_t kNone = 0xffffffff;
   struct Corners {
     std::uint32_t first = kNone, ofOtherFan = kNone;
@@ -75,7 +74,7 @@ void addPinchedVertices(const TriangleMesh& mesh, std::span<const DirectedEdge> 
       found.push_back({DefectKind::pinchedVertex, {first / 3, other / 3}, {mesh.vertices[v], mesh.vertices[v]}});
 }
 
-/// Returns the number of crossings between two triangles of the same connected component. Pairs of
+/// Returns the number of pairs of triangles in the same connected component that intersect each other. Pairs of
 /// triangles with the same three corners do not count.
 std::size_t countFolds(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, const Crossings& crossings) {
   if (crossings.found.empty()) return 0;

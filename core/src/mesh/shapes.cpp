@@ -19,8 +19,8 @@ namespace hpsdf::shapes {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// The lengths that a caller may give lie between these limits. Their ratio is small enough for all parts of
-// a shape to be accurate in double precision.
+// Limits of all lengths that a caller may give. Their ratio is small enough for all parts of a shape to be
+// accurate in double precision.
 constexpr double kShortest = 1e-3, kLongest = 1e3;
 
 Parameter length(std::string name, double defaultValue, std::string help) {
@@ -32,7 +32,7 @@ Parameter count(std::string name, double defaultValue, double minimum, double ma
 }
 
 const std::vector<Shape>& shapeList() {
-  // The upper limits of the counts keep every mesh below some 8 million faces.
+  // The maxima of the whole-number parameters keep every mesh below some 8 million faces.
   static const std::vector<Shape> list = {
       {"sphere",
        "an icosahedron subdivided towards a sphere",
@@ -88,10 +88,10 @@ const std::vector<Shape>& shapeList() {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Specs
+// Parsing of shape specifications such as "torus,minor=0.2"
 
-/// Returns the end of an error message about an unknown name: the most similar name in the list, or all
-/// names in the list.
+/// Returns the end of an error message about an unknown name: it suggests the most similar name in the list, or
+/// lists all names.
 template <typename List>
 std::string suggestion(std::string_view wanted, const List& list) {
   std::vector<std::string> names;
@@ -112,7 +112,7 @@ std::string format(double x) {
 /// A parsed shape specification: the shape and the value of each of its parameters.
 struct Request {
   std::string spec;  ///< the spec as the caller wrote it
-  std::string text;  ///< the spec without prefix
+  std::string text;  ///< the spec without its prefix "builtin:" or "analytic:"
   const Shape* shape = nullptr;
   std::map<std::string, double, std::less<>> values = {};
 
@@ -134,7 +134,7 @@ double parseValue(const Request& request, const Parameter& parameter, std::strin
   return value;
 }
 
-/// Parses one item "parameter=value" and sets the value.
+/// Parses one item "parameter=value" and stores the value in `request`.
 void assign(Request& request, std::string_view item) {
   const std::size_t equals = item.find('=');
   const std::string_view name = trimmed(item.substr(0, equals));
@@ -148,15 +148,15 @@ void assign(Request& request, std::string_view item) {
   request.values[parameter->name] = parseValue(request, *parameter, trimmed(item.substr(equals + 1)));
 }
 
-/// Returns the factor by which a regular polygon of n corners must be scaled to have the area that its
-/// circumcircle has before the scaling.
+/// Returns the factor by which a regular polygon of n corners, inscribed in a circle, must be scaled to have the
+/// circle's area.
 double equalAreaFactor(double n) { return std::sqrt((2 * kPi / n) / std::sin(2 * kPi / n)); }
 
 void requireSoundBowl(const Request& request) {
   if (request["depth"] >= request["thickness"])
     request.fail("the relief cuts through the wall; make depth smaller than thickness");
-  // The inner sheet does not intersect itself if the wall is thinner than the smallest radius of curvature of
-  // the paraboloid. The smallest radius is at the paraboloid's lowest point.
+  // The outer side of the bowl is a paraboloid. The inner side does not intersect itself if the wall is thinner
+  // than the paraboloid's smallest radius of curvature, which is radius²/(2·height) at the lowest point.
   if (request["thickness"] >= request["radius"] * request["radius"] / (2 * request["height"]))
     request.fail("the wall is thicker than the bowl is wide at its bottom; make thickness or height smaller");
 }
@@ -209,7 +209,7 @@ Request parse(std::string_view spec, std::string_view prefix) {
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Meshes
+// Construction of the meshes
 
 /// Returns point `i` of `n` equally spaced points on the unit circle. Points on the axes are exact, so that
 /// bounding boxes and symmetry planes of the shapes are exact too.
@@ -230,7 +230,7 @@ void addQuad(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t
 }
 
 TriangleMesh icosahedron() {
-  const double phi = std::numbers::phi;  // With these vertices midpoints of edges lie on the axes.
+  const double phi = std::numbers::phi;  // With these vertices, six edges have midpoints on the coordinate axes.
   TriangleMesh mesh;
   mesh.vertices = {{-1, phi, 0},  {1, phi, 0},  {-1, -phi, 0}, {1, -phi, 0}, {0, -1, phi},  {0, 1, phi},
                    {0, -1, -phi}, {0, 1, -phi}, {phi, 0, -1},  {phi, 0, 1},  {-phi, 0, -1}, {-phi, 0, 1}};
@@ -251,8 +251,7 @@ TriangleMesh icosahedron() {
   return mesh;
 }
 
-/// Divides every triangle into four. The new vertices lie on the unit sphere, in the middle of each edge's
-/// arc.
+/// Divides every triangle into four. The new vertices are midpoints of edges, moved to the unit sphere.
 void subdivide(TriangleMesh& mesh) {
   std::unordered_map<std::uint64_t, std::uint32_t> middles;
   middles.reserve(3 * mesh.triangles.size() / 2);
@@ -275,9 +274,9 @@ void subdivide(TriangleMesh& mesh) {
   mesh.triangles = std::move(finer);
 }
 
-// The sphere mesh and the torus mesh have the same volume as the smooth shape. If their vertices lay on the
-// smooth surface, every face would lie inside it, by up to the face's sagitta. With equal volumes the
-// deviations cancel on average, and their RMS is a third as large.
+// The sphere mesh and the torus mesh are scaled to the volume of the smooth shape. If the vertices lay on the
+// sphere, every face would lie inside it, by up to the face's sagitta. With equal volumes the deviations cancel
+// on average, and their RMS is a third as large.
 
 TriangleMesh sphereMesh(const Request& request) {
   TriangleMesh mesh = icosahedron();
@@ -290,8 +289,8 @@ TriangleMesh sphereMesh(const Request& request) {
 TriangleMesh torusMesh(const Request& request) {
   const std::uint32_t segments = request.whole("segments");
   const std::uint32_t sides = request.whole("sides");
-  // By Pappus's theorem the mesh has the torus's volume if the polygon around the tube has the area of the
-  // tube's circle. The polygon around the axis must have the area of its circle as well.
+  // By Pappus's theorem the mesh has the torus's volume if the polygon around the tube and the polygon around the
+  // axis have the areas of the circles that they approximate.
   const double tube = request["minor"] * equalAreaFactor(sides);
   const double around = equalAreaFactor(segments);
   TriangleMesh mesh;
@@ -321,12 +320,12 @@ TriangleMesh boxMesh(const Request& request) {
   for (unsigned corner = 0; corner < 8; ++corner)  // The bits of `corner` select the sides along x, y and z.
     mesh.vertices.emplace_back(corner & 1 ? half.x() : -half.x(), corner & 2 ? half.y() : -half.y(),
                                corner & 4 ? half.z() : -half.z());
-  addQuad(mesh, 0, 4, 6, 2);  // -x
-  addQuad(mesh, 1, 3, 7, 5);  // +x
-  addQuad(mesh, 0, 1, 5, 4);  // -y
-  addQuad(mesh, 2, 6, 7, 3);  // +y
-  addQuad(mesh, 0, 2, 3, 1);  // -z
-  addQuad(mesh, 4, 5, 7, 6);  // +z
+  addQuad(mesh, 0, 4, 6, 2);  // the side at -x
+  addQuad(mesh, 1, 3, 7, 5);  // the side at +x
+  addQuad(mesh, 0, 1, 5, 4);  // the side at -y
+  addQuad(mesh, 2, 6, 7, 3);  // the side at +y
+  addQuad(mesh, 0, 2, 3, 1);  // the side at -z
+  addQuad(mesh, 4, 5, 7, 6);  // the side at +z
   return mesh;
 }
 
@@ -336,9 +335,9 @@ struct OutlinePoint {
   double radius;  ///< distance from the axis
 };
 
-/// Returns the corners of the gear's outline counter-clockwise. Of each tooth's pitch the tip takes 0.26,
-/// each of the two straight flanks 0.13, and the root the rest. The angle grows from corner to corner, so
-/// that each corner of the outline has a corner of the bore at the same angle.
+/// Returns the corners of a gear's outline counter-clockwise. The tip of a tooth takes 0.26 of the tooth's pitch,
+/// each of the two straight flanks 0.13, and the root the rest. The angle grows from corner to corner, so that
+/// each corner of the outline has a counterpart on the bore at the same angle.
 std::vector<OutlinePoint> gearOutline(unsigned teeth, unsigned segments, double tip, double root) {
   constexpr double kTip = 0.26;
   constexpr double kFlank = 0.13;
@@ -366,15 +365,15 @@ TriangleMesh gearMesh(const Request& request) {
   const auto corners = static_cast<std::uint32_t>(mesh.vertices.size());
   for (std::uint32_t a = 0; a < corners; a += 4) {  // Each angle has four vertices: bottom and top of outline and bore.
     const std::uint32_t b = (a + 4) % corners;
-    addQuad(mesh, a, b, b + 1, a + 1);          // outline
+    addQuad(mesh, a, b, b + 1, a + 1);          // wall along the outline
     addQuad(mesh, a + 1, b + 1, b + 3, a + 3);  // top
-    addQuad(mesh, a + 3, b + 3, b + 2, a + 2);  // bore
+    addQuad(mesh, a + 3, b + 3, b + 2, a + 2);  // wall of the bore
     addQuad(mesh, a + 2, b + 2, b, a);          // bottom
   }
   return mesh;
 }
 
-/// The mesh translated so that its box is centred at the origin.
+/// Returns the mesh translated so that its bounding box is centred at the origin.
 TriangleMesh centred(TriangleMesh mesh) {
   const Vector3 center = boundingBox(mesh).center();
   for (Vector3& v : mesh.vertices) v -= center;
@@ -385,8 +384,8 @@ TriangleMesh centred(TriangleMesh mesh) {
 /// same size: the map has no pole at which cells would shrink.
 Eigen::Vector2d onDisc(double x, double y) { return {x * std::sqrt(1 - y * y / 2), y * std::sqrt(1 - x * x / 2)}; }
 
-/// Returns a closed wall between two sheets over the unit disc, with the sheet `inside` above the sheet
-/// `outside`. A strip connects the boundaries of the two sheets.
+/// Returns the closed mesh of a wall between two surfaces over the unit disc. The functions `inside` and `outside` map
+/// points of the disc to the upper and the lower surface. A strip connects the boundaries of the surfaces.
 template <typename Sheet>
 TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& outside) {
   const std::uint32_t n = 2 * cells, row = n + 1, sheet = row * row;
@@ -400,14 +399,14 @@ TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& out
   for (std::uint32_t j = 0; j < n; ++j)
     for (std::uint32_t i = 0; i < n; ++i) {
       const std::array<std::uint32_t, 4> at = {j * row + i, j * row + i + 1, (j + 1) * row + i + 1, (j + 1) * row + i};
-      // The diagonal of each cell points towards the nearest corner of the square, because a cell at a corner has
-      // two sides on the boundary.
+      // The diagonal of each cell points towards the nearest corner of the square. In a corner cell, the other
+      // diagonal would cut off a triangle with two sides on the boundary, which would be a sliver on the disc.
       const std::uint32_t first = (i < cells) == (j < cells) ? 0 : 1;
       const auto corner = [&](std::uint32_t k) { return at[(first + k) % 4]; };
       addQuad(mesh, corner(0), corner(1), corner(2), corner(3));
       addQuad(mesh, sheet + corner(0), sheet + corner(3), sheet + corner(2), sheet + corner(1));
     }
-  std::vector<std::uint32_t> boundary;  // the boundary's vertices, counter-clockwise from (-1, -1)
+  std::vector<std::uint32_t> boundary;  // vertices of the boundary, counter-clockwise from (-1, -1)
   for (std::uint32_t k = 0; k < n; ++k) boundary.push_back(k);
   for (std::uint32_t k = 0; k < n; ++k) boundary.push_back(k * row + n);
   for (std::uint32_t k = 0; k < n; ++k) boundary.push_back(n * row + n - k);
@@ -419,8 +418,8 @@ TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& out
   return mesh;
 }
 
-/// Returns the wall of a paraboloid. The inner sheet is lowered by the parameter `depth` times relief(point
-/// of the unit disc).
+/// Returns the mesh of a bowl with a paraboloid as its outer side. The wall's thickness is the parameter
+/// `thickness` minus the parameter `depth` times relief(point of the unit disc).
 template <typename Relief>
 TriangleMesh bowlMesh(const Request& request, const Relief& relief) {
   const double radius = request["radius"], height = request["height"];
@@ -459,8 +458,8 @@ TriangleMesh marbleRunMesh(const Request& request) {
   const double outer = request["width"] / 2, inner = outer - request["thickness"];
   const std::uint32_t sides = request.whole("sides"), loop = 2 * (sides + 1);
   const std::uint32_t steps = request.whole("turns") * request.whole("steps");
-  // Make the points of the channel's cross-section, as (outwards, upwards). They run along the outside of the
-  // channel from lip to lip, and back along its inside.
+  // Make the cross-section of the channel as points (distance outwards, height). They run along the outside of
+  // the channel from lip to lip, and back along its inside.
   std::vector<Eigen::Vector2d> section;
   for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(outer * onCircle(sides + i, 2.0 * sides));
   for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(inner * onCircle(2.0 * sides - i, 2.0 * sides));
@@ -478,7 +477,7 @@ TriangleMesh marbleRunMesh(const Request& request) {
       const std::uint32_t a = step * loop + i, b = step * loop + (i + 1) % loop;
       addQuad(mesh, a, b, b + loop, a + loop);
     }
-  for (std::uint32_t i = 0; i < sides; ++i) {  // Close the two ends.
+  for (std::uint32_t i = 0; i < sides; ++i) {  // Close the two ends of the channel.
     const std::uint32_t last = steps * loop, back = loop - 1 - i;
     addQuad(mesh, i, back, back - 1, i + 1);
     addQuad(mesh, last + i, last + i + 1, last + back - 1, last + back);

@@ -13,7 +13,7 @@
 namespace hpsdf {
 namespace {
 
-/// Returns the longest side of the bounding box of a surface. Throws `Error` about `subject` if this side
+/// Returns the longest side of the bounding box of a surface. Throws an `Error` that names `subject` if this side
 /// is 0 or not finite.
 double longestSide(const Box& surface, const std::string& subject) {
   const double longest = surface.isEmpty() ? 0 : surface.sizes().maxCoeff();
@@ -48,9 +48,9 @@ Box boundingBox(const TriangleMesh& mesh) {
 double signedVolume(const TriangleMesh& mesh) {
   const Box box = boundingBox(mesh);
   if (box.isEmpty()) return 0;
-  // The volume is the sum over the tetrahedra that the triangles form with one common apex. A closed mesh has
-  // the same volume for any apex. With the box's centre as apex the terms are small, so that a mesh far from
-  // the origin loses no digits.
+  // The volume is the sum of the signed volumes of the tetrahedra between the triangles and a common apex. For a
+  // closed mesh it does not depend on the apex. With the box's centre as apex, the terms stay small, so that a
+  // mesh far from the origin loses no digits by cancellation.
   const Vector3 apex = box.center();
   double six = 0;
   for (const Triangle& triangle : mesh.triangles) {
@@ -88,9 +88,8 @@ TriangleMesh normalized(const TriangleMesh& mesh) {
   const Box box = boundingBox(mesh);
   const double longest = longestSide(box, mesh.name.empty() ? "mesh" : mesh.name);
   TriangleMesh result = mesh;
-  // (x - min) - (max - x) is 2(x - centre), but the centre is not rounded. On the longest side of the box the
-  // expression is exactly -longest at min and longest at max. It never decreases with x, so that no vertex
-  // leaves [-1, 1].
+  // (x - min) - (max - x) equals 2(x - centre) but avoids rounding the centre. Along the longest side of the box it is
+  // exactly -longest at min and +longest at max, and it never decreases with x. Therefore no vertex leaves [-1, 1].
   for (Vector3& v : result.vertices) v = ((v - box.min()) - (box.max() - v)) / longest;
   return result;
 }

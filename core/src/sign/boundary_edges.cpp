@@ -13,9 +13,9 @@
 namespace hpsdf::sign {
 namespace {
 
-constexpr std::uint32_t kFew = 512;      // fewer edges are always summed one by one
-constexpr std::uint32_t kSmallest = 8;   // clusters of at most so many edges are not halved
-constexpr double kCoarsestRatio = 0.25;  // greatest radius of a cluster over its distance
+constexpr std::uint32_t kFew = 512;      // fewer boundary edges than this are always summed one by one
+constexpr std::uint32_t kSmallest = 8;   // clusters of at most this many edges are not divided
+constexpr double kCoarsestRatio = 0.25;  // greatest ratio of a cluster's radius to its distance
 
 double cube(double x) { return x * x * x; }
 
@@ -76,7 +76,7 @@ void BoundaryEdges::Cluster::add(const Edge& edge) {
   const double edgeLength = along.norm();
   radius = std::max({radius, a.norm(), b.norm()});
   length += edgeLength;
-  cubes += edgeLength * (cube(a.norm()) + cube(b.norm())) / 2;  // convexity: mean ≤ mean of both ends
+  cubes += edgeLength * (cube(a.norm()) + cube(b.norm())) / 2;  // bound: |d|³ is convex along the edge
   first += along;
   second += sum / 2 * along.transpose();
   const Eigen::Matrix3d spread = (a * a.transpose() + b * b.transpose() + sum * sum.transpose()) / 6;
@@ -98,8 +98,8 @@ inline void BoundaryEdges::Edge::addTo(Gradient& sum, const Vector3& local) cons
   const double below = product * (product + a.dot(b));
   if (below > 0) sum.value += multiplicity * (la + lb) / below * a.cross(b);
   const double nearest = (a + bvh::closestParameter(Vector3::Zero(), a, b) * along).norm();
-  // The derivative of the edge's part is at most the integral of 2/r³ along the edge. This integral is at
-  // most the edge's length times 2/nearest³, and at most that of an infinite line at the distance `nearest`.
+  // The derivative of this edge's contribution is at most the integral of 2/r³ along the edge. This integral is at most
+  // the edge's length times 2/nearest³, and at most the integral along an infinite line at the distance `nearest`.
   sum.derivative += 2 * std::abs(multiplicity) * std::min(along.norm() / nearest, 2.0) / (nearest * nearest);
   sum.edgeDistance = std::min(sum.edgeDistance, nearest);
   ++sum.terms;
@@ -116,11 +116,11 @@ BoundaryEdges::Gradient BoundaryEdges::sum(const Vector3& local, double ratio) c
       const double nearest = distance - cluster.radius;
       sum.value += cluster.series(toCenter, squared);
       sum.error += errorFactor * cluster.cubes / (squared * squared * distance);
-      sum.derivative += 2 * cluster.length / cube(nearest);  // as if all edges were as near as the cluster's sphere
+      sum.derivative += 2 * cluster.length / cube(nearest);  // bound: every edge is at least `nearest` away
       sum.edgeDistance = std::min(sum.edgeDistance, nearest);
       ++sum.terms;
       n = cluster.next;
-    } else if (++n == cluster.next) {  // the cluster has no parts
+    } else if (++n == cluster.next) {  // the cluster is not divided into smaller clusters
       for (std::uint32_t e = cluster.begin; e < cluster.end; ++e) edges_[e].addTo(sum, local);
     }
   }

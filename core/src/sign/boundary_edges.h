@@ -11,21 +11,21 @@
 
 namespace hpsdf::sign {
 
-/// The unbalanced edges of a mesh: boundary edges, and edges along which more triangles run in one
-/// direction than in the other. These edges determine the gradient of the mesh's winding number.
+/// The unbalanced edges of a mesh: boundary edges, and edges along which more triangles run in one direction than in
+/// the other. The unbalanced edges determine the gradient of the mesh's winding number.
 ///
-/// The gradient is the magnetic field of a current along these edges, 1/4π ∫ r/|r|³ × dl, where r runs from
-/// the point to the edge (Biot and Savart). The reason is that a solid angle depends only on the outline of
-/// a surface. A closed mesh has no such edges, and its winding number is constant up to the surface.
+/// The gradient is the magnetic field of a current along the unbalanced edges, 1/4π ∫ r/|r|³ × dl, where r runs from
+/// the point to the edge (Biot and Savart), because a solid angle depends only on the outline of a surface. A closed
+/// mesh has no unbalanced edges, and its winding number is constant up to the surface.
 ///
-/// A cluster of edges that is far enough away is replaced by the Taylor series of r/|r|³ about the
-/// cluster's center, up to second order. If all edges of the cluster lie within r of its center, and the
-/// center is at the distance R from the point, the truncation error is at most
+/// A cluster of edges that is far enough away is replaced by the Taylor series of r/|r|³ about the cluster's center, up
+/// to second order. If all edges of the cluster lie within r of its center, and the center is at the distance R from
+/// the point, the truncation error is at most
 ///
 ///   B/4πR⁵ (4 − 3t)/(1 − t)²,  t = r/R,  B = ∫ |d|³ dl,  d from the center.
 ///
-/// The bound follows from the solid harmonics in the comment of `WindingNumber`: it is the sum of l
-/// |d|^(l−1)/R^(l+1) over l ≥ 4.
+/// The bound is the sum of l |d|^(l−1)/R^(l+1) over l ≥ 4. It follows from the solid harmonics in the comment of
+/// `WindingNumber`.
 class BoundaryEdges {
  public:
   BoundaryEdges() = default;
@@ -42,12 +42,12 @@ class BoundaryEdges {
     Vector3 value = Vector3::Zero();
     double error = 0;                ///< bound of the distance between `value` and the exact sum
     double derivative = 0;           ///< bound of the gradient's derivative in any direction
-    double edgeDistance = HUGE_VAL;  ///< lower bound of the distance to the nearest of the edges
+    double edgeDistance = HUGE_VAL;  ///< lower bound of the distance to the nearest unbalanced edge
     std::size_t terms = 0;           ///< number of edges and clusters that were summed
   };
 
-  /// Returns the gradient of the winding number, summed over clusters of edges. The clusters are as coarse as
-  /// an error of at most `error` permits. The sum is exact if `error` is 0.
+  /// Returns the gradient of the winding number, summed over clusters of edges that are as coarse as possible for an
+  /// error of at most `error`. The sum is exact if `error` is 0.
   Gradient gradient(const Vector3& local, double error) const;
 
   std::size_t bytes() const { return edges_.size() * sizeof(Edge) + clusters_.size() * sizeof(Cluster); }
@@ -61,15 +61,15 @@ class BoundaryEdges {
     void addTo(Gradient& sum, const Vector3& local) const;
   };
 
-  /// The edges [begin, end) with their moments ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl. Here d runs
-  /// from the cluster's center to the edge, and dl contains the edge's multiplicity.
+  /// A cluster of the edges [begin, end) with its moments ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl. Here d
+  /// runs from the cluster's center to the edge, and dl contains the edge's multiplicity.
   struct Cluster {
     std::uint32_t begin = 0, end = 0;
-    std::uint32_t next = 0;  ///< index of the first cluster that is not a part of this one
+    std::uint32_t next = 0;  ///< index of the next cluster that is not a part of this cluster
     Vector3 center = Vector3::Zero();
-    double radius = HUGE_VAL;  ///< r of the error bound; infinite until measured, so that the series is never used
-    double cubes = 0;          ///< B of the error bound
-    double length = 0;         ///< sum of the edges' lengths times their multiplicities
+    double radius = HUGE_VAL;  ///< r of the error bound; infinite until it is computed, so that the series is not used
+    double cubes = 0;          ///< upper bound of B = ∫ |d|³ dl in the error bound
+    double length = 0;         ///< sum of the edges' lengths times their absolute multiplicities
     Vector3 first = Vector3::Zero();
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
     std::array<Eigen::Matrix3d, 3> third = {second, second, second};
@@ -87,7 +87,7 @@ class BoundaryEdges {
   Gradient sum(const Vector3& local, double ratio) const;
 
   std::vector<Edge> edges_;
-  std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes its parts
+  std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes the clusters into which it is divided
 };
 
 }  // namespace hpsdf::sign

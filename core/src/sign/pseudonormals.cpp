@@ -11,8 +11,8 @@
 namespace hpsdf::sign {
 namespace {
 
-/// The corners of all triangles, grouped by vertex. Corner k of the triangle in slot s has the number 3·s +
-/// k. The corners of vertex v are at [first[v], first[v + 1]), in the order of the mesh's triangles.
+/// The corners of all triangles, grouped by vertex. Corner k of triangle s, in the hierarchy's order of triangles, has
+/// the number 3·s + k. The corners of vertex v are at [first[v], first[v + 1]), in the order of the mesh's triangles.
 struct CornersByVertex {
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> corners;
@@ -20,7 +20,7 @@ struct CornersByVertex {
 
 CornersByVertex groupCorners(const bvh::Hierarchy& hierarchy) {
   const auto triangles = hierarchy.triangles();
-  std::vector<std::uint32_t> slots(triangles.size());  // by index in the mesh
+  std::vector<std::uint32_t> slots(triangles.size());  // position of each mesh triangle in the hierarchy's order
   tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t slot) {
     slots[hierarchy.frames()[slot].triangle] = static_cast<std::uint32_t>(slot);
   });
@@ -48,8 +48,8 @@ class VertexVisitor {
         vertices_(hierarchy.vertices()),
         nextSide_(nextSide) {}
 
-  /// Returns the pseudonormal of a vertex, computed from all `corners` at the vertex. Links the triangle
-  /// sides at each edge between this vertex and a vertex whose index is not lower.
+  /// Returns the pseudonormal of a vertex, computed from all `corners` at the vertex. Also links the triangle sides at
+  /// each edge from this vertex to a vertex whose index is not lower.
   Vector3 visit(std::uint32_t vertex, std::span<const std::uint32_t> corners) {
     sides_.clear();
     numbers_.clear();
@@ -75,7 +75,7 @@ class VertexVisitor {
 
   void linkSides() {
     std::sort(sides_.begin(), sides_.end());
-    std::size_t first = 0;  // side at the current edge
+    std::size_t first = 0;  // index of the first side at the current edge
     for (std::size_t i = 0; i < sides_.size(); ++i) {
       const bool last = i + 1 == sides_.size() || sides_[i + 1] >> 32 != sides_[i] >> 32;
       nextSide_[numberOf(sides_[i])] = numberOf(sides_[last ? first : i + 1]);
@@ -91,7 +91,7 @@ class VertexVisitor {
   /// Keys that group the sides at the current vertex by edge when sorted. The high half of a key is the other
   /// vertex of the side, the low half is the side's index in `numbers_`.
   std::vector<std::uint64_t> sides_;
-  std::vector<std::uint32_t> numbers_;  ///< side numbers 3·slot + k
+  std::vector<std::uint32_t> numbers_;  ///< numbers 3·slot + k of the sides at the current vertex
 };
 
 }  // namespace

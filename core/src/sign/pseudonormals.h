@@ -12,9 +12,8 @@ namespace hpsdf::sign {
 /// normalised, because only the signs of dot products with them are used. Triangles without area do not
 /// contribute.
 ///
-/// Vertex pseudonormals are stored. Edge pseudonormals are summed on demand: a query needs an edge
-/// pseudonormal only if all triangles at that edge are the nearest ones, and the search has just visited
-/// these triangles.
+/// Vertex pseudonormals are stored. Edge pseudonormals are summed on demand: a query needs one only if the closest
+/// point lies on the edge, and then the search has just visited the triangles at the edge.
 class Pseudonormals {
  public:
   Pseudonormals() = default;
@@ -23,17 +22,16 @@ class Pseudonormals {
   /// Returns the sum of corner angle times unit normal over the triangles at a vertex.
   const Vector3& ofVertex(std::uint32_t vertex) const { return vertices_[vertex]; }
 
-  /// Returns the sum of the unit normals of all triangles at an edge. The edge is side k of the triangle in
-  /// `slot`, from the triangle's corner k to its corner k + 1. `hierarchy` is the one that the constructor
-  /// received.
+  /// Returns the sum of the unit normals of all triangles at an edge. The edge is side k of the triangle in `slot`,
+  /// from the triangle's corner k to its corner k + 1. `hierarchy` must be the one that the constructor received.
   Vector3 ofEdge(const bvh::Hierarchy& hierarchy, std::uint32_t slot, std::uint32_t k) const;
 
   std::size_t bytes() const;
 
  private:
   std::vector<Vector3> vertices_;
-  /// For each triangle side, with the number 3·slot + k, the number of the next side at the same edge. The
-  /// sides at an edge form a cycle in the order of the mesh's triangles.
+  /// For each triangle side, with the number 3·slot + k, the number of the next side at the same edge. The sides at an
+  /// edge form a cycle in the order of the mesh's triangles.
   std::vector<std::uint32_t> nextSide_;
 };
 

@@ -8,8 +8,8 @@
 
 namespace hpsdf::sign {
 
-/// A sum of angles that needs only one arc tangent in all. It multiplies complex numbers that have these
-/// angles, and counts the full turns.
+/// A sum of angles that needs only one arc tangent in all. It multiplies complex numbers that have the angles as
+/// arguments, and counts the full turns.
 class AngleSum {
  public:
   /// Adds the angle of the complex number x + iy, in (−π, π]. Adds nothing if x and y are 0.

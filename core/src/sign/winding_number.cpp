@@ -12,21 +12,21 @@
 namespace hpsdf::sign {
 namespace {
 
-/// The truncation error that one cluster may have at each accuracy level. A winding number is a sum over
-/// about a hundred clusters.
+/// The greatest truncation error of one cluster at each accuracy level. A winding number is a sum over about a hundred
+/// clusters.
 constexpr std::array<double, WindingNumber::kLevels> kErrors = {1e-2, 5e-4, 2e-5, 5e-7};
 
 double square(double x) { return x * x; }
 
-/// Returns the bound of the truncation error that the comment of `WindingNumber` states, with `ratio` for
-/// t. Returns infinity if the series need not converge.
+/// Returns the bound of the Taylor series' truncation error, A/4πR² (1/(1−t)² − 1 − 2t − 3t²), where A is `area` and t
+/// is `ratio`. Returns infinity if t is 1 or more, because the series need not converge.
 double truncationError(double area, double squaredDistance, double ratio) {
   if (!(ratio < 1)) return HUGE_VAL;
   return area / (4 * std::numbers::pi * squaredDistance) * (1 / square(1 - ratio) - 1 - ratio * (2 + 3 * ratio));
 }
 
-/// Returns the square of the smallest distance at which the truncation error is at most `error`. Finds it
-/// by bisection of the ratio t = radius / distance.
+/// Returns the square of the smallest distance from a cluster at which the truncation error of the cluster's Taylor
+/// series is at most `error`. Finds it by bisection of the ratio t = radius / distance.
 double squaredFarDistance(double area, double radius, double error) {
   if (radius == 0) return 0;
   double low = 0, high = 1;
@@ -91,7 +91,7 @@ void WindingNumber::Moments::add(const std::array<Vector3, 3>& v) {
     radius = std::max(radius, distance);
     cubes += distance * distance * distance;
   }
-  area += normal.norm() * cubes / 3;  // a convex function's mean is at most that of its corner values
+  area += normal.norm() * cubes / 3;  // a convex function's mean is at most the mean of its corner values
   const Eigen::Matrix3d spread =
       (v[0] * v[0].transpose() + v[1] * v[1].transpose() + v[2] * v[2].transpose() + sum * sum.transpose()) / 12;
   first += normal;
@@ -154,7 +154,7 @@ WindingNumber::Estimate WindingNumber::estimate(const Vector3& x, int level) con
       series += moments_[n].series(toCenter, squared);
       all.error += moments_[n].error(squared);
       n = cluster.next;
-    } else if (++n == cluster.next) {  // the cluster is a block
+    } else if (++n == cluster.next) {  // the cluster has no children
       all.value += sumOver(local, cluster.begin, cluster.end);
     }
   }

@@ -31,7 +31,7 @@ class WindingNumber {
 
   struct Estimate {
     double value = 0;
-    double error = 0;  ///< bound of the distance to the exact sum
+    double error = 0;  ///< bound of the difference between `value` and the exact sum
   };
 
   /// Bound of the rounding error of a sum of up to `Hierarchy::kMaxTriangles` solid angles.
@@ -48,7 +48,7 @@ class WindingNumber {
   double exact(const Vector3& x) const;
 
   /// Returns the estimate of the coarsest level whose error is at most `error` or whose estimate satisfies
-  /// `isEnough(estimate)`. Returns the exact sum if there is no such level.
+  /// `isEnough(estimate)`. If no level does, returns the exact sum.
   template <typename Enough>
   Estimate estimateWithin(const Vector3& x, double error, Enough isEnough) const {
     for (int level = 0; level < kLevels; ++level)
@@ -67,19 +67,19 @@ class WindingNumber {
   /// these triangles.
   struct Cluster {
     Vector3 center = Vector3::Zero();                     ///< in the hierarchy's local coordinates
-    std::array<double, kLevels> squaredFarDistance = {};  ///< distances from the center, by accuracy level
-    std::uint32_t next = 0;                               ///< index of the first cluster that is not a part of this one
+    std::array<double, kLevels> squaredFarDistance = {};  ///< square of the least distance for the series, by level
+    std::uint32_t next = 0;                               ///< index of the next cluster that is not a part of this one
     std::uint32_t begin = 0, end = 0;                     ///< range of triangle slots
   };
 
-  /// ∫n dA, and the symmetric parts of ∫n⊗d dA (xx, yy, zz, xy, xz, yz) and ∫n⊗d⊗d dA (xxx, yyy, zzz, xxy,
-  /// xxz, xyy, yyz, xzz, yzz, xyz). Here d runs from the cluster's center to the surface. The remaining parts
-  /// of the tensors cancel in the Taylor series.
+  /// The moments of a cluster: ∫n dA, and the symmetric parts of ∫n⊗d dA (xx, yy, zz, xy, xz, yz) and ∫n⊗d⊗d dA (xxx,
+  /// yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz), where n is the normal and d runs from the cluster's center to the
+  /// surface. The remaining parts of the tensors cancel in the Taylor series.
   struct Moments {
     Vector3 first = Vector3::Zero();
     std::array<double, 6> second = {};
     std::array<double, 10> third = {};
-    double area = 0, radius = 0;  ///< A and r of the error bound
+    double area = 0, radius = 0;  ///< A and r in the bound of the truncation error
 
     /// Adds the moments of a triangle whose corners `v` are relative to the cluster's center.
     void add(const std::array<Vector3, 3>& v);
@@ -97,7 +97,7 @@ class WindingNumber {
   double sumOver(const Vector3& local, std::uint32_t begin, std::uint32_t end) const;
 
   const bvh::Hierarchy* hierarchy_ = nullptr;
-  std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes its parts
+  std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes the clusters into which it is divided
   std::vector<Moments> moments_;   ///< one for each cluster
   std::vector<Vector3> vertices_;  ///< the hierarchy's vertices in its local coordinates
 };

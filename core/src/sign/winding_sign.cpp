@@ -11,16 +11,16 @@
 namespace hpsdf::sign {
 namespace {
 
-constexpr std::size_t kBatch = 512;  // number of points whose signs may follow from each other's winding numbers
-/// The error of the winding number from which the distance to the surface that closes a hole is computed. A
-/// greater error would be noise in the distance, which refinement of the field would try to resolve.
+constexpr std::size_t kBatch = 512;  // number of points whose signs may be derived from each other
+/// Tolerated error of the winding number from which the distance to a closing surface (which closes a hole) is
+/// computed. A greater error would add noise to the distance, which the refinement of the field would try to resolve.
 constexpr double kExact = 2e-3;
-/// The tolerated errors of the gradient of the winding number: each is a change of the winding number,
-/// divided by the distance to the triangles. `kRoughChange` usually suffices to show that no closing
-/// surface is nearer than the triangles. `kExactChange` adds little to the noise of `kExact`.
+/// Tolerated errors of the winding number's gradient, multiplied by the distance to the triangles. `kRoughChange`
+/// usually suffices to show that the surface which closes a hole is farther away than the triangles. `kExactChange` is
+/// small enough to add little to the noise of `kExact`.
 constexpr double kRoughChange = 0.1, kExactChange = kExact / 4;
 
-/// Returns the indices of the distances, the greatest first; those that are not finite come last.
+/// Returns the indices of the distances, sorted from the greatest to the least distance. Infinities and NaNs come last.
 std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
   std::vector<std::uint32_t> order(distances.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -42,10 +42,10 @@ struct WindingSign::Sample {
   double clearance;  ///< lower bound of the distance to the triangles
   double distance;   ///< distance to the surface, including the surfaces that close holes
   bool inside;
-  double margin = 0;        ///< lower bound of |w − level|
+  double margin = 0;        ///< lower bound of |w − level| for the winding number w
   double gradient = 0;      ///< upper bound of |∇w|
   double derivative = 0;    ///< upper bound of the derivative of ∇w in any direction
-  double edgeDistance = 0;  ///< lower bound of the distance to the boundary edges, at least `clearance`
+  double edgeDistance = 0;  ///< lower bound of the distance to the unbalanced edges, at least `clearance`
 
   /// Returns the sample for a point x with known distances, derived from this sample. If x is too far away,
   /// the margin of the new sample is 0, which means unknown.
@@ -55,8 +55,8 @@ struct WindingSign::Sample {
     return movedBy(std::sqrt(squaredStep), x, itsClearance, itsDistance);
   }
 
-  /// Returns true if all points within `radius` of this point are on the same side as this point, except
-  /// points that a triangle separates from it.
+  /// Returns true if all points within `radius` of this point are certainly on the same side (inside or outside) as
+  /// this point, except points that a triangle separates from it.
   bool holdsWithin(double radius) const {
     return radius < edgeDistance && movedBy(radius, position, 0, radius).margin > 0;
   }
@@ -66,8 +66,8 @@ struct WindingSign::Sample {
   bool isCertain() const { return margin > 2 * kExact + 1.01 * gradient * distance; }
 
  private:
-  /// After a step of length s every boundary edge is still at least 1 − s/edgeDistance times as far away as
-  /// before. The bound of the derivative grows at most by the inverse cube of this factor.
+  /// Returns the sample after a step of length s. Every boundary edge is then still at least 1 − s/edgeDistance times
+  /// as far away as before. The bound of the derivative grows at most by the inverse cube of this factor.
   Sample movedBy(double step, const Vector3& x, double itsClearance, double itsDistance) const {
     const double nearer = 1 - step / edgeDistance;
     const double changes = derivative / (nearer * nearer * nearer), steepest = gradient + changes * step;
@@ -126,8 +126,8 @@ void WindingSign::applyTo(std::span<double> distances, std::span<const Vector3> 
 void WindingSign::applyToBatch(std::span<double> distances, std::span<const Vector3> points,
                                std::span<const double> clearances, std::vector<Sample>& samples) const {
   samples.clear();
-  // Points far from all triangles come first, because their samples decide the sides of the greatest number
-  // of other points.
+  // Points far from all triangles come first, because the signs of the greatest number of other points follow from
+  // their samples.
   for (const std::uint32_t i : farthestFirst(clearances)) {
     Sample here = {points[i], clearances[i], distances[i], false};
     for (const Sample& other : samples)

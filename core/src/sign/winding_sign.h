@@ -8,8 +8,8 @@
 
 namespace hpsdf::sign {
 
-/// Returns a distance from a triangle at which points in front of it and behind it can be probed. The
-/// distance exceeds the rounding errors of coordinates in a mesh with the bounding box `box`.
+/// Returns a distance from a triangle at which a point in front of the triangle and a point behind it can be probed.
+/// The distance exceeds the rounding errors of coordinates in a mesh with the bounding box `box`.
 double probeDistance(const Box& box);
 
 /// The sign of distances to a mesh by the winding number: a point is inside if its winding number is above
@@ -33,20 +33,21 @@ class WindingSign {
     applyTo(distances, points, distances);
   }
 
-  /// Replaces unsigned distances by signed distances for a mesh in which some triangles do not count as
-  /// surface. `distances` are the distances to the nearest triangle that counts, `clearances` those to the
-  /// nearest of all triangles. For outside points the result is the clearance, because a triangle with the
-  /// inside on both of its sides lies behind other triangles.
+  /// Replaces unsigned distances by signed distances for a mesh in which some triangles do not count as surface.
+  /// `distances` are the distances to the nearest triangle that counts, `clearances` the distances to the nearest of
+  /// all triangles. Outside points use the clearance, because from outside a triangle with the inside on both sides is
+  /// hidden behind others.
   void applyTo(std::span<double> distances, std::span<const Vector3> points, std::span<const double> clearances) const;
 
-  /// Returns true if the triangle in `slot` has the outside in front of its centroid and the inside behind
-  /// it. Compares the winding number of all other triangles at the centroid with the mean of the values on
-  /// both sides of the triangle. Probing a point on each side instead could jump over a nearby wall.
+  /// Returns true if the triangle in `slot` has the outside in front of its centroid and the inside behind it. At the
+  /// centroid, the winding number of all other triangles is the mean of the values on both sides of the triangle and
+  /// must be about ½, or −½ for a mesh that is oriented inward. Probing a point on each side instead could jump over a
+  /// nearby wall.
   bool separatesOutsideFromInside(std::uint32_t slot) const;
 
   bool isInside(const Vector3& x) const;
 
-  /// Returns true if it is certain that all points within `radius` of x are on the same side as x, except
+  /// Returns true if all points within `radius` of x are certainly on the same side (inside or outside) as x, except
   /// points that a triangle separates from x.
   bool isSameSideWithin(const Vector3& x, double radius) const;
 

@@ -25,8 +25,8 @@ bool inBox(const Vector3& x, const Vector3& a, const Vector3& b, const Axes& axe
   return std::ranges::all_of(axes, [&](int k) { return std::min(a[k], b[k]) <= x[k] && x[k] <= std::max(a[k], b[k]); });
 }
 
-/// Returns two coordinate axes: the triangle, projected onto the plane of these axes, has an area. Returns
-/// twice the same axis if the triangle is degenerate.
+/// Returns two coordinate axes onto whose plane the triangle projects with an area. Returns the same axis twice
+/// if the triangle is degenerate.
 Axes projectionAxes(const Corners& t) {
   for (const Axes axes : {Axes{0, 1}, Axes{1, 2}, Axes{2, 0}})
     if (orientation(axes, t[0], t[1], t[2]) != 0) return axes;
@@ -53,7 +53,8 @@ bool segmentsIntersect(const Vector3& a, const Vector3& b, const Vector3& c, con
          (atA == 0 && inBox(a, c, d, axes)) || (atB == 0 && inBox(b, c, d, axes));
 }
 
-/// Returns true if a closed segment intersects a closed triangle that is not degenerate.
+/// Returns true if a segment and a triangle have a point in common, including end points and boundary. The triangle
+/// must not be degenerate.
 bool segmentIntersects(const Vector3& from, const Vector3& to, const Corners& t) {
   const int start = orientation(t[0], t[1], t[2], from), end = orientation(t[0], t[1], t[2], to);
   if (start * end > 0) return false;
@@ -80,9 +81,9 @@ bool lieOnOneSide(const Corners& t, std::span<const Vector3> points) {
   return static_cast<std::size_t>(std::abs(sum)) == points.size();
 }
 
-/// Returns true if two triangles that share their first corner have another point in common. The ray from
-/// the shared corner through such a point leaves one of the triangles through the edge opposite to the
-/// corner, at a point of the other triangle.
+/// Returns true if two triangles that share their first corner have another point in common. It suffices to test
+/// the edges opposite to the shared corner: the ray from this corner through a common point leaves one of the
+/// triangles through its opposite edge, at a point of the other triangle.
 bool intersectBeyondCorner(const Corners& one, const Corners& other) {
   if (lieOnOneSide(one, {other.begin() + 1, 2}) || lieOnOneSide(other, {one.begin() + 1, 2})) return false;
   return segmentIntersects(one[1], one[2], other) || segmentIntersects(other[1], other[2], one);
@@ -109,10 +110,10 @@ int moveSharedToFront(Indices& one, Indices& other) {
   return shared;
 }
 
-// The distance tests below may round, because they only detect triangles that are too close together for
-// pseudonormals.
+// The distance tests below need not be exact, because they only detect triangles that are too close together for
+// an inside test by pseudonormals.
 
-/// Returns the squared distance of the segments ab and cd.
+/// Returns the squared distance between the segments ab and cd.
 double squaredDistance(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
   const auto toSegment = [](const Vector3& x, const Vector3& from, const Vector3& to) {
     return (from + bvh::closestParameter(x, from, to) * (to - from) - x).squaredNorm();
@@ -142,8 +143,8 @@ bool lieFarOnOneSide(const Corners& t, std::span<const Vector3> points, double m
   return std::max(above, below) == static_cast<int>(points.size());
 }
 
-/// Returns true if a point, a segment or the boundary of a triangle comes nearer to the triangle t than
-/// `margin`. The number of `corners` (1, 2 or 3) tells which of the three is given.
+/// Returns true if the distance between `corners` and the triangle t is less than `margin`. One corner stands for
+/// a point, two for a segment, three for the boundary of a triangle.
 bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
   if (lieFarOnOneSide(t, corners, margin)) return false;
   const bvh::TriangleFrame frame = bvh::makeFrame(t, 0);
@@ -157,18 +158,18 @@ bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
   return false;
 }
 
-/// Returns true if two triangles come nearer to each other than `margin` at any place except their shared
-/// corners. The `shared` corners come first in both triangles.
+/// Returns true if the corners of one triangle that are not shared, or the edges between these corners, come
+/// nearer to the other triangle than `margin`, or vice versa. The `shared` corners come first in both triangles.
 bool areNear(const Corners& one, const Corners& other, int shared, double margin) {
   const auto unshared = [&](const Corners& t) { return std::span(t).subspan(static_cast<std::size_t>(shared)); };
   return isNear(one, unshared(other), margin) || isNear(other, unshared(one), margin);
 }
 
-/// Finds the pairs of triangles that intersect, by a tree of bounding boxes. Each box contains up to four
-/// boxes of the next lower level, which are neighbours in the hierarchy's order.
+/// Finds pairs of intersecting triangles by a tree of axis-aligned bounding boxes. Each box contains up to four
+/// boxes of the next lower level; the lowest boxes bound the triangles in the order of the hierarchy.
 class Finder {
  public:
-  /// `margin` has the meaning of the parameter `margin` of `findCrossings`.
+  /// `margin` is the distance below which triangles count as intersecting, as in `findCrossings`.
   Finder(const bvh::Hierarchy& hierarchy, double margin)
       : hierarchy_(hierarchy), margin_(margin), vertices_(hierarchy.vertices().size()) {
     const double scale = scaleToOne(hierarchy.vertices());
@@ -177,8 +178,9 @@ class Finder {
     makeBoxes();
   }
 
-  /// Returns the crossings of the triangles in the slots [begin, end) with triangles in later slots, sorted
-  /// by the earlier slot. Returns std::nullopt if there are `most` crossings or more.
+  /// Returns the crossings of the triangles at the positions (slots) [begin, end) of the hierarchy's order with
+  /// triangles at later positions, sorted by the earlier position. Returns std::nullopt if there are `most`
+  /// crossings or more.
   std::optional<std::vector<Crossing>> findFewer(std::uint32_t begin, std::uint32_t end, std::size_t most,
                                                  const Progress& progress) const {
     std::vector<std::vector<Crossing>> ofSlot(end - begin);
@@ -196,7 +198,8 @@ class Finder {
     return found;
   }
 
-  /// Returns the first `most` crossings of the triangle in `slot` with triangles in later slots.
+  /// Returns the first `most` crossings of the triangle at the position `slot` of the hierarchy's order with
+  /// triangles at later positions.
   std::vector<Crossing> findFirst(std::uint32_t slot, std::size_t most) const {
     std::vector<Crossing> found;
     find(slot, [&](const Crossing& crossing) {
@@ -207,14 +210,14 @@ class Finder {
   }
 
  private:
-  /// Calls take(crossing) for each crossing of the triangle in `slot` with a triangle in a later slot, until
-  /// `take` returns false.
+  /// Calls take(crossing) for each crossing of the triangle at the position `slot` of the hierarchy's order with
+  /// a triangle at a later position, until `take` returns false.
   template <typename Take>
   void find(std::uint32_t slot, const Take& take) const {
     if (!isDegenerate(corners(slot))) visit(static_cast<int>(levels_.size()) - 1, 0, slot, take);
   }
 
-  static constexpr std::uint32_t kWidth = 4;  ///< boxes in a box of the next level
+  static constexpr std::uint32_t kWidth = 4;  ///< number of boxes that one box of the next higher level contains
 
   Corners cornersOf(const Indices& t) const { return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]}; }
   Corners corners(std::uint32_t slot) const { return cornersOf(hierarchy_.triangles()[slot]); }
@@ -270,9 +273,9 @@ class Finder {
 
   const bvh::Hierarchy& hierarchy_;
   double margin_;
-  std::vector<Vector3> vertices_;         ///< the hierarchy's vertices, scaled to order 1
-  double unit_;                           ///< factor from `vertices_` to mesh units
-  std::vector<std::vector<Box>> levels_;  ///< boxes of the triangles by slot, of four of them, of sixteen, …
+  std::vector<Vector3> vertices_;         ///< vertices of the hierarchy, scaled to magnitudes of about 1
+  double unit_;                           ///< factor that converts `vertices_` to mesh units
+  std::vector<std::vector<Box>> levels_;  ///< level n holds the boxes of 4^n consecutive triangles each
 };
 
 }  // namespace
@@ -318,10 +321,9 @@ Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, doub
   const auto add = [&](const std::vector<Crossing>& found) {
     crossings.found.insert(crossings.found.end(), found.begin(), found.end());
   };
-  // Search the slots in ranges whose size grows up to a fiftieth of all slots. If a range has more crossings
-  // than `limit` allows, its search is stopped early and the range is halved, until the slot is found at
-  // which the limit is reached. Therefore a heap of triangles that all intersect each other is neither
-  // searched completely nor stored.
+  // Search the triangles in ranges that grow up to a fiftieth of all triangles. If a range has more crossings than
+  // `limit` allows, its search is stopped early and the range is halved, until the triangle is found at which the
+  // limit is reached. Even if all triangles intersect each other, most pairs thus are neither tested nor stored.
   constexpr std::uint32_t kLeast = 64;
   const std::uint32_t largest = std::max(kLeast, count / 50);
   std::uint32_t size = kLeast;

@@ -13,26 +13,24 @@ namespace hpsdf::surface {
 /// The positions of the corners of a triangle.
 using Corners = std::array<Vector3, 3>;
 
-/// Returns true if two triangles have a point in common. The test is exact. The magnitude of the
-/// coordinates must be about 1.
+/// Returns true if two triangles have a point in common. The test is exact for coordinates with magnitudes of about 1.
 bool intersect(const Corners& one, const Corners& other);
 
-/// Returns true if an edge of the triangle `other` intersects the coplanar triangle `one`. Only the edges
-/// of `other` that `counts` selects are tested. Both triangles are projected along the axis in whose
-/// direction `other` shows the greatest area.
+/// Returns true if an edge of the triangle `other` intersects the coplanar triangle `one`. Only edges k of
+/// `other` with counts[k] = true are tested. Both triangles are projected along the coordinate axis along which
+/// the projection of `other` has the greatest area.
 bool edgesIntersect(const Corners& one, const Corners& other, const std::array<bool, 3>& counts);
 
-/// Returns true if two triangles are coplanar, up to rounding. The magnitude of their coordinates must be
-/// about 1.
+/// Returns true if two triangles are coplanar, up to rounding. The magnitude of their coordinates must be about 1.
 bool areCoplanar(const Corners& one, const Corners& other);
 
 /// Returns a factor that scales coordinates to a magnitude of about 1. The factor is a power of two, so
 /// that scaling is exact.
 double scaleToOne(std::span<const Vector3> vertices);
 
-/// Finds the crossings of a hierarchy's triangles like `hpsdf::findCrossings`, with triangle indices of the
-/// mesh. If `margin` is above 0, triangles nearer to each other than `margin` count as crossing too.
-/// `margin` is in coordinates scaled to a magnitude of about 1. The distance test is subject to rounding.
+/// Finds at most `limit` pairs of intersecting triangles in a hierarchy, as `hpsdf::findCrossings` does, and
+/// returns them with the triangles' indices in the mesh. If `margin` is above 0, triangles nearer to each other
+/// than `margin` count too, up to rounding. `margin` is in coordinates scaled by `scaleToOne`.
 Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress);
 
 }  // namespace hpsdf::surface

@@ -8,7 +8,7 @@
 namespace hpsdf::surface {
 namespace {
 
-/// An exact result of an operation: the unevaluated sum of the rounded result and its rounding error.
+/// The exact result of an arithmetic operation: the unevaluated sum of the rounded result and its rounding error.
 struct Exact {
   double value, rest;
 };
@@ -59,7 +59,7 @@ class ExactSum {
       }
   }
 
-  /// Returns the sign of the sum, which is that of its greatest part.
+  /// Returns the sign of the sum, which is the sign of its part with the greatest magnitude.
   int sign() const { return count_ == 0 ? 0 : parts_[count_ - 1] > 0 ? 1 : -1; }
 
  private:

@@ -11,8 +11,8 @@ namespace hpsdf::surface {
 /// as products of three coordinates neither overflow nor underflow.
 int orientation(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d);
 
-/// Returns the exact sign of (b − a) × (c − a), after projection of the points to the plane of two
-/// coordinate axes.
+/// Returns the exact sign of (b − a) × (c − a), after projection of the points to the plane of the two coordinate
+/// axes `axes`.
 int orientation(const std::array<int, 2>& axes, const Vector3& a, const Vector3& b, const Vector3& c);
 
 }  // namespace hpsdf::surface

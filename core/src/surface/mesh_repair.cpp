@@ -23,28 +23,26 @@ namespace hpsdf {
 namespace surface {
 namespace {
 
-/// The bodies of a surface. Several patches form one body if only their union is closed. At each edge of
-/// the union as many triangles run in one direction as in the other, and solid material lies between the
-/// patches. Solids that touch along an edge or in a shared wall (`redundantFaces`) are different bodies.
-/// Every other patch is a body of its own.
+/// The bodies of a surface, made of patches: sets of triangles that are connected across edges of exactly two
+/// triangles. Several patches form one body if only their union is closed and solid material lies between them. Every
+/// other patch is a body of its own. Solids that touch along an edge or in a shared wall are different bodies.
 struct Bodies {
-  std::vector<std::uint32_t> ofPatch;  ///< for each patch its body: the lowest index of the body's patches
-  std::vector<char> closed;            ///< for each patch 1 if its body is closed; such bodies have no one-sided patch
+  std::vector<std::uint32_t> ofPatch;  ///< for each patch, its body: the lowest index of a patch of the body
+  std::vector<char> closed;            ///< for each patch, 1 if its body is closed and thus has no one-sided patch
 };
 
 /// Angle in radians below which two faces count as coplanar.
 constexpr double kSameAngle = 1e-9;
 
-/// Returns true if an edge has exactly two faces, both of the same patch, which run along the edge in
-/// opposite directions. Most edges are like this.
+/// Returns true if an edge has exactly two faces, both of the same patch, and these run along the edge in
+/// opposite directions.
 bool isWithinPatch(const mesh::Patches& patches, std::span<const mesh::DirectedEdge> edge) {
   return edge.size() == 2 && edge[0].rising != edge[1].rising &&
          patches.patchOf[edge[0].face] == patches.patchOf[edge[1].face];
 }
 
-/// Returns the directed edges that remain at an edge after pairs of opposite directed edges of the same
-/// patch have cancelled. Which of the directed edges cancel does not matter, because only the patch of a
-/// remaining directed edge is used.
+/// Returns the directed edges that remain along an edge after directed edges of the same patch with opposite
+/// directions have cancelled in pairs. The order of the faces determines which of them cancel.
 std::vector<mesh::DirectedEdge> unbalanced(const mesh::Patches& patches, std::span<const mesh::DirectedEdge> edge) {
   std::vector<mesh::DirectedEdge> sides(edge.begin(), edge.end());
   std::ranges::stable_sort(sides, {}, [&](const mesh::DirectedEdge& side) { return patches.patchOf[side.face]; });
@@ -57,20 +55,18 @@ std::vector<mesh::DirectedEdge> unbalanced(const mesh::Patches& patches, std::sp
   return remaining;
 }
 
-/// A face at an edge, in the radial order of the faces around the edge. In a correctly oriented mesh solid
-/// material lies between a face with `rising` = false and the next face with `rising` = true,
-/// counterclockwise.
+/// A face at an edge, with its angle around the edge. In a correctly oriented mesh, solid material lies between a
+/// face with `rising` = false and the face with `rising` = true that follows it counterclockwise.
 struct RadialFace {
   double angle;  ///< in radians, around the edge
   bool rising;
   std::uint32_t patch;
 };
 
-/// Sorts the faces at an edge counterclockwise, as seen with the edge pointing to the viewer. A face begins
-/// a solid if its `rising` equals `begins`, else it ends a solid. Coplanar faces get the same angle: the
-/// faces that end a solid come first, then those that begin a solid. Coincident faces of the same
-/// orientation are sorted by patch, so that solids are matched with the same patches at all edges of a
-/// shared wall.
+/// Sorts the faces at an edge by angle, counterclockwise as seen with the edge pointing to the viewer. A face
+/// begins a solid if its `rising` equals `begins`, else it ends a solid. Coplanar faces get the same angle, and
+/// those that end a solid come first. Coincident faces of the same orientation are sorted by patch, so that all
+/// edges of a shared wall match the same patches.
 void sortAround(std::vector<RadialFace>& faces, bool begins) {
   std::ranges::sort(faces, {}, &RadialFace::angle);
   const auto before = [begins](const RadialFace& a, const RadialFace& b) {
@@ -110,8 +106,8 @@ std::vector<RadialFace> radialFaces(const TriangleMesh& mesh, const mesh::Patche
 /// Two faces at an edge with solid material between them.
 using Wedge = std::array<RadialFace, 2>;
 
-/// Matches each face that begins a solid with the face that ends the same solid, as parentheses are
-/// matched, in two passes around the edge. The numbers of beginning and ending faces are equal.
+/// Matches each face that begins a solid with the face that ends the same solid, like opening and closing
+/// parentheses, in two passes around the edge. As many faces must begin a solid as end one.
 std::vector<Wedge> wedgesOf(std::vector<RadialFace> faces, bool begins) {
   sortAround(faces, begins);
   std::vector<Wedge> wedges;
@@ -133,9 +129,9 @@ bool anyIsFlat(const std::vector<Wedge>& wedges) {
   return std::ranges::any_of(wedges, [](const Wedge& wedge) { return wedge[0].angle == wedge[1].angle; });
 }
 
-/// Joins patches that have solid material between them at an edge. If coplanar faces would then form a flat
-/// body, the touching solids may all be oriented inward; in this case the roles of solid and empty space
-/// are exchanged. If a flat body results again, all patches at the edge are joined.
+/// Joins patches that have solid material between them at an edge. If two coplanar faces would enclose a solid
+/// without thickness, all solids at the edge may be oriented inward; in this case the roles of solid and empty
+/// space are exchanged. If this also yields a solid without thickness, all patches at the edge are joined.
 void joinSolids(const std::vector<RadialFace>& faces, mesh::DisjointSets& bodies) {
   std::vector<Wedge> wedges = wedgesOf(faces, false);
   if (anyIsFlat(wedges)) wedges = wedgesOf(faces, true);
@@ -146,8 +142,8 @@ void joinSolids(const std::vector<RadialFace>& faces, mesh::DisjointSets& bodies
   }
 }
 
-/// Finds the bodies that the patches form. All faces of a patch must have the same orientation, except in
-/// one-sided patches. `sides` are the directed edges of the mesh, grouped by edge.
+/// Finds the bodies that the patches of a mesh form. All faces of a patch must have the same orientation, except
+/// in one-sided patches. `sides` are the directed edges of the mesh, grouped by undirected edge.
 Bodies findBodies(const TriangleMesh& mesh, const mesh::Patches& patches, std::span<const mesh::DirectedEdge> sides) {
   mesh::DisjointSets joined(patches.count);
   std::vector<char> open = patches.oneSided;
@@ -174,13 +170,13 @@ Bodies findBodies(const TriangleMesh& mesh, const mesh::Patches& patches, std::s
   return bodies;
 }
 
-/// The faces of one body. If the body is reversed, all its faces are reversed.
+/// The faces and the measures of one body, which is reversed as a whole or not at all.
 struct Body {
   std::vector<std::uint32_t> faces;
   double area = 0, volume = 0;
   Box box;
   bool closed = false;
-  bool solid = false;     ///< true if the sign of the volume is reliable
+  bool solid = false;     ///< true if the sign of `volume` reliably tells the orientation
   bool reversed = false;  ///< true if the faces are to be reversed
 };
 
@@ -191,7 +187,7 @@ Vector3 areaVector(const TriangleMesh& mesh, std::uint32_t face) {
 
 void reverse(TriangleMesh& mesh, std::uint32_t face) { std::swap(mesh.triangles[face][1], mesh.triangles[face][2]); }
 
-/// Orients all faces of a patch alike, like the faces that cover the greater part of the patch's area.
+/// Orients the faces of each patch consistently, like those that cover the greater part of the patch's area.
 /// Skips one-sided patches. Returns the number of reversed faces.
 std::size_t orientPatches(TriangleMesh& mesh, const mesh::Patches& patches) {
   std::vector<double> area(patches.count), against(patches.count);
@@ -208,9 +204,9 @@ std::size_t orientPatches(TriangleMesh& mesh, const mesh::Patches& patches) {
   return reversed;
 }
 
-/// Returns one entry per patch. Each body is at the index of its lowest patch; the entries of the other
-/// patches have no faces. The volume of a body is the sum of the tetrahedra between its triangles and the
-/// center of its box. One-sided bodies are not solid.
+/// Returns one entry per patch. The measures of a body are in the entry of its first patch; the entries of its
+/// other patches have no faces. The volume of a body is the sum of the signed tetrahedra between its triangles
+/// and the center of its bounding box. A one-sided body has `solid` = false.
 std::vector<Body> measureBodies(const TriangleMesh& mesh, const mesh::Patches& patches, const Bodies& bodies) {
   std::vector<Body> measured(patches.count);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
@@ -237,7 +233,7 @@ void reverseBodies(TriangleMesh& mesh, const std::vector<Body>& bodies) {
       for (const std::uint32_t f : body.faces) reverse(mesh, f);
 }
 
-/// Evaluates the winding number of the solid bodies among the given bodies.
+/// Evaluates the winding number of a list of bodies. Only bodies with `solid` = true contribute.
 class BodyWinding {
  public:
   BodyWinding(const TriangleMesh& mesh, std::span<const Body> bodies)
@@ -251,8 +247,8 @@ class BodyWinding {
   }
 
  private:
-  /// Returns a mesh of the faces of the solid bodies. Each face gets three vertices of its own; the other
-  /// vertices are not copied, so that a small body of a large mesh costs little.
+  /// Returns a mesh of the faces of the solid bodies. Each face gets three vertices of its own, and no other
+  /// vertices are copied, so that a small body of a large mesh costs little.
   static TriangleMesh surfaceOf(const TriangleMesh& mesh, std::span<const Body> bodies) {
     TriangleMesh surface{.vertices = {}, .triangles = {}, .name = mesh.name};
     for (const Body& body : bodies) {
@@ -297,9 +293,9 @@ std::vector<Vector3> pointsBeside(const TriangleMesh& mesh, const Body& body, do
 
 enum class Orientation { undecided, outward, inward };
 
-/// Returns the orientation of a body according to the winding numbers of the imported mesh, by step 4 of
-/// `repaired`. `before` and `behind` are points in front of the body's faces and behind them. `byVolume` is
-/// the orientation according to the sign of the body's own volume.
+/// Returns the orientation of a body according to the winding numbers of the imported mesh on both sides of the
+/// body (step 4 in the documentation of `repaired`). `before` and `behind` are points in front of the body's
+/// faces and behind them. `byVolume` is the orientation according to the sign of the body's own volume.
 Orientation importedOrientation(const BodyWinding& imported, const std::vector<Vector3>& before,
                                 const std::vector<Vector3>& behind, Orientation byVolume) {
   std::ptrdiff_t outward = 0, inward = 0, left = std::ssize(before), all = left;
@@ -316,9 +312,9 @@ Orientation importedOrientation(const BodyWinding& imported, const std::vector<V
   return isMost(outward) ? Orientation::outward : isMost(inward) ? Orientation::inward : Orientation::undecided;
 }
 
-/// Decides again which bodies are reversed, by steps 4 and 5 of `repaired`. Changes nothing unless there
-/// are at least two solid bodies and at least one body that is to be reversed. In the mesh `outward` all
-/// solid bodies are oriented outward.
+/// Corrects `Body::reversed` so that cavities stay oriented inward (steps 4 and 5 in the documentation of
+/// `repaired`). Changes nothing unless there are at least two solid bodies and at least one body is to be
+/// reversed. In the mesh `outward` all solid bodies are oriented outward.
 void keepCavityOrientation(const TriangleMesh& imported, const TriangleMesh& outward, std::vector<Body>& bodies) {
   if (std::ranges::count_if(bodies, &Body::solid) < 2 || std::ranges::none_of(bodies, &Body::reversed)) return;
   const BodyWinding allOutward(outward, bodies), asImported(imported, bodies);
@@ -351,7 +347,7 @@ RepairedMesh repaired(ImportedMesh imported) {
   bvh::requireSurface(mesh);
   RepairedMesh result;
 
-  // Orient the faces of each patch alike, find the bodies that the patches form, and measure these bodies.
+  // Orient the faces of each patch consistently, find the bodies that the patches form, and measure the bodies.
   const mesh::Patches patches = mesh::patchesOf(mesh.triangles.size(), mesh::directedEdgesOf(mesh.triangles));
   result.reversedFaces = surface::orientPatches(mesh, patches);
   const surface::Bodies bodies = surface::findBodies(mesh, patches, mesh::directedEdgesOf(mesh.triangles));

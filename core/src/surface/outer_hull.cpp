@@ -22,37 +22,37 @@
 namespace hpsdf::surface {
 namespace {
 
-/// The length of the smallest pieces of triangles, divided by the longest side of the mesh. It starts at
-/// `kFinest`. While there are too many pieces it is doubled, up to `kCoarsest`.
+/// The length of the smallest pieces of triangles relative to the longest side of the mesh. It starts at
+/// `kFinest` and is doubled, up to `kCoarsest`, while there are too many pieces.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
-/// The factor by which the smallest pieces are longer if only holes of the mesh make their sides uncertain.
-/// Holes do not merit as many pieces as intersections.
+/// Near holes of the mesh, the smallest pieces are longer by this factor than at intersections, because holes do
+/// not merit as many pieces.
 constexpr double kCoarserBesideHoles = 8;
 constexpr std::size_t kMostPairs = 2'000'000;
-constexpr std::size_t kMostPieces = 250'000;  // in addition to the mesh's triangles
+constexpr std::size_t kMostPieces = 250'000;  // limit for pieces in addition to the mesh's triangles
 
 enum class PieceKind : char {
-  surface,      ///< at least one side is outside
-  inner,        ///< both sides are inside
-  undecided,    ///< no triangle intersects it, and its sides are unknown
-  intersected,  ///< other triangles intersect it, and it is too small to subdivide
-  replaced,     ///< its quarters are in the list
+  surface,      ///< at least one side of the piece is outside the solid
+  inner,        ///< both sides of the piece are inside the solid
+  undecided,    ///< no triangle intersects the piece; it is unknown whether its sides are inside
+  intersected,  ///< triangles intersect the piece, and it is too small to subdivide
+  replaced,     ///< the quarters of the piece are in the list instead
 };
 
 struct Piece {
   Corners corners;
-  std::uint32_t triangle;  ///< index of the triangle that contains it
+  std::uint32_t triangle;  ///< index of the mesh triangle that contains the piece
   bool isWhole;
   PieceKind kind = PieceKind::intersected;
 };
 
-/// A triangle that intersects another one.
+/// A triangle that intersects the triangle to be subdivided.
 struct Cutter {
   std::uint32_t triangle;
   Corners corners;
   bool isCoplanar;  ///< true if both triangles lie in one plane
-  /// For each edge of a coplanar cutter, whether the edge can cut. It cannot if a neighbour of the cutter
-  /// continues the cutter's plane across the edge, because inside and outside do not change at such an edge.
+  /// For each edge of a coplanar cutter: true if it can separate inside from outside. It cannot if a neighbour of
+  /// the cutter continues the cutter's plane across the edge.
   std::array<bool, 3> counts = {true, true, true};
 };
 
@@ -78,23 +78,22 @@ std::array<Corners, 4> quarters(const Corners& t) {
 
 struct TooManyPieces {};
 
-/// Returns the triangle t, shrunk by a millionth towards its centroid. Triangles that share only the
-/// boundary of t do not intersect the shrunk triangle.
+/// Returns the triangle t, shrunk by a millionth towards its centroid. Triangles that meet t only at its boundary
+/// do not intersect the shrunk triangle.
 Corners shrunk(const Corners& t) {
   const Vector3 middle = (t[0] + t[1] + t[2]) / 3;
   constexpr double kLess = 1e-6;
   return {t[0] + kLess * (middle - t[0]), t[1] + kLess * (middle - t[1]), t[2] + kLess * (middle - t[2])};
 }
 
-/// Subdivides triangles that other triangles intersect. All coordinates are scaled to a magnitude of about
-/// 1.
+/// Subdivides triangles that other triangles intersect. All coordinates are scaled to a magnitude of about 1.
 class Subdivider {
  public:
   Subdivider(double finest, const Progress& progress) : finest_(finest), progress_(progress) {}
 
-  /// Appends the piece to `pieces`, as undecided, if no cutter intersects it, or, as intersected, if it has
-  /// the smallest size. Otherwise subdivides its quarters recursively. Can be called from any thread. Throws
-  /// `TooManyPieces` and `Cancelled`.
+  /// Appends the piece to `pieces` as undecided if no cutter intersects it, or as intersected if it has the
+  /// smallest size. Otherwise does the same for its four quarters, recursively. Can be called from any thread.
+  /// Throws `TooManyPieces` and `Cancelled`.
   void subdivide(Piece piece, const std::vector<Cutter>& cutters, std::vector<Piece>& pieces) {
     progress_.throwIfCancelled();
     const Corners corners = shrunk(piece.corners);
@@ -128,13 +127,12 @@ class Subdivider {
 
   double finest_;
   const Progress& progress_;
-  std::atomic<std::size_t> added_ = 0;  ///< number of pieces less the number of triangles
+  std::atomic<std::size_t> added_ = 0;  ///< number of pieces minus the number of triangles
 };
 
 using Pair = std::array<std::uint32_t, 2>;
 
-/// Returns the pairs of triangles that intersect. Each pair is listed in both orders, and the list is
-/// sorted.
+/// Returns the pairs of triangles that intersect. Each pair is listed in both orders, and the list is sorted.
 std::vector<Pair> intersectingPairs(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh,
                                     const Progress& progress) {
   const Crossings crossings = findCrossings(hierarchy, kMostPairs, 0, progress);
@@ -149,11 +147,11 @@ std::vector<Pair> intersectingPairs(const bvh::Hierarchy& hierarchy, const Trian
   return pairs;
 }
 
-/// Clears `counts` of each coplanar cutter at the edges across which another coplanar cutter continues the
-/// plane. A neighbour that is folded onto the cutter does not continue the plane: the two triangles
-/// intersect and are one of the pairs.
+/// Sets `counts` to false for each edge of a coplanar cutter across which another coplanar cutter continues the
+/// plane. A neighbour that is folded back onto the cutter does not continue the plane: it intersects the cutter,
+/// so that `pairs` contains the two triangles.
 void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, std::vector<Cutter>& cutters) {
-  using DirectedEdge = std::array<std::uint32_t, 3>;  // from vertex, to vertex, triangle
+  using DirectedEdge = std::array<std::uint32_t, 3>;  // start vertex, end vertex, triangle
   std::vector<DirectedEdge> edges;
   for (const Cutter& cutter : cutters)
     for (int k = 0; k < 3 && cutter.isCoplanar; ++k) {
@@ -173,8 +171,8 @@ void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, 
   }
 }
 
-/// Returns the pieces of all triangles, in the order of the triangles. The coordinates of the pieces are
-/// multiplied by `scale`. Throws `TooManyPieces`.
+/// Subdivides all triangles that other triangles intersect, and returns the pieces of all triangles in the order
+/// of the triangles. The coordinates of the pieces are multiplied by `scale`. Throws `TooManyPieces`.
 std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
                                       Subdivider& subdivider) {
   const auto scaledCorners = [&](std::uint32_t t) {
@@ -182,7 +180,7 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
     return Corners{scale * a, scale * b, scale * c};
   };
   // Subdivide each triangle that other triangles intersect, in parallel over these triangles.
-  std::vector<std::size_t> firsts;  // index of the first pair of each such triangle, and the number of pairs
+  std::vector<std::size_t> firsts;  // index of the first pair of each intersected triangle; at the end pairs.size()
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (i == 0 || pairs[i][0] != pairs[i - 1][0]) firsts.push_back(i);
   firsts.push_back(pairs.size());
@@ -214,8 +212,8 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
   return pieces;
 }
 
-/// Probes whether the two sides of pieces are inside or outside. The coordinates of pieces are multiplied
-/// by `scale`. The probes' distance `offset` from the surface is in mesh units.
+/// Tests whether the two sides of a piece are inside or outside the mesh, at points whose distance from the piece
+/// is `offset` in mesh units. The coordinates of pieces are multiplied by `scale`.
 struct SideProbe {
   const sign::WindingSign& winding;
   double scale, offset;
@@ -224,8 +222,8 @@ struct SideProbe {
 
   Vector3 step(const Corners& t) const { return offset * (t[1] - t[0]).cross(t[2] - t[0]).stableNormalized(); }
 
-  /// Classifies a piece that no triangle intersects. A degenerate piece is classified as inner, because the
-  /// neighbouring pieces contain its edges.
+  /// Classifies a piece that no triangle intersects. A degenerate piece is classified as inner and thus dropped,
+  /// because the neighbouring pieces contain its edges.
   PieceKind classify(const Corners& corners) const {
     const Vector3 middle = centroid(corners), aside = step(corners);
     const Vector3 before = middle + aside, behind = middle - aside;
@@ -237,9 +235,9 @@ struct SideProbe {
     return isCertain ? PieceKind::inner : PieceKind::undecided;
   }
 
-  /// Returns true if an intersected piece is surrounded by the inside: all probes on both sides of its
-  /// quarters are inside, and all probes around its centroid, in fourteen directions at the distance of the
-  /// piece's longest side.
+  /// Returns true if an intersected piece lies in the interior of the mesh. All test points must be inside: points on
+  /// both sides of its quarters, and points around its centroid, in fourteen directions at the distance of its
+  /// longest side.
   bool isSurrounded(const Corners& corners) const {
     const Vector3 aside = step(corners);
     for (const Corners& quarter : quarters(corners))
@@ -281,8 +279,7 @@ std::optional<std::vector<Piece>> classifiedPieces(const TriangleMesh& mesh, dou
   try {
     std::vector<Piece> pieces = subdivideTriangles(mesh, scale, pairs, subdivider);
     probe.classify(pieces, progress, task);
-    // Refine undecided pieces repeatedly. Pieces are undecided near holes, where the winding number varies
-    // along a piece.
+    // Subdivide undecided pieces repeatedly. They lie near holes, where the winding number varies along a piece.
     for (std::size_t first = 0, end = pieces.size(); first < end; first = end, end = pieces.size()) {
       for (std::size_t i = first; i < end; ++i)
         if (pieces[i].kind == PieceKind::undecided && subdivider.canSubdivide(pieces[i].corners, kCoarserBesideHoles))

@@ -49,8 +49,8 @@ class Checksum {
 /// The first bytes of a file. They identify the type of the file.
 using Magic = std::array<char, 8>;
 
-/// Writes numbers to a file and then the checksum of these numbers. `CheckedReader` has members of the same
-/// names, so that one function template can list the items of a file for reading and writing.
+/// Writes numbers to a file and then the checksum of these numbers. `CheckedReader` has members of the same names, so
+/// that the same function template can write and read a file.
 class CheckedWriter {
  public:
   /// All members of this class throw the same errors as `OutputFile`.
@@ -74,8 +74,7 @@ class CheckedWriter {
     array(values, values.size());
   }
   void begin(const Magic& magic, std::uint32_t version);
-  /// Does nothing, because values that are written are valid. `CheckedReader::require` checks values that are
-  /// read.
+  /// Does nothing, because only values that are read can be invalid (see `CheckedReader::require`).
   void require(bool, const char*) const {}
   /// Writes the checksum and commits the file.
   void finish();
@@ -89,9 +88,9 @@ class CheckedWriter {
 
 /// The words by which the messages of `CheckedReader` describe a kind of file.
 struct FileKind {
-  std::string_view name;    ///< the file itself, such as "field file"
-  std::string_view wanted;  ///< the file to give, such as "a .hpsdf file"
-  std::string_view remedy;  ///< what to do about a damaged file, such as "build or copy it again"
+  std::string_view name;    ///< the kind of file, such as "field file"
+  std::string_view wanted;  ///< the file that the user should give, such as "a .hpsdf file"
+  std::string_view remedy;  ///< the advice for a damaged file, such as "build or copy it again"
 };
 
 /// Reads a file that `CheckedWriter` wrote. Every member throws `Error` (of the kind `file`) if the file
@@ -107,8 +106,8 @@ class CheckedReader {
   }
   void flag(bool& value);
   void text(std::string& value);
-  /// Reads an array of `count` elements. If they need more bytes than remain in the file, throws before
-  /// memory is allocated.
+  /// Reads an array of `count` elements. Throws, before memory is allocated, if the elements need more bytes than
+  /// remain in the file.
   template <typename T>
   void array(std::vector<T>& values, std::uint64_t count) {
     require(count <= remaining() / sizeof(T), "it ends too early");

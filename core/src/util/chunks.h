@@ -83,9 +83,9 @@ struct Sums {
   double rms() const { return count == 0 ? 0 : std::sqrt(squares / static_cast<double>(count)); }
 };
 
-/// Returns the total of all chunks. In parallel, work(sum, first item, number of items) computes the sum of
-/// each chunk. The sums are then added in the order of the chunks, so that rounding does not depend on the
-/// number of threads.
+/// Returns the sum of the results of all chunks. In parallel, work(sum, first item, number of items) computes the sum
+/// of each chunk. The sums are then added in the order of the chunks, so that rounding does not depend on the number of
+/// threads.
 template <typename Sum, typename Work>
 Sum sumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                 const Work& work) {
@@ -97,8 +97,8 @@ Sum sumOfChunks(std::size_t items, std::size_t size, const Progress& progress, s
   return all;
 }
 
-/// Returns the total of all chunks like `sumOfChunks`, but adds the chunks' sums in any order and does not
-/// store them. Suitable for sums that do not depend on the order of addition.
+/// Like `sumOfChunks`, but adds the chunks' sums in any order and does not store them. The result is reproducible only
+/// if it does not depend on the order of addition.
 template <typename Sum, typename Work>
 Sum unorderedSumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                          const Work& work) {

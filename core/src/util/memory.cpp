@@ -26,9 +26,9 @@ double limitIn(const fs::path& file) {
   return text >> bytes ? bytes : kNoLimit;
 }
 
-/// Returns the lowest limit in the files named `file`, in the folders from the control group's folder up to
-/// the root of the control groups. Within a container the control group's own folder may be invisible. In
-/// that case the topmost visible folder is that of the container.
+/// Returns the lowest memory limit of a Linux control group and of the groups above it, read from the file named `file`
+/// in each group's folder. Within a container the folder of the control group may be invisible. In that case the
+/// topmost visible folder belongs to the container.
 double leastLimit(const fs::path& groups, fs::path group, const char* file) {
   double least = kNoLimit;
   for (;; group = group.parent_path()) {

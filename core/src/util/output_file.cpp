@@ -24,7 +24,7 @@ namespace {
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-constexpr std::string_view kTemporary = ".part-";  ///< a process id, "-" and a number follow
+constexpr std::string_view kTemporary = ".part-";  ///< followed in file names by a process id, "-" and a number
 
 /// Returns the beginning that the names of all temporary files of `file` share, without a folder. If the
 /// name of `file` is too long for a suffix, the beginning contains its first characters (whole UTF-8
@@ -127,16 +127,15 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   const auto refuse = [&](int why) {
     throw Error(ErrorKind::file, file.string(), "cannot be written (" + reason(why) + "); check the folder");
   };
-  // Refuse a file name that is too long. Opening the temporary file would not fail, because its name is short
-  // enough.
+  // Refuse a file name that is too long, because opening the temporary file, whose name is short enough, would succeed.
   if (error == std::errc::filename_too_long) refuse(error.value());
   if (std::filesystem::is_directory(status))
     throw Error(ErrorKind::file, file.string(), "is a folder; give a file name");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     throw Error(ErrorKind::file, file.string(), "is not a regular file; give another name");
   if (!file_.has_filename()) throw Error(ErrorKind::file, file.string(), "names a folder; give a file name");
-  // Try names until the temporary file can be created. A name may be taken by a file that a killed process
-  // with the same process id left behind.
+  // Try names until the temporary file can be created. A killed process with the same process id may have left a file
+  // with one of these names.
   for (int tries = 100; tries > 0 && stream_ == nullptr; --tries) {
     temporary_ = temporaryBeside(file_);
     stream_ = std::fopen(temporary_.c_str(), "wbx");

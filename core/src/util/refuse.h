@@ -7,7 +7,6 @@
 
 namespace hpsdf::detail {
 
-/// Returns one message that consists of all parts.
 template <typename... Parts>
 std::string messageOf(const Parts&... parts) {
   std::ostringstream message;

@@ -15,7 +15,7 @@
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kMostContacts = SphereMinima::kMost;  // of two bodies; they fill three of Bullet's manifolds
+constexpr std::size_t kMostContacts = SphereMinima::kMost;  // contacts of two bodies; three manifolds hold four each
 constexpr int kNodes = 256;                                 // number of a soft body's nodes that one task handles
 constexpr int kPieces = 64;                                 // greatest number of points sampled on a node's path
 
@@ -34,9 +34,9 @@ double sizeOf(const btCollisionObject& object) {
   return radius;
 }
 
-/// Returns the first sampled point, on a node's path in one step, whose distance from the field's body is
-/// less than `near`. Returns the end of the path if there is no such point. Sampling the path keeps nodes
-/// from passing through thin bodies.
+/// Returns the first sampled point, on a node's path during one step, whose distance from the field's body is
+/// less than `near`. Returns the end of the path if there is no such point. Sampling the path keeps nodes from
+/// passing through thin bodies.
 Vector3 firstContact(const Field& field, const Vector3& from, const Vector3& to, double near) {
   // Choose the number of pieces of the path. A path whose length is NaN or too great gets the maximum number.
   const int pieces = int(std::min(double(kPieces - 1), (to - from).norm() / near)) + 1;
@@ -218,7 +218,7 @@ struct SoftFieldAlgorithm::Pair {
   const FieldShape& shape;
   Eigen::Isometry3d worldFromField, fieldFromWorld;
   double margin;  ///< distance within which nodes count as touching
-  double near;    ///< distance at which a node's path ends
+  double near;    ///< distance from the surface at which a node's path ends
 };
 
 /// Nodes that may touch the field.
@@ -226,7 +226,7 @@ struct SoftFieldAlgorithm::Candidates {
   std::size_t count = 0;
   std::array<int, kNodes> nodes;
   std::array<Vector3, kNodes> starts, ends;  ///< starts and ends of the nodes' paths
-  std::array<Vector3, kNodes> at;            ///< point of contact, if they touch
+  std::array<Vector3, kNodes> at;            ///< point of contact, if the node touches the field
 };
 
 void SoftFieldAlgorithm::find(const btCollisionObject& first, const btCollisionObject& second, Findings& findings) {
@@ -319,8 +319,8 @@ void SoftFieldAlgorithm::fill(const btCollisionObjectWrapper& first, const btCol
       const btVector3 arm = node.m_x - transform.getOrigin();
       const btVector3 bodyMotion = rigid != nullptr ? rigid->getVelocityInLocalPoint(arm) * step : btVector3(0, 0, 0);
       if (height > contact.m_cti.m_normal.dot(bodyMotion)) continue;
-      // The solver cancels the node's motion towards the surface, measured from the node's position m_q. If m_q
-      // is on the surface, this motion is exactly the penetration, and the correction adds no velocity.
+      // The solver cancels the node's motion towards the surface since its earlier position m_q. Move m_q onto
+      // the surface: the motion is then exactly the penetration, and the correction adds no velocity.
       node.m_q -= (contact.m_cti.m_normal.dot(node.m_q) + contact.m_cti.m_offset) * contact.m_cti.m_normal;
       const btVector3 relative = node.m_x - node.m_q - bodyMotion;
       const btScalar along = relative.dot(contact.m_cti.m_normal);

@@ -74,7 +74,7 @@ class RigidFieldAlgorithm final : public FieldAlgorithm {
 
   ContactQuery query_;
   std::vector<BodyContact> contacts_;
-  SphereMinima minima_;  ///< minima of the sphere, if one of the bodies is a sphere
+  SphereMinima minima_;  ///< minima of the field over the sphere, if one of the bodies is a sphere
   double size_ = 0;      ///< radius of the smaller body's bounding sphere
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btManifoldPoint> previous_;  ///< the contacts of the previous step
@@ -105,11 +105,11 @@ class SoftFieldAlgorithm final : public FieldAlgorithm {
   /// Replaces `touching` by those candidates that touch the field.
   void keepTouching(const Pair& pair, const Candidates& all, std::vector<Touching>& touching);
 
-  std::vector<Vector3> outside_;              ///< last position of each node outside of the field, in its coordinates
-  std::vector<std::vector<Touching>> parts_;  ///< touching nodes of each group of nodes, in their order
+  std::vector<Vector3> outside_;              ///< each node's last position outside the body, in field coordinates
+  std::vector<std::vector<Touching>> parts_;  ///< touching nodes of each group of `kNodes` nodes
 };
 
-/// Creates an algorithm in the dispatcher's memory.
+/// Creates a collision algorithm in memory of Bullet's dispatcher.
 template <typename Algorithm>
 struct CreateAlgorithm final : btCollisionAlgorithmCreateFunc {
   btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,

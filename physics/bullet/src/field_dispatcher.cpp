@@ -26,7 +26,7 @@ class SpherePairAlgorithm final : public btSphereSphereCollisionAlgorithm {
                         const btDispatcherInfo& info, btManifoldResult* result) override {
     manifolds_.resize(0);
     getAllContactManifolds(manifolds_);
-    btPersistentManifold& manifold = *manifolds_[0];  // with at most one contact
+    btPersistentManifold& manifold = *manifolds_[0];  // this manifold has at most one contact
     const btScalar impulse = manifold.getNumContacts() > 0 ? manifold.getContactPoint(0).m_appliedImpulse : 0;
     btSphereSphereCollisionAlgorithm::processCollision(first, second, info, result);
     if (manifold.getNumContacts() > 0) manifold.getContactPoint(0).m_appliedImpulse = impulse;

@@ -9,7 +9,7 @@ namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kDirections = 128;  // number of points at which a search samples the sphere
-constexpr std::size_t kStarts = 24;       // greatest number of descents
+constexpr std::size_t kStarts = 24;       // greatest number of points from which a descent starts
 constexpr int kRounds = 4;                // steps of each descent
 // Two directions count as the same if the cosine of the angle between them exceeds these limits:
 // `kSameStart` before the descents, `kSameMinimum` after the descents.
@@ -51,7 +51,7 @@ void evaluateSlopes(const Field& field, const Vector3& center, double radius, st
   }
 }
 
-/// Sorts the minima by value. Of minima with nearly the same direction, keeps only the lowest. Keeps at
+/// Sorts the minima by value. Keeps only the lowest one of several minima with nearly the same direction, and at
 /// most `most` minima.
 void keepLowest(std::size_t most, double sameCosine, std::vector<SphereMinimum>& minima) {
   std::ranges::sort(minima, {}, &SphereMinimum::value);

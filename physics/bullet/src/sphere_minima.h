@@ -12,9 +12,9 @@ namespace hpsdf::physics {
 /// A local minimum of the field over a sphere, or an approximation of one during the descent.
 struct SphereMinimum {
   Vector3 direction = Vector3::UnitX();  ///< unit vector from the sphere's centre
-  double value = 0;                      ///< field value at that point of the sphere
+  double value = 0;                      ///< field value at the point of the sphere in this direction
   Vector3 slope = Vector3::Zero();       ///< component of the field's gradient tangential to the sphere
-  double step = 1;                       ///< next step against the slope, in radii
+  double step = 1;                       ///< length of the next descent step, in radii, for a slope of 1
 };
 
 /// Finds the minima of a field over a sphere that moves a little from step to step. Each search also starts

@@ -22,22 +22,21 @@ constexpr Color kIsoLine = {24, 28, 44};
 constexpr Color kZeroLine = {10, 10, 20};
 constexpr Color kSurfaceLine = {255, 255, 255};
 constexpr Color kSurfaceCasing = {16, 14, 34};
-constexpr Color kSection = {238, 222, 205};  // section of a clay surface
+constexpr Color kSection = {238, 222, 205};  // cut through a solid without a colour scale
 constexpr Color kAir = {222, 228, 235};      // part of a plane that lies outside of the solid
 
 constexpr double kOutlineStrength = 0.62;
 constexpr double kIsoStrength = 0.42;
-// Widths of lines, in multiples of a thin line's width.
+// The widths of lines are in multiples of a thin line's width.
 constexpr double kZeroWidth = 2.4;
 constexpr double kSurfaceWidth = 1.6;
 constexpr double kCasingWidth = 3.4;
-// Cell outlines fade if the cell is narrower than this many widths of a thin line, because outlines would
-// cover the colours of such cells.
+// Cell outlines fade if the cell is narrower than this many widths of a thin line, because they would cover the colours
+// of small cells.
 constexpr double kOutlineFadesBelow = 10;
 constexpr double kOutlineGoneBelow = 3;
-// The smallest slope of the distance that is used for drawing lines. Where the distance is almost constant
-// in the plane of a slice (along a medial axis, on a tangent plane), lines would grow into blots with the
-// true slope.
+// The least slope of the distance that is assumed for drawing lines. With the true slope, lines would widen to blots
+// where the distance is almost constant in the plane of a slice (near a medial axis or on a tangent plane).
 constexpr double kFlattestSlope = 0.25;
 
 // Returns a picture in which each pixel is the mean of its samples' colours, where colorOf(x, y, i) is the
@@ -56,14 +55,13 @@ Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
   return image;
 }
 
-// Returns how much of a sample a line covers, 0 to 1. The centre line of the line is at `distance` from the
-// sample; lengths are in samples.
+// Returns the share of a sample, 0 to 1, that a line covers. The sample is at `distance` from the centre of the line;
+// lengths are in samples.
 float coverage(double distance, double width) {
   return static_cast<float>(std::clamp(width / 2 + 0.5 - distance, 0.0, 1.0));
 }
 
-// Returns true if sample i shows a section or a plane. Both are drawn flat: unlit, with the outlines of
-// their cells.
+// Returns true if sample i shows a section or a plane, which are drawn flat: unlit, with the outlines of their cells.
 bool isFlat(const ViewBuffers& buffers, std::size_t i) {
   return buffers.shows(i, Shown::section) || buffers.shows(i, Shown::plane);
 }
@@ -86,7 +84,7 @@ class CellOutlines {
     measureCells();
   }
 
-  /// Returns how much of sample (x, y) outlines cover, 0 to 1.
+  /// Returns the share of sample (x, y), 0 to 1, that outlines cover.
   float operator()(int x, int y) const {
     return std::max(alongAxis(x, y, x, -1), alongAxis(x, y, y, -std::ptrdiff_t(buffers_.width)));
   }
@@ -116,15 +114,13 @@ class CellOutlines {
     strengths_[kNoCell] = 0;
   }
 
-  // Returns how much of sample (x, y) is covered by outlines perpendicular to one axis. `position` is the
-  // number of samples before this sample along the axis. `step` is the index offset from a sample to the
-  // previous sample along the axis.
+  // Returns the share of sample (x, y), 0 to 1, that outlines perpendicular to one axis cover. `position` is the
+  // sample's number along this axis. `step` is the index offset from a sample to the previous one along the axis.
   float alongAxis(int x, int y, int position, std::ptrdiff_t step) const {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
     const std::uint32_t* cell = &cell_[i];
     const int most = std::min(widthUp_, position);
-    // Cells are convex: if two samples lie in the same cell, all samples between these two lie in this cell
-    // too.
+    // Cells are convex: if two samples lie in one cell, all samples between them lie in it too.
     if (most == 0 || cell[most * step] == *cell) return 0;
     int k = 1;
     while (cell[k * step] == *cell) ++k;
@@ -133,8 +129,8 @@ class CellOutlines {
     return strength * static_cast<float>(std::clamp(width_ - (k - 1), 0.0, 1.0));
   }
 
-  // Returns true if a plane or section ends between the samples i and j because something nearer covers it.
-  // Such an end is not the edge of a cell.
+  // Returns true if a plane or section ends between the samples i and j because something nearer covers it, not because
+  // a cell ends there.
   bool hidden(std::size_t i, std::size_t j) const {
     if (!inScene_ || (cell_[i] == kNoCell) == (cell_[j] == kNoCell)) return false;
     const auto [flat, other] = cell_[i] != kNoCell ? std::pair(i, j) : std::pair(j, i);
@@ -156,7 +152,7 @@ class Contours {
   /// The zero line is where the value equals `zero`.
   explicit Contours(const ViewBuffers& buffers, double zero = 0) : buffers_(buffers), zero_(zero) {}
 
-  /// Change of the value from one sample to the next, at least kFlattestSlope times the distance of samples.
+  /// Change of the value from one sample to the next, at least kFlattestSlope times the spacing of samples.
   double slope(int x, int y, double sampleSize) const {
     const std::size_t i = index(x, y);
     const double dx = derivative(i, 1, x > 0, x + 1 < buffers_.width);
@@ -216,8 +212,7 @@ class SurfaceLine {
  public:
   explicit SurfaceLine(const Sampling& sampling) : thin_(sampling.lineWidth * sampling.samples) {}
 
-  /// Returns the colour `ground` of a sample with the line drawn over it. The sample is at `distance` from
-  /// the centre line, in samples.
+  /// Draws the line over the colour `ground` of a sample at `distance` samples from the line's centre.
   LinearColor operator()(const LinearColor& ground, double distance) const {
     const LinearColor cased = mix(ground, casing_, 0.8F * coverage(distance, kCasingWidth * thin_));
     return mix(cased, line_, coverage(distance, kSurfaceWidth * thin_));

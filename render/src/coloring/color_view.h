@@ -12,8 +12,8 @@
 
 namespace hpsdf::render {
 
-/// The sampling of a view. Its buffers hold samples × samples points for each pixel of the picture. The
-/// colours of these points are averaged in linear light.
+/// The sampling of a view. Its buffers hold samples × samples points for each pixel of the picture. The colours of
+/// these points are averaged in linear light.
 struct Sampling {
   int samples = 1;
   double lineWidth = 1;   ///< width of thin lines, pixels of the finished picture
@@ -37,19 +37,17 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
 /// line at distance zero.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
-/// Colours a lit surface in front of the backdrop. If `color` is empty, surface and boxes have the colour
-/// of one material, else the given colours with soft shading. Sections and planes are unlit and show the
-/// outlines of their cells. On a plane, the surface f = offset is a line. `lines` is empty, or holds for
-/// each sample how strongly the lines along cell edges cover the sample (0 to 1). `bodies` are the
-/// materials of the bodies in the buffers.
+/// Colours a lit surface in front of the backdrop. If `color` is empty, surface and boxes have plain materials, else
+/// the given colours with soft shading. Sections and planes are unlit and show the outlines of their cells; on a plane,
+/// the surface f = offset is a line. `lines` is empty or holds the share of each sample, 0 to 1, that lines along cell
+/// edges cover. `bodies` holds the colour of each body.
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
                    double offset = 0, const std::vector<float>& lines = {}, std::span<const LinearColor> bodies = {});
 
 /// The background colour of a picture: around the domain in a slice, and behind the legend and the caption.
 Color paperColor();
 
-/// The backdrop of a picture of a surface: a soft gradient. `fromTop` is 0 at the top of the view, 1 at the
-/// bottom.
+/// The backdrop behind a surface, a soft gradient. `fromTop` is 0 at the top of the view, 1 at the bottom.
 LinearColor backdropColor(double fromTop);
 
 /// A picture in the paper colour, with the backdrop of surfaces in its upper `viewHeight` rows.

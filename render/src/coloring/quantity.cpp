@@ -32,13 +32,13 @@ void measure(const Field& field, ColorBy quantity, const ReferenceData& referenc
   for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - expected[i]);
 }
 
-/// A value of a quantity, with its weight when the limits of a colour scale are chosen.
+/// A value of a quantity, and its weight in the choice of a colour scale's limits.
 struct Weighted {
   double value, weight;
 };
 
-/// The smallest and the largest positive value, without the lowest 1 % and the highest 0.1 % of the total
-/// weight. If a few outliers set the limits of a scale, all other values would have one colour.
+/// The smallest and the largest positive value, without the lowest 1 % and the highest 0.1 % of the total weight.
+/// Otherwise a few outliers could stretch a colour scale so far that all other values have one colour.
 std::array<double, 2> rangeWithoutOutliers(std::vector<Weighted> values) {
   std::erase_if(values, [](const Weighted& v) { return !(v.value > 0) || !std::isfinite(v.value); });
   if (values.empty()) return {0, 0};
@@ -62,7 +62,7 @@ std::vector<Weighted> weighted(const Field& field, const std::vector<double>& of
   return values;
 }
 
-/// Picks at most a million samples at even intervals, which represent all samples. Each has the weight 1.
+/// Picks at most a million samples at even intervals, to represent all samples. Each has the weight 1.
 std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
   constexpr std::size_t kMost = 1'000'000;
   std::vector<Weighted> values;

@@ -14,8 +14,8 @@ constexpr Color kClay = {210, 153, 119};
 constexpr Color kPlainBox = {222, 216, 204};
 
 constexpr int kRings = 3, kTapsInRing = 6;
-constexpr double kOcclusionRadius = 0.035;  // radius of the outer ring of taps, as a share of the view's height
-constexpr double kFlatRise = 0.06;  // sine of the angle above the tangent plane up to which a tap counts as flat
+constexpr double kOcclusionRadius = 0.035;  // radius of the ambient occlusion, as a share of the view's height
+constexpr double kFlatRise = 0.06;  // sine of the angle above the tangent plane up to which neighbours do not occlude
 constexpr double kOcclusionStrength = 2.6;
 
 /// The positions and normals at the samples of a view, in the camera's frame: x right, y up, z towards the eye.
@@ -42,8 +42,8 @@ class CameraFrame {
     return parallel_ ? onPicture(x, y, -distance) : distance * ray(x, y);
   }
 
-  /// The surface normal at a sample. Where the field jumps, the normal may point away from the eye. Such a normal
-  /// is replaced by the nearest normal perpendicular to the ray. Otherwise single dark samples would speckle the
+  /// The surface normal at a sample. A normal that points away from the eye, as it may where the field jumps, is
+  /// replaced by the nearest normal perpendicular to the ray. Otherwise single dark samples would speckle the
   /// silhouettes.
   Eigen::Vector3f normal(int x, int y, const Eigen::Vector3f& toEye) const {
     const Eigen::Vector3f n = axes_ * buffers_.normal[std::size_t(y) * buffers_.width + x];
@@ -51,7 +51,7 @@ class CameraFrame {
     return facing >= 0 ? n : (n - facing * toEye).normalized();
   }
 
-  /// World height of the part of the scene that the view shows at a depth in front of the eye.
+  /// The height, in world units, that the view covers at a given depth in front of the eye.
   float heightAt(float depth) const { return parallel_ ? 2 * halfHeight_ : 2 * halfHeight_ * depth; }
 
  private:
@@ -64,7 +64,7 @@ class CameraFrame {
   const ViewBuffers& buffers_;
   bool parallel_;                 // true for an orthographic camera
   Eigen::Matrix3f axes_;          // its rows are the camera's axes
-  float halfWidth_, halfHeight_;  // half the view's extent, in perspective at depth 1
+  float halfWidth_, halfHeight_;  // half the view's width and height, in perspective at depth 1
 };
 
 /// Light sources that move with the camera, given in the camera's frame, as in portrait photography: a warm key
@@ -80,8 +80,7 @@ struct Lights {
   LinearColor sky = {0.26F, 0.29F, 0.34F};
   LinearColor ground = {0.10F, 0.08F, 0.07F};
 
-  /// Light that a matt surface with unit normal n reflects. `open` is the share of ambient light that reaches the
-  /// point.
+  /// Light that a matt surface with the unit normal n reflects. `open` is the share of ambient light that reaches it.
   LinearColor diffuse(const Eigen::Vector3f& n, float open) const {
     const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
     const LinearColor lamps =
@@ -90,7 +89,7 @@ struct Lights {
     return lamps * (0.45F + 0.55F * open) + mix(ground, sky, 0.5F + 0.5F * n.y()) * open;
   }
 
-  /// Blinn-Phong highlight of the key light, and the sky mirrored at grazing angles (Schlick's Fresnel term).
+  /// Blinn-Phong highlight of the key light, and the sky mirrored at grazing angles (a Fresnel term like Schlick's).
   LinearColor gloss(const Eigen::Vector3f& n, const Eigen::Vector3f& toEye) const {
     const Eigen::Vector3f half = (key + toEye).normalized();
     const float highlight = 0.13F * std::pow(std::max(0.0F, n.dot(half)), 36.0F);
@@ -105,8 +104,8 @@ class SurfaceShader {
   SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const std::function<LinearColor(std::size_t)>& color,
                 std::span<const LinearColor> bodies)
       : buffers_(buffers), frame_(buffers, camera), color_(color), bodies_(bodies) {
-    // Place the taps, the neighbours that occlusion samples, in rings. Each ring is rotated against the next
-    // smaller ring. All pixels have the same taps, so that the picture has no noise.
+    // Arrange the neighbours that ambient occlusion samples (the taps) in rings, each rotated against the next smaller
+    // one. All pixels use the same pattern, so that the picture has no noise.
     for (int ring = 1; ring <= kRings; ++ring)
       for (int i = 0; i < kTapsInRing; ++i) {
         const double angle = 2 * std::numbers::pi * (i + ring * 0.381966) / kTapsInRing;
@@ -132,9 +131,9 @@ class SurfaceShader {
   }
 
  private:
-  /// The share of ambient light that reaches a point: 1 on open ground, close to 0 in a deep fold. Neighbouring
-  /// samples that rise above the tangent plane at the point block ambient light. Folds and contacts darken, which
-  /// shows the shape better than lamps do.
+  /// The share of ambient light that reaches a point: 1 on open ground, close to 0 in a deep fold. It is blocked by
+  /// neighbouring samples that rise above the tangent plane at the point. Darker folds and contacts show the shape
+  /// better than lamps do.
   float openness(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
     const float radius = float(kOcclusionRadius) * frame_.heightAt(-position.z());
     float occluded = 0;

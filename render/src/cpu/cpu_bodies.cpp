@@ -26,7 +26,7 @@ struct BodyRay {
 struct TriangleHit {
   double distance;
   Vector3 barycentric;
-  bool fromBehind;  ///< whether the ray meets the side from which the corners run clockwise
+  bool fromBehind;  ///< whether the ray meets the back of the triangle, from which its corners run clockwise
 };
 
 /// The intersection of a ray with a triangle (Möller, Trumbore 1997).
@@ -40,7 +40,7 @@ std::optional<TriangleHit> intersect(const BodyRay& ray, const Vector3& a, const
   return TriangleHit{toC.dot(q) / determinant, {1 - ofB - ofC, ofB, ofC}, determinant < 0};
 }
 
-/// Fills the buffers of one view.
+/// Renders one view of bodies into buffers.
 class BodyView {
  public:
   BodyView(const BodyMeshes& meshes, const Camera& camera, std::span<const Body> bodies, BodyBuffers& buffers)

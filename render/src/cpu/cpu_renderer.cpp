@@ -22,8 +22,8 @@ struct VisiblePart {
   double fromEye;  ///< distance from the start of the pixel's ray to the origin of `ray`, world units
 };
 
-/// The part of a ray, given in grid coordinates, in the visible part of the domain. Returns std::nullopt if the
-/// ray misses it.
+/// Clips a ray, given in grid coordinates, to the visible part of the domain. Returns std::nullopt if the ray misses
+/// that part.
 std::optional<VisiblePart> visiblePart(const RayGeometry& rays, const Vector3& eye, const Vector3& direction) {
   double first = 0;
   double last = std::numeric_limits<double>::infinity();

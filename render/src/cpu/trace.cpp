@@ -7,17 +7,17 @@
 namespace hpsdf::render {
 namespace {
 
-// These lengths are in units of the domain's diagonal unless noted. The shaders use the same kNudge, kPastFace
+// The following lengths are in units of the domain's diagonal unless noted. The shaders use the same kNudge, kPastFace
 // and kGrain.
-constexpr double kNudge = 1e-6;  // distance by which steps end behind a face; also the shortest step
+constexpr double kNudge = 1e-6;  // overshoot of a step across a cell's face; also the shortest step
 constexpr double kPastFace =
-    4e-7;  // greatest distance behind a face at which rays enter the next node, in parts of the grid
-constexpr double kConverged = 1e-8;  // change of the root between two iterations that ends its refinement
-constexpr double kGrain = 0.25;  // step in a blend zone where no bound excludes a zero, in parts of the zone's extent
-constexpr int kMostSteps = 1 << 16;
+    4e-7;  // distance behind a face at which a ray leaves a node, as a share of the domain's extent
+constexpr double kConverged = 1e-8;  // the refinement of a root ends when an iteration changes it by less
+constexpr double kGrain = 0.25;  // step in a blend zone where no bound excludes a root, as a share of the blend extent
+constexpr int kStepLimit = 1 << 16;
 constexpr int kMostRefinements = 24;
 
-/// Calls f(coefficients) with a pointer to a leaf's coefficients. Their type is float or double.
+/// Calls f(coefficients) with a pointer to a leaf's coefficients, which are of type float or double.
 template <typename F>
 auto withCoefficients(const FieldData& field, std::uint32_t leaf, F&& f) {
   return std::visit([&](const auto& c) { return f(c.data() + node::offset(field.nodes[leaf])); }, field.coefficients);
@@ -60,9 +60,9 @@ Sample evaluate(const T* c, int degree, const Vector3& local) {
 
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
-/// World length along the ray from a point to the exit from its node's box. With a margin, the faces of the box
-/// lie `margin` node edges further inside. The length ends slightly behind the face. Otherwise a ray that runs
-/// along a face, and lies on it up to rounding, would leave the box again at every step.
+/// The length along the ray, in world units, from a point to just behind the face where the ray leaves the point's
+/// node. With a margin, the node is first shrunk on every side by `margin` times its edge length. Without the
+/// overshoot, a ray that runs along a face, up to rounding, would leave the node again at every step.
 double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid, double margin = 0) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
@@ -74,7 +74,7 @@ double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3
   return exit;
 }
 
-/// Length of the step over which the height certainly stays positive, if its slope is at least `steepest`.
+/// Length of a step over which the height is guaranteed to stay positive, if its slope is at least `steepest`.
 double certainlyAbove(double height, double steepest) {
   if (!(height > 0)) return 0;
   return steepest < 0 ? height / -steepest : std::numeric_limits<double>::infinity();
@@ -195,7 +195,7 @@ CellPoint TraceField::leafAt(const Vector3& p) const {
 double TraceField::linearSlope(std::uint32_t leaf, const Vector3& direction) const {
   const int p = degree(leaf);
   if (p == 0) return 0;
-  // Coefficients are in lexicographic order. The pointers below are to c_100, c_010 and c_001.
+  // The coefficients c_ijk are in lexicographic order; the indices below are those of c_100, c_010 and c_001.
   return withCoefficients(field_, leaf, [&](const auto* c) {
     return c[coefficientCount(p) - coefficientCount(p - 1)] * direction.x() + c[p + 1] * direction.y() +
            c[1] * direction.z();
@@ -230,31 +230,30 @@ Vector3 TraceField::worldGradient(const Vector3& local, int depth) const {
   return std::ldexp(2.0, depth) * local.cwiseProduct(space_.grid).cwiseQuotient(space_.size);
 }
 
-/// The march of one ray to the first crossing of the offset, by steps that cannot pass a crossing
-/// (docs/rendering.md, "Tracing"). Heights are f − offset, signed so that they are positive where the ray starts.
-/// The stages have the names of those in shaders/surface_march.frag.
+/// Marches along one ray to the first crossing of f = offset, by steps that cannot pass a crossing (docs/rendering.md,
+/// "Tracing"). A height is f − offset, signed so that it is positive where the ray starts. The functions for the stages
+/// have the same names as in shaders/surface_march.frag.
 class TraceField::March {
  public:
   March(const TraceField& field, const Ray& ray, double offset)
       : field_(field), ray_(ray), offset_(offset), nudge_(kNudge * field.space_.diagonal) {}
 
   std::optional<Hit> run() {
-    for (int i = 0; i < kMostSteps && t_ <= ray_.length; ++i)
+    for (int i = 0; i < kStepLimit && t_ <= ray_.length; ++i)
       if (const auto hit = step()) return hit;
     return std::nullopt;
   }
 
  private:
-  /// The point at parameter t of the ray, in a leaf, with bounds along the ray for the height of the leaf's
-  /// polynomial.
+  /// The ray's point at parameter t, its leaf, and bounds along the ray for the height of the leaf's polynomial.
   struct LeafPoint {
     CellPoint at;
-    Vector3 localDirection;  ///< change of the local coordinates per world unit
-    double steepest;         ///< least slope of the height along the ray
-    double shallowest;       ///< greatest slope of the height along the ray
-    double curve;            ///< greatest second derivative of the height along the ray
+    Vector3 localDirection;  ///< change of the local coordinates per world unit along the ray
+    double steepest;         ///< lower bound of the height's slope along the ray
+    double shallowest;       ///< upper bound of the height's slope along the ray
+    double curve;            ///< upper bound of the height's second derivative along the ray
     double toLeave;          ///< distance to the exit from the leaf, world units
-    double clear;            ///< lower bound of the height at t, blended or not
+    double clear;            ///< lower bound of the height of the field at t, with or without blending
     bool inBlendZone;
   };
 
@@ -310,8 +309,8 @@ class TraceField::March {
             .inBlendZone = inBlendZone};
   }
 
-  /// Takes a step where neighbouring leaves have a weight: as far as the height is certainly positive, but at
-  /// least a small part of the blend zone.
+  /// Takes a step where several leaves are blended: as far as the height is guaranteed to stay positive, but at least a
+  /// small part of the blend zone.
   std::optional<Hit> stepInBlendZone(const LeafPoint& leaf) {
     const double grain = kGrain * field_.zones_[leaf.at.node].extent / leaf.localDirection.norm();
     const double length = std::min(leaf.toLeave, std::max(certainlyAbove(leaf.clear, leaf.steepest), grain) + nudge_);
@@ -321,11 +320,11 @@ class TraceField::March {
     return std::nullopt;
   }
 
-  /// Takes a step where the leaf's polynomial alone is the field. Over a step the height sags below its chord by
-  /// at most curve · length² / 8. The height is monotone if it falls by more than curve · length² / 2.
+  /// Takes a step where the leaf's polynomial alone is the field. With second derivatives up to `curve`, the height
+  /// sags below its chord by at most curve · length² / 8 and is monotone if it falls by more than curve · length² / 2.
   std::optional<Hit> stepInLeaf(const LeafPoint& leaf) {
     const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
-    const bool falling = leaf.shallowest < 0;  // throughout the leaf, so that there is one root at most
+    const bool falling = leaf.shallowest < 0;  // the height decreases in the whole leaf: it has at most one root
     const double safe = certainlyAbove(lastHeight_, leaf.steepest) + nudge_;
     const double length =
         std::min(toExit, falling ? lastHeight_ / -leaf.shallowest + nudge_
@@ -356,8 +355,8 @@ class TraceField::March {
     lastLeaf_ = kNoCell;
   }
 
-  /// Finds the only root in a leaf by regula falsi, Illinois variant. The height is positive at parameter a of
-  /// the ray, and not positive at b.
+  /// Finds a root between the ray parameters a and b by regula falsi, Illinois variant. The height is positive at a and
+  /// not positive at b.
   Hit refine(const CellPoint& leaf, double a, double heightA, double b, double heightB) const {
     double t = b;
     for (int i = 0; i < kMostRefinements; ++i) {
@@ -398,9 +397,9 @@ class TraceField::March {
   const double nudge_;
   double t_ = 0;
   double side_ = 0;  ///< sign of f − offset where the ray starts; 0 until it is known
-  // The state after the last step, for the next step in the same leaf.
+  // The members below keep the state after the last step, for the next step in the same leaf.
   std::uint32_t lastLeaf_ = kNoCell;
-  double lastHeight_ = 0;   ///< height at t
+  double lastHeight_ = 0;   ///< height of the field at t_
   double longestStep_ = 0;  ///< longest step to try, world units
 };
 

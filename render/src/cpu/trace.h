@@ -1,9 +1,8 @@
 #pragma once
-// Lookup, evaluation and ray tracing of a field in grid coordinates, in double precision. This code is the
-// reference for the shaders, and is itself tested against the queries of `Field`. Lookup and evaluation repeat
-// the code of core on purpose, so that they do not share its faults. For the same reason the march takes none
-// of the shaders' short cuts: every ray starts where it enters the domain, and fewer bounds decide the steps of
-// a ray.
+// Lookup, evaluation and ray tracing of a field in double precision: the reference with which the shaders are compared.
+// It is itself tested against the queries of `Field`. So as not to share their faults, it repeats the lookup and
+// evaluation of core instead of calling them, and its march uses fewer bounds than the shaders and starts every ray
+// where it enters the domain.
 
 #include <optional>
 #include <vector>
@@ -15,7 +14,7 @@
 
 namespace hpsdf::render {
 
-/// A node and a point in it.
+/// A point and an octree node that contains it.
 struct CellPoint {
   std::uint32_t node;
   int depth;
@@ -32,7 +31,7 @@ struct Sample {
 /// The part of a ray within the domain: point(t) = origin + t · direction, with t from 0 to `length`.
 struct Ray {
   Vector3 origin;     ///< grid coordinates, within the domain
-  Vector3 direction;  ///< grid coordinates per world unit
+  Vector3 direction;  ///< change of the grid coordinates per world unit along the ray
   double length;      ///< distance to the exit from the domain, world units
 };
 
@@ -40,13 +39,12 @@ struct Hit {
   double t;
   CellPoint cell;
   Vector3 local;  ///< coordinates within the cell, in [−1, 1]³ but for rounding
-  bool onFace;    ///< whether f crosses the offset from one leaf to the next, not within one
+  bool onFace;    ///< whether f crosses the offset on the face between two leaves, not within one leaf
 };
 
-/// A hit on a face is a crack if |f − offset| exceeds kCrack · domain diagonal · slope. The slope is that of
-/// the field at the hit, but at least 1, the slope of a distance. The march enters a leaf up to 1.4e-6
-/// diagonals behind its face, so that |f − offset| may be that large even in a continuous field with a zero
-/// just behind a face. Single precision adds 2e-7. The shaders use the same value.
+/// A hit on the face between two leaves is a crack if |f − offset| exceeds kCrack · domain diagonal · slope, where the
+/// slope is |∇f| but at least 1. The threshold allows for continuous fields: the march enters a leaf up to 1.4e-6
+/// diagonals behind its face, and single precision adds 2e-7. The shaders use the same value.
 constexpr double kCrack = 4e-6;
 
 /// A field, with the data that ray tracing needs. Keeps a reference to the field.
@@ -59,8 +57,7 @@ class TraceField {
   /// The leaf at a point in grid coordinates.
   CellPoint leafAt(const Vector3& p) const;
 
-  /// Value and gradient of the field at local coordinates of a leaf. The point may lie slightly outside of the
-  /// leaf.
+  /// Value and gradient of the field at local coordinates of a leaf, which may lie slightly outside of the leaf.
   Sample sample(const CellPoint& leaf, const Vector3& local) const;
   double value(const CellPoint& leaf, const Vector3& local) const;
 
@@ -75,21 +72,20 @@ class TraceField {
  private:
   class March;
 
-  /// Returns true if other leaves than the point's own may have a weight at the point.
+  /// Returns true if leaves other than the one that contains the point may have a blending weight there.
   bool inBlendZone(const CellPoint& at) const;
 
   Sample samplePolynomial(std::uint32_t leaf, const Vector3& local) const;
-  /// The blended field by its definition: the weighted mean of all leaves with a weight at the point.
+  /// The blended field by its definition: the weighted mean of the polynomials of all leaves with a weight at the
+  /// point.
   Sample sampleBlended(const CellPoint& leaf, const Vector3& local) const;
-  /// The blending weight of a leaf at a point, and the gradient of the weight. The point is given relative to the
-  /// leaf's lower corner, in grid coordinates.
+  /// The blending weight of a leaf at a point, and its gradient in grid coordinates.
   struct Weight {
     double value;
     Vector3 gradient;
   };
   Weight weightAt(std::uint32_t leaf, int depth, const Vector3& fromCorner) const;
-  /// Calls use(leaf, depth, local, weight) for each leaf with a weight at the point `p`, which is in grid
-  /// coordinates.
+  /// Calls use(leaf, depth, local, weight) for each leaf with a blending weight at the point `p`, in grid coordinates.
   template <typename Use>
   void forEachWeight(const Vector3& p, const Use& use) const;
   /// Calls `use`, as forEachWeight does, for the leaves below a node. `corner` is the lower corner of the node.
@@ -98,7 +94,7 @@ class TraceField {
 
   CellPoint baseCellAt(const Vector3& p) const;
   void descend(CellPoint& at) const;
-  /// The leaf at a point, or the first node on the descent to the leaf whose range of values excludes `offset`.
+  /// Descends to the leaf at a point, but stops earlier at a node whose range of field values excludes `offset`.
   CellPoint relevantNodeAt(const Vector3& p, double offset) const;
   /// The derivative of the linear part of a leaf's polynomial along a direction in local coordinates.
   double linearSlope(std::uint32_t leaf, const Vector3& direction) const;

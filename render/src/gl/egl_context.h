@@ -12,13 +12,13 @@ namespace hpsdf::render {
 /// that offers such a context.
 class EglContext {
  public:
-  /// Throws `Error` that names the devices tried and the reason why each failed.
+  /// Throws `Error` if no device works. The message names the devices tried and why each failed.
   explicit EglContext(GlChoice choice);
   ~EglContext();
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
-  /// The string GL_RENDERER.
+  /// The GL_RENDERER string of the device.
   const std::string& renderer() const { return renderer_; }
 
   /// Makes the context current on this thread for the lifetime of this object. The destructor restores the

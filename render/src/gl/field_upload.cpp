@@ -13,8 +13,8 @@ namespace {
 
 using NodeTexel = std::array<std::uint32_t, 4>;
 
-constexpr int kOffsetBits = 27;  // the other 5 bits hold a degree up to 30
-constexpr int kLowDegree = 4;    // highest degree that field.glsl evaluates without loops; the same as there
+constexpr int kOffsetBits = 27;  // bits of a coefficient's index; the other 5 bits hold a degree up to 30
+constexpr int kLowDegree = 4;    // highest degree that field.glsl evaluates without loops; same value as there
 
 void checkFits(std::size_t texels, std::size_t largest, const char* what) {
   if (texels > largest)
@@ -22,7 +22,7 @@ void checkFits(std::size_t texels, std::size_t largest, const char* what) {
                 std::to_string(largest) + ": render with --cpu, or build a coarser field");
 }
 
-/// The number of coefficients of a leaf on the device, a multiple of four.
+/// The number of coefficients that a leaf of this degree takes on the device, a multiple of four.
 std::size_t uploadedCount(int degree) { return (coefficientCount(std::max(degree, kLowDegree - 1)) + 3) / 4 * 4; }
 
 std::size_t uploadedCount(const FieldData& field) {
@@ -32,9 +32,9 @@ std::size_t uploadedCount(const FieldData& field) {
   return count;
 }
 
-/// Writes the coefficients of a leaf to `out`. Entries for coefficients that the leaf lacks remain zero. A leaf
-/// of degree kLowDegree has its terms of that degree last, so that the lower terms of all leaves up to this
-/// degree have the same order.
+/// Writes the coefficients of a leaf to `out`; entries for coefficients that the leaf lacks remain zero. A leaf of
+/// degree kLowDegree stores its terms of this degree last, so that its other terms have the same order as in leaves of
+/// lower degree.
 template <typename T>
 void uploadLeaf(const T* c, int degree, float* out) {
   const int all = std::max(degree, kLowDegree - 1);

@@ -6,22 +6,21 @@
 
 namespace hpsdf::render {
 
-/// A field on the device, as buffer textures: Mesa's llvmpipe allows them 2^27 texels, a storage buffer only 128 MiB.
+/// A field on the device, in buffer textures: Mesa's llvmpipe allows 2^27 texels in these, but only 128 MiB in a
+/// storage buffer. Floats in RGBA32UI texels are stored as their bits.
 ///
-/// * nodes, RGBA32UI: x is the first child, or degree · 2^27 + index of the leaf's first coefficient.
-///   y is `packOutwards` of the range, or the valueDeviation of a leaf.
-///   z is the gradientDeviation, w the secondDerivative.
-/// * coefficients, R32F: those of the leaves in the order of the nodes, each leaf padded to a multiple of four.
-///   Leaves up to degree 4 have the order of `LowDegree` in field.glsl.
-/// * coefficientQuads, RGBA32F: the buffer of the coefficients, four to a texel.
-/// * linearParts, RGBA32F: `SurfaceBounds::linear`.
-/// * zones, RGBA32UI: x is `LookupGrid::blendExtents`; y, z and w are the numbers of `BlendZoneBounds`.
-///   Empty without blending.
-///
-/// RGBA32UI texels hold floats by their bits.
+/// * nodes, RGBA32UI: x is the index of the first child, or for a leaf degree · 2^27 + index of its first coefficient;
+///   y is the packed range of values (`packOutwards`), or the valueDeviation of a leaf; z is the gradientDeviation, w
+///   the secondDerivative (`SurfaceBounds`).
+/// * coefficients, R32F: the leaves' coefficients in the order of the nodes, padded for each leaf to a multiple of
+///   four. Leaves up to degree 4 have the order of `LowDegree` in field.glsl.
+/// * coefficientQuads, RGBA32F: the same buffer of coefficients, four per texel.
+/// * linearParts, RGBA32F: `SurfaceBounds::linear` of each node.
+/// * zones, RGBA32UI: x is `LookupGrid::blendExtents`; y, z and w are the members of `BlendZoneBounds`. Empty without
+///   blending.
 class FieldUpload {
  public:
-  /// Throws `Error` when the field exceeds what the device holds.
+  /// Throws `Error` if the field is too large for the device.
   FieldUpload(const Field& field, const std::vector<SurfaceBounds>& bounds, const std::vector<BlendZoneBounds>& zones);
 
   /// Binds the texture units 0 (nodes), 1 (coefficients), 4 (linearParts), 5 (coefficientQuads) and 6 (zones).

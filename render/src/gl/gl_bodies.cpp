@@ -1,5 +1,5 @@
-// OpenGL finds the body and the triangle that each pixel sees. The CPU computes the distances and normals in
-// double precision.
+// OpenGL finds the body and the triangle that each pixel shows. The CPU computes distances and normals in double
+// precision.
 
 #include <algorithm>
 #include <array>
@@ -23,19 +23,18 @@ enum : GLuint { kPosition = 0, kTargetFromMesh = 1, kIndex = 5 };
 /// The binding points of the buffers that contain the vertex attributes.
 enum : GLuint { kVertexBinding = 0, kInstanceBinding = 1 };
 
-/// The indices of the body and the triangle that a pixel sees.
+/// The indices of the body and the triangle that a pixel shows.
 using BodyTriangle = std::array<std::uint32_t, 2>;
 
-/// The data of a body, in the layout of the attributes of the vertex shader.
+/// The data of a body, in the layout of the vertex shader's attributes.
 struct Instance {
   std::array<float, 16> targetFromMesh;  ///< column-major
   std::uint32_t body;
 };
 
-/// The transform from points relative to the eye to the clip space of a tile. In this clip space rows run
-/// downwards and nearer points have greater depths. In perspective the depth in clip space is
-/// leastDepth / depth, for which floats have the same relative precision near and far. For parallel rays it
-/// falls linearly with the distance.
+/// The transform from points relative to the eye to the clip space of a tile, in which rows run downwards and nearer
+/// points have greater depths. In perspective, the depth in clip space is leastDepth / depth, for which floats have the
+/// same relative precision near and far. For parallel rays, it falls linearly with the distance.
 Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
   const bool parallel = camera.projection == Projection::orthographic;
   const Eigen::RowVector4d right =
@@ -54,7 +53,7 @@ Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width,
   return result;
 }
 
-/// A ball that contains a mesh, in the mesh's frame.
+/// A bounding sphere of a mesh, in the mesh's frame.
 struct Ball {
   Vector3 center;
   double radius;
@@ -66,8 +65,8 @@ Ball ballAround(const BodyMesh& mesh) {
   return ball;
 }
 
-/// Returns true if a ball may be visible: some of it lies inside each of the left, right, lower, upper and far
-/// planes of the frustum. `center` is relative to the eye.
+/// Returns false if a ball lies wholly beyond one of the left, right, lower, upper and far planes of the frustum.
+/// `center` is relative to the eye.
 bool mayBeVisible(const Eigen::Matrix4d& targetFromEye, const Vector3& center, double radius) {
   constexpr double kRounding = 1e-6;
   for (const auto& [axis, sign] : {std::pair(0, 1), {0, -1}, {1, 1}, {1, -1}, {2, -1}}) {
@@ -78,7 +77,6 @@ bool mayBeVisible(const Eigen::Matrix4d& targetFromEye, const Vector3& center, d
   return true;
 }
 
-/// A mesh on the device.
 struct MeshUpload {
   explicit MeshUpload(const BodyMesh& mesh) {
     glNamedBufferStorage(vertices.name(), GLsizeiptr(mesh.vertices().size() * sizeof(Eigen::Vector3f)), nullptr,
@@ -88,7 +86,7 @@ struct MeshUpload {
     upload(mesh);
   }
 
-  /// Uploads the vertices of the mesh relative to the centre of its ball, so that single precision suffices.
+  /// Uploads the vertices relative to the centre of the mesh's bounding sphere, so that single precision suffices.
   void upload(const BodyMesh& mesh) {
     ball = ballAround(mesh);
     std::vector<Eigen::Vector3f> positions;
@@ -132,9 +130,8 @@ struct BodyResources {
   std::vector<MeshUpload> meshes;
 };
 
-/// The point of a triangle that a pixel's ray meets. OpenGL rounds corners, so that the ray may pass slightly
-/// beside the triangle. The ray's intersection with the triangle's plane is then moved into the triangle. All
-/// vectors are in the mesh's frame.
+/// The point where a pixel's ray meets a triangle, in the mesh's frame. OpenGL rounds corners, so that the ray may pass
+/// slightly beside the triangle. The ray's intersection with the triangle's plane is then moved into the triangle.
 BodyPoint pointOn(const std::array<Vector3, 3>& corners, const Vector3& start, const Vector3& direction,
                   const BodyTriangle& seen) {
   const Vector3 toB = corners[1] - corners[0], toC = corners[2] - corners[0];
@@ -194,7 +191,7 @@ class GlBodyRenderer final : public BodyRenderer {
   std::string description() const override { return context_.renderer(); }
 
  private:
-  /// Draws the bodies that may be visible, mesh after mesh.
+  /// Draws the bodies that may be visible, with one instanced draw call per mesh.
   void drawAll(const Eigen::Matrix4d& targetFromEye, const Vector3& eye, std::span<const Body> bodies) const {
     std::vector<std::vector<Instance>> instances(meshes_.size());
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -225,7 +222,7 @@ class GlBodyRenderer final : public BodyRenderer {
                             nullptr, static_cast<GLsizei>(instances.size()));
   }
 
-  /// Computes normal and distance of the triangle that pixel (x, y) sees.
+  /// Writes the data of the triangle that pixel (x, y) shows, with normal and distance, to the buffers.
   void show(const Camera& camera, std::span<const Body> bodies, const BodyTriangle& seen, int x, int y,
             BodyBuffers& buffers) const {
     const Body& body = bodies[seen[0]];

@@ -10,7 +10,7 @@ namespace hpsdf::render {
 namespace {
 
 struct ShaderKind {
-  static void create(GLuint*) {}  // glCreateShader needs the stage
+  static void create(GLuint*) {}  // empty, because glCreateShader also needs the shader stage
   static void destroy(const GLuint* name) { glDeleteShader(*name); }
 };
 using GlShader = GlObject<ShaderKind>;

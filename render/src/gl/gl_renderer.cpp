@@ -20,7 +20,7 @@ namespace {
 
 static_assert(kTile % kBlock == 0);
 
-/// The locations of the uniforms in shaders/.
+/// The locations of the uniforms in the shaders.
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
@@ -28,21 +28,21 @@ enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend, kBlendedSteps };
 enum : GLint { kViewport = 13, kStartSide };
 constexpr GLint kRefinementLimit = kMostSteps;
 
-constexpr int kStepsInAll = 1 << 16;  // greatest number of steps of a ray, the same as on the CPU
+constexpr int kStepsInAll = 1 << 16;  // greatest number of steps of a ray, as on the CPU
 constexpr int kRefinementsInAll = 24;
 
-/// Greatest total number of loop iterations in one run of a shader. llvmpipe silently ends all loops of a
-/// shader once the sum of their iterations is 65535, and the compiler's own loops may take some of these.
+/// Greatest total number of loop iterations in one run of a shader. llvmpipe silently ends all loops of a shader once
+/// the sum of their iterations is 65535, and loops that the compiler adds count too.
 constexpr int kLoopBudget = 60000;
 
-/// The number of loop iterations in one evaluation of a leaf, including the last test of each loop.
+/// The number of loop iterations in the evaluation of one leaf's polynomial, including the last test of each loop.
 constexpr int evaluationLoops(int degree) {
   const int rows = (degree + 1) * (degree + 2) / 2;
   return coefficientCount(degree) + 2 * rows + 2 * (degree + 1) + 1;
 }
 
-/// The number of loop iterations in one evaluation in a blend zone. It counts eight candidates at each depth,
-/// the descent to the candidates of the first depth, and the evaluation of at most sixteen leaves.
+/// The number of loop iterations in one evaluation of the blended field: the search through eight candidate nodes at
+/// each depth, the descent to the first candidates, and the evaluation of at most sixteen leaves.
 constexpr int blendedEvaluationLoops(int evaluation) {
   return 9 * (kMaxDepth + 1) + 9 * (kMaxDepth + 1) + 16 * evaluation + 2;
 }
@@ -50,7 +50,7 @@ constexpr int blendedEvaluationLoops(int evaluation) {
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
 
-/// The smallest rectangle of a view that contains all blocks. There must be at least one block.
+/// The smallest rectangle of a view that contains all blocks, of which there must be at least one.
 Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
   const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
   const auto [top, bottom] = std::ranges::minmax(blocks, {}, &Block::y);
@@ -124,8 +124,7 @@ class GlRenderer final : public Renderer {
     octree_.nodes = field.data().nodes;
     const std::vector<BlendZoneBounds> zones = blendZoneBounds(field);
     bounds_ = surfaceBounds(field.data(), zones);
-    // Limit the number of steps and of root refinements in one pass, so that the shaders stay within the loop
-    // budget.
+    // Limit the steps and the root refinements in one pass, so that the shaders stay within kLoopBudget.
     const int unblended = evaluationLoops(highestDegree(field.data()));
     const int evaluation = zones.empty() ? unblended : blendedEvaluationLoops(unblended);
     const int loopsOfStep = unblended + kMaxDepth + 4;
@@ -211,8 +210,7 @@ class GlRenderer final : public Renderer {
 
  private:
   void setTile(const Tile& tile) const {
-    // Extend the viewport to whole blocks: a block is drawn as a point, and OpenGL omits points whose centre lies
-    // outside.
+    // Extend the viewport to whole blocks: a block is drawn as a point, and OpenGL omits points with centres outside.
     const auto wholeBlocks = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
     glViewport(0, 0, wholeBlocks(tile.width), wholeBlocks(tile.height));
     for (const GlProgram* program : {&resources_->march, &resources_->hit}) {
@@ -221,8 +219,8 @@ class GlRenderer final : public Renderer {
     }
   }
 
-  /// Traces the rays of a tile and reads the hits. The first pass of the march starts all rays. Further passes
-  /// continue only the pixels whose march has not ended.
+  /// Traces the rays of a tile and reads the hits. The first march pass starts all rays. Further march passes continue
+  /// only the rays whose march has not ended.
   void drawTile(const Tile& tile, GLsizei blocks, const RenderTarget& state, const RenderTarget& target) {
     state.bindForDrawing();
     march(blocks);
@@ -254,7 +252,7 @@ class GlRenderer final : public Renderer {
       glBeginQuery(GL_ANY_SAMPLES_PASSED, query);
       glDrawArrays(GL_POINTS, 0, blocks);
       glEndQuery(GL_ANY_SAMPLES_PASSED);
-      // Each pass reads the texels that the pass before it has written. Each pixel reads only its own texel.
+      // Each march pass reads the texels that the previous pass has written. Each pixel reads only its own texel.
       glTextureBarrier();
       GLuint any = GL_FALSE;
       glGetQueryObjectuiv(query, GL_QUERY_RESULT, &any);
@@ -268,10 +266,10 @@ class GlRenderer final : public Renderer {
     glDrawArrays(GL_POINTS, 0, blocks);
   }
 
-  /// Returns true if the march of a pixel in the result of the hit pass has not ended.
+  /// Returns true if the march of a pixel has not ended, given the texel that the hit pass wrote for this pixel.
   static bool isUnderWay(const Texel& texel) { return texel[0] == kNoCell && texel[1] != 0; }
 
-  /// Copies a pixel of the tile to the view.
+  /// Copies the pixel `from` of the last tile to the pixel `to` of the view's buffers.
   void setPixel(std::size_t from, ViewBuffers& buffers, std::size_t to) const {
     const Texel& texel = integers_[from];
     buffers.cell[to] = texel[0];
@@ -285,13 +283,13 @@ class GlRenderer final : public Renderer {
 
   EglContext context_;
   GridSpace space_;
-  FieldData octree_;  ///< the field's nodes alone
+  FieldData octree_;  ///< the field's octree, without coefficients
   std::vector<SurfaceBounds> bounds_;
   std::unique_ptr<Resources> resources_;
   int stepsInPass_;                   ///< greatest number of steps of a ray in one pass of the march
-  int refinements_;                   ///< greatest number of refinements of a root
-  std::vector<Texel> integers_;       ///< the last tile's integers, as the shaders define them
-  std::vector<NormalTexel> normals_;  ///< the last tile's normals
+  int refinements_;                   ///< greatest number of iterations that refine a root
+  std::vector<Texel> integers_;       ///< integer outputs of the shaders for the last tile
+  std::vector<NormalTexel> normals_;  ///< normals for the last tile
 };
 
 }  // namespace

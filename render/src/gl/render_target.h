@@ -41,18 +41,17 @@ void forEachPixel(const Tile& tile, const F& f) {
   });
 }
 
-/// A render target for the tiles of a part of a view. Each pixel has integers and either four floats or a
-/// depth.
+/// A render target for the tiles of a part of a view. Each pixel has integers, and either four floats or a depth.
 class RenderTarget {
  public:
-  /// `integers` is the format of the integers, `other` that of the floats or depths. Throws `Error` if the device
-  /// cannot draw into such a target.
+  /// `integers` is the OpenGL format of the integers, `other` is the format of the floats or depths. Throws `Error` if
+  /// the device cannot draw into these formats.
   RenderTarget(const Tile& part, GLenum integers, GLenum other) : hasDepth_(other == GL_DEPTH_COMPONENT32F) {
     const int width = std::min(part.width, kTile), height = std::min(part.height, kTile);
     glTextureStorage2D(integers_.name(), 1, integers, width, height);
     glTextureStorage2D(other_.name(), 1, other, width, height);
     for (const GLuint texture : {integers_.name(), other_.name()}) {
-      // Integer textures cannot be read with the default filters.
+      // Integer textures can only be read with nearest filtering, which is not the default.
       glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
       glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     }
@@ -66,8 +65,7 @@ class RenderTarget {
 
   void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
 
-  /// Clears all pixels: the integers to no cell or no body, the floats to no normal, the depth to an infinite
-  /// distance.
+  /// Clears all pixels to no cell or body, a zero normal or an infinite distance.
   void clear() const {
     static_assert(kNoCell == kNoBody);
     constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};
@@ -76,13 +74,13 @@ class RenderTarget {
     glClearNamedFramebufferfv(framebuffer_.name(), hasDepth_ ? GL_DEPTH : GL_COLOR, hasDepth_ ? 0 : 1, kZero);
   }
 
-  /// Binds integers and floats as textures to the units 2 and 3.
+  /// Binds the integers and the floats as textures to the texture units 2 and 3.
   void bindForReading() const {
     glBindTextureUnit(2, integers_.name());
     glBindTextureUnit(3, other_.name());
   }
 
-  /// Reads the integers or the floats of all pixels of a tile. The type of `out` decides which.
+  /// Reads the integers or the floats, depending on the type of `out`, of all pixels of a tile.
   template <typename Channel, std::size_t channels>
   void read(const Tile& tile, std::vector<std::array<Channel, channels>>& out) const {
     constexpr bool kIntegers = std::is_integral_v<Channel>;

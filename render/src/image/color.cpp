@@ -17,8 +17,8 @@ double encodeChannel(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
-// The number of steps of the table for encodeChannel. A step is at most 1/20 of an 8-bit code, so that the
-// table rounds like the function itself.
+// The number of steps of the lookup table for encodeChannel. The function changes by at most 1/20 of an 8-bit code per
+// step, so that table and function rarely round differently.
 constexpr int kEncodeSteps = 65535;
 
 const std::vector<std::uint8_t>& encodeTable() {
@@ -40,7 +40,7 @@ const std::array<float, 256>& decodeTable() {
   return table;
 }
 
-// The matrices are Ottosson's (2020).
+// The matrices are from Ottosson (2020).
 LinearColor oklabToLinear(const Oklab& color) {
   const double l = std::pow(color.lightness + 0.3963377774 * color.a + 0.2158037573 * color.b, 3);
   const double m = std::pow(color.lightness - 0.1055613458 * color.a - 0.0638541728 * color.b, 3);

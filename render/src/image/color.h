@@ -8,7 +8,7 @@
 
 namespace hpsdf::render {
 
-/// Linear sRGB, each channel 0 to 1.
+/// A colour in linear sRGB, each channel 0 to 1.
 using LinearColor = Eigen::Vector3f;
 
 LinearColor decodeSrgb(Color color);
@@ -37,7 +37,7 @@ double colorDifference(const Oklab& a, const Oklab& b);
 
 inline LinearColor mix(const LinearColor& a, const LinearColor& b, float t) { return a + t * (b - a); }
 
-/// Mixes a colour into a pixel, in linear light. `share` is the share of the new colour, 0 to 1.
+/// Mixes a colour into a pixel, in linear light. `share` is the weight of the new colour, 0 to 1.
 inline void mixInto(Color& pixel, const LinearColor& color, float share) {
   pixel = encodeSrgb(mix(decodeSrgb(pixel), color, share));
 }

@@ -104,8 +104,8 @@ DistanceScale distanceScale(double minimum, double maximum) {
   const double largest = std::max(std::abs(minimum), std::abs(maximum));
   if (largest > 0) {
     scale.range = niceCeil(largest);
-    // Divide the span of the values by the iso-lines. If the values are constant, divide the range of the colours
-    // instead.
+    // Space the iso-lines evenly over the span of the values, or over the range of the colours if the values are
+    // constant.
     const double span = maximum - minimum;
     scale.step = niceStep(span > 1e-6 * largest ? span : 2 * scale.range, kIsoLines);
   }

@@ -9,18 +9,17 @@
 
 namespace hpsdf::render {
 
-/// The map for ordered values: from dark violet at 0 over blue, teal and green to pale yellow at 1. Its lightness rises
-/// throughout.
+/// The colour map for ordered values: dark violet at 0, then blue, teal and green, to pale yellow at 1. Its lightness
+/// rises monotonically.
 LinearColor orderedColor(double t);
 
-/// Colours for levels (polynomial degrees or octree depths, 0 to 255), spread evenly over the ordered colour
-/// map.
+/// Colours for levels (polynomial degrees or octree depths, 0 to 255), spread evenly over the colour map.
 class LevelMap {
  public:
   explicit LevelMap(std::span<const int> levels);
 
-  /// The colour of a level. A level that is not in `levels` gets magenta, which the colour map does not contain,
-  /// so that a fault in the buffers is visible.
+  /// The colour of a level. A level that is not in `levels` gets magenta, which the colour map does not contain, so
+  /// that a fault in the buffers becomes visible.
   const LinearColor& operator()(int level) const { return colors_[static_cast<std::uint8_t>(level)]; }
   const std::vector<int>& levels() const { return levels_; }
 
@@ -36,9 +35,8 @@ class ColorScale {
   /// Requires low < high. A logarithmic scale also requires 0 < low.
   ColorScale(double low, double high, bool logarithmic);
 
-  /// A scale for values from `least` (above 0) to `greatest`. The ends of a logarithmic scale are powers of ten,
-  /// at most six decades apart. A linear scale runs from 0 to a number of one or two digits. Its high end is 1 if
-  /// `greatest` is 0.
+  /// A scale for values from `least` (above 0) to `greatest`. The ends of a logarithmic scale are powers of ten, at
+  /// most six decades apart. A linear scale runs from 0 to a number of one or two digits, or to 1 if `greatest` is 0.
   static ColorScale around(double least, double greatest, bool logarithmic);
 
   LinearColor operator()(double value) const {
@@ -73,12 +71,12 @@ LinearColor divergingColor(double t);
 
 /// The range of the colours and the spacing of the iso-lines that show distances in a slice.
 struct DistanceScale {
-  double range = 1;                 ///< the colours span [−range, range]
-  double step = 0.1;                ///< iso-lines are at the multiples of this value
-  double minimum = 0, maximum = 0;  ///< least and greatest value shown
+  double range = 1;                 ///< the colour map covers the distances [−range, range]
+  double step = 0.1;                ///< iso-lines are drawn at the multiples of this distance
+  double minimum = 0, maximum = 0;  ///< least and greatest distance shown
 };
 
-/// Chooses the scale for values within [minimum, maximum]: a range of one or two digits, and about twelve
+/// Chooses the scale for distances in [minimum, maximum]: colours up to a number of one or two digits, and about twelve
 /// iso-lines whose step is {1, 2, 5} · 10^n.
 DistanceScale distanceScale(double minimum, double maximum);
 

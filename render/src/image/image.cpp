@@ -31,8 +31,8 @@ static_assert(sizeof(Color) == 3, "rows of Color are handed to stb as packed byt
 constexpr int kSmallestSize = 16;
 constexpr int kLargestSize = 16384;
 constexpr int kMostSamples = 8;
-// Limits the memory for all samples of a picture. A sample of a surface takes 27 bytes in the buffers, and 27
-// more while a renderer fills them. Bodies take 28 bytes more, and 12 while they are drawn.
+// Limits the memory of a picture. Each sample of a surface takes 27 bytes in the buffers, and 27 more while it is
+// rendered. Bodies add 28 bytes per sample, and 12 more while they are drawn.
 constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
 std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }

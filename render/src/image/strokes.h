@@ -18,12 +18,11 @@ inline PixelRect pixelsNear(const Eigen::Vector2d& from, const Eigen::Vector2d& 
           clamped(std::ceil(high.x()), rect.x0, rect.x1), clamped(std::ceil(high.y()), rect.y0, rect.y1)};
 }
 
-/// A pixel near a segment.
 struct NearPixel {
   int x, y;
   Eigen::Vector2d middle;
   double t;         ///< parameter of the segment's nearest point: 0 at its beginning, 1 at its end
-  double distance;  ///< distance of the pixel's middle from that point, less than the reach
+  double distance;  ///< distance of the pixel's middle from the segment, below the reach
 };
 
 /// Calls f(pixel) for each pixel of `rect` whose middle is less than `reach` away from a segment.

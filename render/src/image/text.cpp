@@ -8,7 +8,7 @@
 
 #include "image/embedded.h"
 
-// Makes the functions static, because ImGui and others contain their own copies of stb.
+// Makes stb's functions static, because ImGui and others contain their own copies of stb.
 #define STB_TRUETYPE_IMPLEMENTATION
 #define STBTT_STATIC
 #include <stb/stb_truetype.h>
@@ -37,7 +37,7 @@ std::size_t sequenceLength(unsigned char first) {
   return first >= 0xc0 ? 2 : 1;
 }
 
-// Removes the first code point from the text. Broken sequences and control characters become U+FFFD, because file names
+// Removes the first code point from the text. Invalid UTF-8 and control characters become U+FFFD, because file names
 // may contain any bytes.
 char32_t takeCodePoint(std::string_view& text) {
   const auto first = static_cast<unsigned char>(text.front());
@@ -64,7 +64,7 @@ struct PlacedGlyph {
   PixelRect box;   // extent of the glyph's bitmap
 };
 
-struct Line {
+struct TextLine {
   std::vector<PlacedGlyph> glyphs;
   double advance = 0;
 };
@@ -73,10 +73,10 @@ float scaleFor(double size) { return stbtt_ScaleForMappingEmToPixels(&font(), st
 
 // Lays out a line of text. Baselines are rounded to whole pixel rows, which keeps horizontal strokes crisp.
 // Columns are not rounded, which keeps the spacing even.
-Line layOut(std::string_view text, double size, double x, double baseline) {
+TextLine layOut(std::string_view text, double size, double x, double baseline) {
   const float scale = scaleFor(size);
   const int row = static_cast<int>(std::lround(baseline));
-  Line line;
+  TextLine line;
   int previous = 0;
   while (!text.empty()) {
     const int glyph = stbtt_FindGlyphIndex(&font(), static_cast<int>(takeCodePoint(text)));
@@ -120,7 +120,7 @@ void drawGlyph(Image& image, const PlacedGlyph& glyph, float scale, Color color)
 }  // namespace
 
 TextMeasure measureText(std::string_view text, double size, double x, double baseline) {
-  const Line line = layOut(text, size, x, baseline);
+  const TextLine line = layOut(text, size, x, baseline);
   TextMeasure measure{line.advance, {}};
   for (const PlacedGlyph& glyph : line.glyphs) {
     if (glyph.box.empty()) continue;
@@ -153,7 +153,7 @@ std::string fitText(std::string_view text, double size, double width) {
   std::vector<std::size_t> ends = {0};  // byte offset after each code point
   for (std::string_view rest = text; !rest.empty(); ends.push_back(text.size() - rest.size())) takeCodePoint(rest);
   const auto shortened = [&](std::size_t count) { return std::string(text.substr(0, ends[count])) + "…"; };
-  // Find the longest part that fits by bisection, because a name may be as long as a path.
+  // Find the longest part that fits by bisection, because names such as file paths may be long.
   std::size_t fits = 0, tooLong = ends.size() - 1;
   if (measureText(shortened(0), size).advance > width) return {};
   while (fits + 1 < tooLong) {

@@ -12,8 +12,8 @@
 namespace hpsdf::render {
 
 struct TextMeasure {
-  double advance = 0;  ///< distance in pixels to the start of a text that follows
-  PixelRect ink;       ///< contains every pixel that drawing may change
+  double advance = 0;  ///< distance in pixels to the start of the next text on the line
+  PixelRect ink;       ///< rectangle of all pixels that drawing the text may change
 };
 
 TextMeasure measureText(std::string_view text, double size, double x = 0, double baseline = 0);

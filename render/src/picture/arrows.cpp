@@ -13,19 +13,18 @@ namespace {
 constexpr Color kCore = {22, 20, 34};
 constexpr Color kCasing = {252, 251, 246};
 constexpr float kCasingStrength = 0.75F;
-// Lengths of an arrow's parts are in multiples of the width of a thin line.
+// The following lengths of an arrow's parts are in multiples of the width of a thin line.
 constexpr double kCoreWidth = 1.3;
-constexpr double kCasingBorder = 1.0;  // width of the casing on either side
+constexpr double kCasingBorder = 1.0;  // width of the light casing on either side of the dark core
 constexpr double kHeadLength = 5.5;
-constexpr double kHeadShare = 0.6;       // greatest share of the arrow that the head takes
-constexpr double kHeadHalfWidth = 0.45;  // as a share of the head's length
-constexpr float kHidden = 0.3F;          // opacity of hidden parts
+constexpr double kHeadShare = 0.6;       // greatest length of the head, as a share of the arrow's length
+constexpr double kHeadHalfWidth = 0.45;  // half the width of the head, as a share of its length
+constexpr float kHidden = 0.3F;          // opacity of an arrow's hidden parts
 
-/// A pixel that shows the field.
 struct FieldPixel {
   int x, y;
-  Vector3 point;     ///< the point that its middle sample shows
-  Vector3 gradient;  ///< the field's gradient there
+  Vector3 point;     ///< the point that the pixel's middle sample shows
+  Vector3 gradient;  ///< the field's gradient at `point`
 };
 
 template <typename View>
@@ -61,7 +60,7 @@ class Shape {
     // The shaft is a capsule that ends in the middle of the head.
     const double shaftEnd = length_ - 0.5 * head_;
     const double toShaft = std::hypot(t - std::clamp(t, 0.0, shaftEnd), across) - half_;
-    // The head is an isosceles triangle; by symmetry only one half of it is considered.
+    // The head is an isosceles triangle; by symmetry, the distance to one half of it suffices.
     const double slope = std::hypot(1.0, kHeadHalfWidth);
     const double beyondSide = (across - kHeadHalfWidth * (length_ - t)) / slope;
     const double beyondBase = length_ - head_ - t;
@@ -117,8 +116,8 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
     if (const double length = along.norm(); length > longest) along *= longest / length;
     const PicturePoint to = project(camera, pixel.point + along, width, height);
     if (!(to.depth > 0)) continue;
-    // A surface hides the arrow only if it is nearer by more than a tolerance. The tolerance is the rise of a
-    // slanted surface within one or two pixels.
+    // A surface hides the arrow only if it is nearer by more than a tolerance of two pixel sizes, because the depth of
+    // a slanted surface varies within a pixel.
     const auto strength = [&buffers, from, to, samples, tolerance = 2 * longest / spacing](double t, int x, int y) {
       const double distance = from.distance + t * (to.distance - from.distance);
       return hides(buffers, samples, x, y, distance, tolerance) ? kHidden : 1.0F;

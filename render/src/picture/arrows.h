@@ -12,7 +12,7 @@
 
 namespace hpsdf::render {
 
-constexpr double kArrowShare = 0.8;  ///< length of an arrow, as a share of the spacing, where the gradient has length 1
+constexpr double kArrowShare = 0.8;  ///< length of an arrow for a gradient of length 1, as a share of the spacing
 
 /// An arrow in a picture. Its ends are in pixels from the upper left corner of the picture.
 struct Arrow {
@@ -28,9 +28,8 @@ struct Arrow {
 std::vector<Arrow> gradientArrows(const Field& field, const SliceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing);
 
-/// Arrows that show the gradient on a surface. They start at the visible point of every `spacing`-th pixel
-/// along both axes. An arrow is faint where something in the buffers hides it. View and buffers must outlive
-/// the result.
+/// Arrows that show the gradient on a surface. They start at the visible point of every `spacing`-th pixel along both
+/// axes. An arrow is faint where something nearer hides it. The buffers must outlive the arrows.
 std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing);
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kBarColors = 256;
 
-/// The colours of the bar in a legend, from end to end. `colorAt` maps positions from 0 to 1 to colours.
+/// The colours of a legend's colour bar, from end to end. `colorAt` maps positions from 0 to 1 to colours.
 std::vector<Color> barOf(const std::function<LinearColor(double)>& colorAt) {
   std::vector<Color> bar;
   for (int i = 0; i < kBarColors; ++i) bar.push_back(encodeSrgb(colorAt(double(i) / (kBarColors - 1))));

@@ -12,10 +12,10 @@
 namespace hpsdf::render {
 
 struct ColorKey {
-  SampleColor color;   ///< may refer to the buffers
-  Legend legend = {};  ///< content of the panel, as data
-  ScaleOptions scale;  ///< the settings' scale with the limits and levels that were chosen
-  std::string name;    ///< name of the colours' meaning in a caption
+  SampleColor color;   ///< colour of each sample; may refer to the buffers
+  Legend legend = {};  ///< the legend in the panel, as data
+  ScaleOptions scale;  ///< the given options, with the limits and levels that were chosen
+  std::string name;    ///< short name of the shown quantity for a caption, e.g. "degree"
   std::string range;   ///< range of a quantity's values in a caption; empty for degrees and depths
 };
 

@@ -9,8 +9,7 @@
 
 namespace hpsdf::render {
 
-/// The colour of cracks, magenta, differs from all colours of surfaces, for readers with any kind of colour
-/// vision.
+/// The colour of cracks: magenta, which differs from all colours of surfaces, also for colour-blind readers.
 constexpr Color kCrackColor = {255, 0, 255};
 
 /// The number of pixels with cracks in a view, and the size of the largest crack.

@@ -17,19 +17,19 @@ namespace {
 constexpr Color kMarkCasing = {24, 22, 34};
 constexpr float kMarkCasingStrength = 0.7F;
 constexpr float kHiddenMark =
-    0.7F;  // opacity of hidden marks; they are dashed rather than faint, so that hues stay distinct
-// Lengths of the marks' parts are in multiples of the width of a thin line.
+    0.7F;  // opacity of hidden marks, which are dashed rather than faint, so that hues stay distinct
+// The following lengths of a mark's parts are in multiples of the width of a thin line.
 constexpr double kDash = 4;  // length of a dash, and of the gap after it
 constexpr double kLineWidth = 1.8;
 constexpr double kDotRadius = 2.6;
 constexpr double kMarkCasingBorder = 0.9;
-constexpr double kSmallGroup = 16;     // a group up to this size gets a ring
+constexpr double kSmallGroup = 16;     // a group of defects up to this size gets a ring
 constexpr double kLeastRing = 9;       // radius of the smallest ring
-constexpr double kHiddenBeyond = 4;    // a mark is hidden by what is nearer by more than this, in pixels
+constexpr double kHiddenBeyond = 4;    // a mark is hidden by a surface that is nearer by more pixel sizes than this
 constexpr double kNearestMark = 1e-3;  // least depth of a mark, as a share of the depth of an edge's farther end
-constexpr int kGroupCell = 8;          // pixels; marks in neighbouring cells of this size belong to one group
+constexpr int kGroupCell = 8;          // size of a grid cell in pixels; marks in neighbouring cells form one group
 
-/// The names and the colour of a kind of defects, as a row of the legend without the number of defects.
+/// The names and the colour of a kind of defects, as a row of the legend without a number.
 const Swatch& styleOf(DefectKind kind) {
   static const std::array<Swatch, kDefectKinds> styles = {
       {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
@@ -51,9 +51,9 @@ bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind 
 struct Stroke {
   PicturePoint from, to;
   double radius = 0;     ///< radius of a ring, pixels; 0 for lines and dots
-  double halfWidth = 0;  ///< pixels
+  double halfWidth = 0;  ///< half the width of the line, pixels
   Color color;
-  double tolerance = 0;  ///< depth by which something must be nearer to hide the stroke, world units
+  double tolerance = 0;  ///< a surface nearer by more than this hides the stroke, world units
 };
 
 class Painter {
@@ -70,7 +70,7 @@ class Painter {
  private:
   void paint(const Stroke& stroke, double border, const LinearColor& color, float opacity) {
     const Eigen::Vector2d from(stroke.from.x, stroke.from.y), to(stroke.to.x, stroke.to.y);
-    const double reach = stroke.halfWidth + border + 0.5;  // from the segment or the ring
+    const double reach = stroke.halfWidth + border + 0.5;  // distance covered around the segment or ring, pixels
     const PixelRect view{0, 0, buffers_.width / samples_, buffers_.height / samples_};
     forEachPixelNear(from, to, stroke.radius + reach, view, [&](const NearPixel& near) {
       const double covered = std::min(reach - std::abs(near.distance - stroke.radius), 1.0);
@@ -108,10 +108,10 @@ class Painter {
   Image& picture_;
   const ViewBuffers& buffers_;
   int samples_;
-  double dash_;  ///< pixels
+  double dash_;  ///< length of a dash, pixels
 };
 
-/// Groups of defects of one kind. The picture is divided into square cells (kGroupCell). A group is a connected
+/// Groups of defects of one kind. The picture is divided into square cells (kGroupCell), and a group is a connected
 /// component of the cells that contain defects.
 class Groups {
  public:
@@ -132,7 +132,7 @@ class Groups {
     return groups;
   }
 
-  /// Adds points on a line to the groups. Neighbouring points are at most the size of a cell apart.
+  /// Adds points along a line to the groups, about one for each cell on the line.
   void add(const PicturePoint& from, const PicturePoint& to) {
     const double length = std::hypot(to.x - from.x, to.y - from.y);
     const int steps = int(std::min(std::ceil(length / kGroupCell), 1e4));
@@ -173,10 +173,10 @@ class Groups {
   Group& at(int column, int row) { return cells_[std::size_t(row) * columns_ + column]; }
 
   int columns_, rows_;
-  std::vector<Group> cells_;  ///< the points of each cell; their extent is empty where there are none
+  std::vector<Group> cells_;  ///< the defects in each cell of the picture; the extent is empty if there are none
 };
 
-/// The ends, in the picture, of the part of a segment that lies in front of the eye. If there is no such part,
+/// The end points, in the picture, of the part of a segment that lies in front of the eye. If there is no such part,
 /// both returned points are behind the eye.
 std::array<PicturePoint, 2> beforeEye(const Camera& camera, const std::array<Vector3, 2>& ends, int width, int height) {
   const auto seen = [&](const Vector3& point) { return project(camera, point, width, height); };

@@ -1,5 +1,5 @@
 #pragma once
-// The texts of captions.
+// Functions that write the texts of captions.
 
 #include <string>
 #include <vector>
@@ -13,7 +13,7 @@ namespace hpsdf::render {
 /// A vector as text, as in "(1, −0.5, 2)".
 std::string formatVector(const Vector3& v, int digits = 4);
 
-/// The name of the field's source.
+/// The name of the field's source, for example of its mesh, or "unnamed field".
 std::string describeSource(const Field& field);
 
 /// The field's target error as text, as in "τ = 1e-5".

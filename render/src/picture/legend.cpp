@@ -11,16 +11,16 @@ namespace {
 
 constexpr Color kShareBar = {206, 209, 218};
 
-// The text size for a picture. Text is 15 pixels high at 1280 × 720. It grows in proportion to larger pictures.
-// In smaller pictures it shrinks less than the picture.
+// The text size for a picture: 15 pixels at 1280 × 720. It grows in proportion to larger pictures, and shrinks less
+// than in proportion to smaller ones.
 double textSizeFor(int width, int height) {
   const double size = std::min<double>(height, width * 9.0 / 16);
   return size >= 720 ? 15 * size / 720 : std::max(9.0, 15 - (720 - size) * 5 / 480);
 }
 
-// The part of the legend's panel below the title that is still free.
+// The part of the legend's panel that is still free below the title.
 struct Column {
-  /// Adds the first of the titles that fits into the panel to the overlay.
+  /// Adds a title to the overlay: the first of `titles` that fits into the panel.
   Column(Overlay& overlay, const Frame& frame, std::span<const std::string> titles)
       : left(frame.panel.x0 + frame.textSize),
         right(frame.panel.x1 - frame.textSize),
@@ -83,8 +83,8 @@ void addSwatch(Overlay& overlay, const LevelRow& row, double left, double width,
   overlay.boxes.push_back({left, std::round(row.top), left + width, std::round(row.top + row.height - gap), color});
 }
 
-// Adds a row for a level: a swatch with the level's number, then the level's share as text. In a roomy picture
-// a grey bar shows the share too.
+// Adds a row for a level: a swatch with the level's number, and the level's share of the volume as text. In a roomy
+// picture, a grey bar shows the share too.
 void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, double size, double largestShare,
                 bool roomy, const LinearColor& color) {
   const double left = std::round(column.left);
@@ -108,8 +108,8 @@ void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, dou
                            middle + half, kShareBar});
 }
 
-// Adds rows for levels that are too low for text in each row. The swatches touch, and only some of them have
-// the level's number beside them.
+// Adds one row per level where rows are too low for a text in each. The swatches touch, and only some of them have the
+// level's number beside them.
 void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<LevelRow>& rows, const LevelMap& map) {
   const double left = std::round(column.left), swatch = std::round(0.35 * column.width());
   const double size = std::min(kSmallestText + 1, 1.1 * kSmallestText);
@@ -137,15 +137,15 @@ std::string formatScientific(double value, int digits) {
   return withoutTrailingZeros(shown.substr(0, e)) + "e" + std::to_string(std::stoi(shown.substr(e + 1)));
 }
 
-// Formats a positive number without an exponent or trailing zeros. It is rounded to `digits` digits, or to a
-// whole number if the whole number has more digits.
+// Formats a positive number without an exponent or trailing zeros, rounded to `digits` digits, or to a whole number if
+// its integer part has more digits.
 std::string formatPlain(double value, int digits) {
   const int beforePoint = static_cast<int>(std::floor(std::log10(value))) + 1;
   return withoutTrailingZeros(printed("%.*f", std::max(0, digits - beforePoint), value));
 }
 
-// Formats a multiple of a step with its sign. All multiples have the same number of decimals. Very small and
-// very large steps give an exponent instead.
+// Formats a multiple of a step with its sign. All multiples have the same number of decimals, or an exponent if the
+// step is very small or very large.
 std::string formatTick(double value, double step) {
   if (value == 0) return "0";
   const std::string sign = value < 0 ? "−" : "+";
@@ -250,13 +250,13 @@ void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& s
   // Choose the iso-lines that get numbers: zero and every 1st, 2nd, 5th, 10th … line from zero, so that the
   // numbers have room.
   const double perLine = bar.height() * scale.step / (2 * scale.range);
-  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // on each side, about 1e7 at most
+  const int lines = static_cast<int>(std::floor(scale.range / scale.step + 1e-9));  // above zero, about 1e7 at most
   int every = 1;
   for (int decade = 1; every * perLine < 1.7 * bar.labelSize && every <= lines; decade *= 10)
     for (const int digit : {2, 5, 10})
       if (every * perLine < 1.7 * bar.labelSize) every = digit * decade;
 
-  // Leave out the iso-lines without numbers if the lines are so dense that they would cover the colours.
+  // Leave out the iso-lines without numbers if they are so dense that they would cover the colours.
   const int next = perLine < 2 * thin ? every : 1;
   for (int line = -(lines / next) * next; line <= lines; line += next) {
     const double y = bar.top + bar.height() * (0.5 - 0.5 * (line * scale.step) / scale.range);
@@ -272,7 +272,7 @@ void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::stri
   const double em = frame.textSize, thin = std::max(1.0, em / 15);
   const Bar bar = addBar(overlay, frame, titles, 0.5 * em, 0.8 * em, [](double t) { return orderedColor(1 - t); });
 
-  double lastLabel = std::numeric_limits<double>::infinity();  // height of the last number; the marks ascend
+  double lastLabel = std::numeric_limits<double>::infinity();  // y coordinate of the last number added
   const auto mark = [&](double value, bool labelled) {
     const double y = bar.bottom - bar.height() * scale.fraction(value);
     labelled = labelled && y + 1.6 * bar.labelSize <= lastLabel;
@@ -293,13 +293,13 @@ void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, cha
   const double extent = length + std::round(1.1 * size);  // length of an arrow with its letter
   if (section.width() < 3 * extent || section.height() < 3 * extent) return;
 
-  // Choose the origin of the arrows: to the left of the section, below the section, or within it on a plate.
+  // Choose the origin of the arrows: to the left of the section, below it, or within it on a background plate.
   double x = section.x0, y = section.y1;
   if (section.x0 - frame.view.x0 >= extent + 2 * gap) {
     x = section.x0 - gap - extent;
     y = std::min<double>(section.y1, frame.view.y1 - gap);
   } else if (frame.view.y1 - section.y1 >= extent + 2 * gap) {
-    x = std::max<double>(x, frame.view.x0 + gap);  // the letter above the arrow extends to its left
+    x = std::max<double>(x, frame.view.x0 + gap);  // room for the letter above the arrow, which extends to its left
     y = section.y1 + gap + extent;
   } else {
     x += gap;

@@ -16,7 +16,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// Points of a curve: distance along the line, value.
+/// Points of a curve; x is the distance along the line, y the value.
 using Points = std::vector<Eigen::Vector2d>;
 
 // The colours of curves differ in lightness as well as in hue, for colour-blind readers and for print.
@@ -26,17 +26,17 @@ constexpr Color kRed = {187, 58, 82};
 constexpr Color kOutside = {238, 238, 240};
 constexpr Color kBorder = {176, 179, 190};
 
-// A row of a chart's legend, with the curve that it names, or with many short curves.
+// A row of a chart's legend, with one curve or with many short curves.
 struct Series {
   std::vector<std::string> names;  // the longest first; the legend shows the first that fits
   Color color;
-  bool broad = false;  // drawn as a broad band, which stays visible under another curve of equal values
+  bool broad = false;  // drawn as a broad band, which stays visible under a curve of equal values
   std::vector<Points> curves;
 };
 
 struct Chart {
   std::vector<std::string> titles;
-  double weight;  // height relative to the other charts
+  double weight;  // height of the chart relative to the other charts
   std::vector<Series> series;
   bool containsZero = false;
 };
@@ -109,8 +109,7 @@ Scale scaleOf(const Chart& chart, double lines) {
   if (!(low <= high)) low = high = 0;
   const double size = std::max(std::abs(low), std::abs(high));
   double margin = kMargin * (high - low);
-  // A curve that is constant up to rounding gets a wide margin, so that the rounding errors do not look like
-  // variation.
+  // Give a curve that is constant up to rounding a wide margin, so that rounding errors do not look like variation.
   if (!(high - low > kFlat * size)) margin = size > 0 ? 0.05 * size : 1;
   low -= margin;
   high += margin;
@@ -182,8 +181,8 @@ class Plotter {
       for (PixelRect& row : *rows) row.x0 = left_, row.x1 = right_;
   }
 
-  // Stacks charts and bands from top to bottom. If the charts would be too low to read, first the bands are left
-  // out, then charts, beginning with the last.
+  // Stacks charts and bands from top to bottom. If the charts would be too low to read, first the bands are left out,
+  // then charts from the last one on.
   void layOutRows(int top, int bottom) {
     const int gap = std::max(1, int(std::lround(0.9 * em_))), bandGap = std::max(1, int(std::lround(0.35 * em_)));
     const int band = int(std::lround(1.5 * em_)), least = int(std::lround(2.6 * em_));
@@ -224,7 +223,7 @@ class Plotter {
 
   // Draws a chart's two axes and its horizontal grid lines with their values. The grid line at zero is darker.
   void drawGround(const PixelRect& chart, const Scale& scale) {
-    double lastLabel = std::numeric_limits<double>::infinity();  // baseline of the last number; the ticks ascend
+    double lastLabel = std::numeric_limits<double>::infinity();  // baseline of the last number added
     for (const double tick : ticksOf(scale)) {
       const double y = yOf(chart, scale, tick);
       const std::string label = tickText(tick, scale.step);
@@ -257,8 +256,8 @@ class Plotter {
     nameOutside(bands_[0]);
   }
 
-  // Draws the band of degrees or depths below the charts. Its colours depend on all levels of the field, as in
-  // slices. Its legend contains only the levels of cells on the line.
+  // Draws the band of degrees or depths below the charts. Its colours depend on all levels of the field, as in pictures
+  // of slices. Its legend contains only the levels of cells on the line.
   void drawBand(const PixelRect& band, const std::string& name, const std::map<int, double>& ofField,
                 const auto& levelOf) {
     std::vector<int> levels;
@@ -365,7 +364,7 @@ class Plotter {
     const std::vector<LineJump> jumps = jumpsAlong(line_);
     double greatest = 0;
     for (const LineJump& jump : jumps) greatest = std::max(greatest, std::abs(jump.value));
-    // Choose as many digits for coordinates as are needed to tell the two ends of the line apart.
+    // Show as many digits of the coordinates as are needed to tell the two ends of the line apart.
     const double size = std::max(line_.from.cwiseAbs().maxCoeff(), line_.to.cwiseAbs().maxCoeff());
     const int digits = int(std::clamp(std::ceil(std::log10(size / line_.length())) + 3, 4.0, 15.0));
     std::vector<std::string> details = {
@@ -380,14 +379,14 @@ class Plotter {
   const Field& field_;
   const Line& line_;
   // Lengths are in pixels.
-  const double em_, small_, thin_;  // sizes of text and small text, width of thin lines
+  const double em_, small_, thin_;  // sizes of normal and small text, width of thin lines
   const bool labelled_;             // true if the picture has room for numbers
   std::vector<Chart> charts_;
   std::vector<Scale> scales_;
-  int left_ = 0, right_ = 0;  // extent of the line
+  int left_ = 0, right_ = 0;  // x coordinates of the plotted line's ends
   std::vector<PixelRect> bands_;
   int bottom_ = 0;     // lower end of the last chart or band
-  LineLayout layout_;  // its charts are the rectangles of charts_
+  LineLayout layout_;  // layout_.charts[n] is the rectangle of charts_[n]
 };
 
 }  // namespace

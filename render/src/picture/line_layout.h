@@ -1,6 +1,6 @@
 #pragma once
-// The layout of a line plot: its charts, curves, boxes and texts. The plot is laid out before it is painted, so
-// that tests can check the layout.
+// The layout of a line plot: its charts, curves, boxes and texts. It is computed before painting, so that tests can
+// check it.
 
 #include <Eigen/Core>
 #include <span>

@@ -22,7 +22,7 @@ namespace {
 constexpr double kFarthest = 1e15;    // greatest coordinate of a camera's target, in a unit near the mesh's size
 constexpr double kMeshBorder = 0.04;  // free border around a whole mesh, as a share of the view's width and height
 
-/// The kinds of visible faces: front side, back side, or a face that crosses another. The values index the
+/// The kinds of visible faces: front side, back side, or a face that crosses another. The values are indices of
 /// materials.
 enum Side : std::uint32_t { front, back, crossing };
 constexpr Color kBack = {78, 124, 190};
@@ -67,7 +67,7 @@ OrbitCamera nearestForWhole(const std::vector<Vector3>& points, OrbitCamera orbi
   for (const Vector3& point : points) {
     const Vector3 from = point - target;
     const double nearer = orbit.projection == Projection::perspective ? -from.dot(camera.forward) : 0;
-    for (const Vector3& half : {camera.right, camera.up})  // half the view's sides at distance 1
+    for (const Vector3& half : {camera.right, camera.up})  // half the view's width and height at distance 1
       distance = std::max(distance, nearer + std::abs(from.dot(half)) / half.squaredNorm() / (1 - 2 * kMeshBorder));
   }
   orbit.distance = distance / domain.diagonal().norm();

@@ -46,7 +46,7 @@ Frame frameOfSurface(const SurfacePicture& picture) {
   return result;
 }
 
-/// The rectangle of pixels of a slice that contains all pixels which show the domain.
+/// The smallest rectangle of pixels of a slice that contains all pixels which show the domain.
 PixelRect sectionOf(const ViewBuffers& buffers, int samples) {
   PixelRect samplesHit = {buffers.width, buffers.height, 0, 0};
   for (int y = 0; y < buffers.height; ++y)
@@ -67,8 +67,7 @@ void movePanelTo(const PixelRect& section, Frame& frame) {
   frame.panel.x1 -= space;
 }
 
-/// Names the axes in the picture of a slice. Does nothing for an oblique plane, which is not parallel to two
-/// axes.
+/// Adds arrows that name the axes to the picture of a slice, unless the slice is oblique.
 void addAxesOf(Overlay& overlay, const Frame& frame, const SliceView& view, const PixelRect& section) {
   const int right = axisAlong(view.right), up = axisAlong(view.up);
   if (right >= 0 && up >= 0 && !section.empty()) addAxes(overlay, frame, section, "xyz"[right], "xyz"[up]);
@@ -79,7 +78,8 @@ void checkArrows(int spacing) {
     throw Error("arrows = " + std::to_string(spacing) + " is out of range: give 4 to 1000 pixels between them, or 0");
 }
 
-/// Draws arrows along the gradient over the finished view. Legend and caption may cover the arrows later.
+/// Draws arrows along the gradient over the finished view. The legend and the caption are painted later, over the
+/// arrows.
 void addArrows(Image& image, const Frame& frame, const Field& field, const auto& view, const ViewBuffers& buffers,
                int samples, int spacing) {
   if (spacing > 0)
@@ -99,7 +99,7 @@ std::function<Vector3(int, int)> pointsOf(const View& view, const ViewBuffers& b
   };
 }
 
-/// A slice view of the domain's section with a plane, framed for a view of width × height pixels.
+/// A view of the domain's section with a plane, framed for width × height pixels.
 SliceView sectionView(const Box& domain, const Plane& plane, int width, int height) {
   if (const auto* axis = std::get_if<AxisPlane>(&plane))
     return axisSlice(domain, axis->axis, axis->offset, width, height);
@@ -107,11 +107,12 @@ SliceView sectionView(const Box& domain, const Plane& plane, int width, int heig
   return planeSlice(domain, free.point, free.normal, width, height);
 }
 
-/// The view and the buffers of a picture of a surface, with all it shows: surface, sections, cells and bodies.
+/// The view and the buffers of a picture of a surface, with all parts of the scene: surface, sections, cells and
+/// bodies.
 struct Scene {
   SurfaceView view;
   ViewBuffers buffers;
-  std::vector<float> lines = {};  ///< how strongly edges of cells cover each sample, 0 to 1; empty without such lines
+  std::vector<float> lines = {};  ///< share of each sample, 0 to 1, that edges of cells cover; empty if none are drawn
 
   /// Returns true if any pixel shows a cell of the field or a line along the edge of a cell.
   bool showsField() const {
@@ -129,7 +130,7 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   checkClip(picture.clip);
   const ShownBodies& bodies = picture.bodies;
   Camera camera = cameraOf(picture.camera, field.domain(), width, height);
-  // Parallel rays start in front of the domain. Move their start in front of the bodies too.
+  // Parallel rays start in front of the domain. Move their start back to lie in front of the bodies too.
   if (bodies.renderer) camera = startingBefore(bodies.renderer->bounds(bodies.bodies), camera);
   const SurfaceView view{camera, picture.offset, picture.clip};
   width *= picture.samples;
@@ -147,8 +148,7 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   return scene;
 }
 
-/// Adds facts about the field to the panel. They replace the legend if the colours of the picture show no
-/// quantity.
+/// Adds facts about the field to the panel, in place of the legend of a picture without a colour scale.
 void addFieldFacts(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures) {
   static const std::string titles[] = {"hp distance field", "field"};
   const std::pair<std::string, std::string> facts[] = {
@@ -168,7 +168,7 @@ std::vector<LinearColor> materialsOf(const ShownBodies& shown) {
   return materials;
 }
 
-/// Adds the details for the caption about all contents of a surface's picture except its colours and marks.
+/// Adds the caption's details about the contents of a surface's picture, except its colours and marks.
 void addSceneDetails(const SurfacePicture& picture, std::vector<std::string>& details) {
   if (picture.bodies.renderer) {
     if (!picture.bodies.note.empty()) details.push_back(picture.bodies.note);
@@ -377,7 +377,7 @@ std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y)
 }
 
 bool meetsWalls(const Field& field, double offset) {
-  constexpr int kPoints = 40;  // along each side of a wall
+  constexpr int kPoints = 40;  // number of test points along each side of a wall
   const Box& domain = field.domain();
   bool below = false, above = false;
   for (int wall = 0; wall < 6; ++wall) {

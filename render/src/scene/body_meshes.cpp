@@ -15,14 +15,14 @@
 namespace hpsdf::render {
 namespace {
 
-// Greatest angle between the normals of adjacent faces that are shaded as one smooth surface. In a sphere of 80
-// triangles the angles are smaller, at the edges of a gear's teeth they are larger.
+// Greatest angle between the normals of adjacent faces that are shaded as one smooth surface. The angles in a sphere of
+// 80 triangles are smaller, the angles at the edges of a gear's teeth are larger.
 constexpr double kCreaseDegrees = 40;
 
 constexpr std::size_t kMostTriangles = std::size_t{1} << 26;
 constexpr std::size_t kMostBodies = std::size_t{1} << 24;
-constexpr double kGreatest = 1e15;        // greatest coordinate: squares of triangle areas stay finite
-constexpr double kRigidTolerance = 1e-6;  // greatest deviation of a rotation's RᵀR from the identity
+constexpr double kGreatest = 1e15;        // greatest coordinate, so that squares of triangle areas stay finite
+constexpr double kRigidTolerance = 1e-6;  // greatest entry of RᵀR − identity for a rotation R
 
 bool isInRange(const Vector3& point) { return point.allFinite() && point.cwiseAbs().maxCoeff() <= kGreatest; }
 

@@ -12,7 +12,7 @@ namespace hpsdf::render {
 namespace {
 
 constexpr std::size_t kMostPixels = std::size_t{1} << 26;
-constexpr double kLeastDepth = 1e-5;  // least visible depth in perspective, in parts of the farthest depth
+constexpr double kLeastDepth = 1e-5;  // least visible depth in perspective, as a share of the farthest depth
 
 }  // namespace
 

@@ -1,5 +1,5 @@
 #pragma once
-// Functions for views of bodies that the CPU and the OpenGL body renderer share.
+// Functions for views of bodies, used by both the CPU and the OpenGL renderer of bodies.
 
 #include "scene/body_meshes.h"
 
@@ -22,15 +22,14 @@ BodyBuffers emptyBodyBuffers(int width, int height);
 /// The point of a body that a pixel sees.
 struct BodyPoint {
   std::uint32_t body, triangle;
-  double distance;  ///< along the pixel's ray from its start, world units
+  double distance;  ///< distance along the pixel's ray from its start, world units
   Vector3 barycentric;
-  bool fromBehind;  ///< whether the ray meets the side from which the triangle's corners run clockwise
+  bool fromBehind;  ///< whether the ray meets the back of the triangle, from which its corners run clockwise
 };
 void showBody(const BodyMeshes& meshes, std::span<const Body> bodies, const BodyPoint& point, std::size_t pixel,
               BodyBuffers& buffers);
 
-/// Copies each pixel of `bodies` to `buffers` if its body is nearer to the eye than what `buffers` show at the
-/// pixel.
+/// Copies each pixel of `bodies` to `buffers` where the body is nearer to the eye than the point that `buffers` show.
 void addBodies(const BodyBuffers& bodies, ViewBuffers& buffers);
 
 /// Returns the camera with the start of its parallel rays moved back in front of the box. A perspective camera

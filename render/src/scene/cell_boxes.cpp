@@ -38,7 +38,7 @@ BoxRay rayOf(const Camera& camera, int x, int y, int width, int height) {
 /// The point at which a ray enters a box.
 struct Entry {
   double distance;
-  int axis;  ///< axis across the face that the ray enters
+  int axis;  ///< axis perpendicular to the face through which the ray enters
 };
 
 /// The point at which a ray that starts outside of a box enters the box. Returns std::nullopt if the ray misses
@@ -54,15 +54,14 @@ std::optional<Entry> enter(const BoxRay& ray, const Box& box) {
   return entry;
 }
 
-/// The drawn box of a cell.
+/// A box that is drawn for a cell.
 struct CellBox {
   Box box;
   const Cell* cell;
   double squaredDistance;  ///< squared distance of the box from the eye
 };
 
-/// The boxes to draw for the cells, sorted by their distance from the eye. Near boxes come first because they
-/// hide most of the others.
+/// The boxes to draw for the cells, from near to far, because near boxes hide most of the others.
 std::vector<CellBox> boxesOf(const SurfaceView& view, const std::vector<Cell>& cells) {
   const Camera& camera = view.camera;
   std::vector<CellBox> boxes;

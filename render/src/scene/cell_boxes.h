@@ -1,5 +1,5 @@
 #pragma once
-// Cells of the octree in a picture of a surface: the choice of the shown cells, and their drawing as boxes.
+// Cells of the octree in a picture of a surface: their selection by degree and depth, and their drawing as boxes.
 
 #include <array>
 #include <vector>
@@ -13,19 +13,18 @@ namespace hpsdf::render {
 /// The leaves of the chosen degrees and depths, in the order of the octree.
 std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice);
 
-/// The part of a box that the view's clipping plane leaves; empty where the plane leaves nothing or only a face.
+/// The part of a box that the view's clipping plane does not remove; empty if it removes all but a face.
 Box clipped(Box box, const SurfaceView& view);
 
-/// The corners of a box; bit k of a corner's index is set where its coordinate along axis k is the greater one.
+/// The corners of a box; bit k of a corner's index is set if its coordinate along axis k is the greater one.
 std::array<Vector3, 8> cornersOf(const Box& box);
 
-/// The edge length of a drawn box as a share of the edge length of its cell. It is below 1, so that there are
-/// gaps between boxes.
+/// The edge length of a drawn box as a share of its cell's edge length, below 1 to leave gaps between boxes.
 constexpr double kBoxShare = 0.8;
 
-/// Shows each cell as a solid box about the cell's centre, in pixels where the box is nearer to the eye than
-/// what the buffers show. Such a pixel shows the face that its ray enters, with the field's value there and the
-/// outward normal. A clipping plane cuts boxes. A box that contains the eye is left out.
+/// Shows each cell as a solid box about the cell's centre, in pixels where the box is nearer to the eye than the point
+/// that the buffers show. Such a pixel gets the field's value at the point where its ray enters the box, and the
+/// outward normal of the face there. A clipping plane cuts boxes. A box that contains the eye is left out.
 void addBoxes(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells, ViewBuffers& buffers);
 
 }  // namespace hpsdf::render

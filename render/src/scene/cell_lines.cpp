@@ -15,15 +15,14 @@
 namespace hpsdf::render {
 namespace {
 
-// An edge fades if its length in the picture lies between two limits, given here in multiples of the line
-// width.
-constexpr double kFullLength = 24;  // edges of this length or more have full strength
+// A cell edge fades if its length in the picture lies between two limits, in multiples of the line width.
+constexpr double kFullLength = 24;  // edges of this length or more are drawn at full strength
 constexpr double kGoneLength = 6;   // edges of this length or less are not drawn
 
-constexpr double kFarthestStrength = 0.3;  // strength at the far end of the domain; it is 1 at the near end
+constexpr double kFarthestStrength = 0.3;  // opacity of lines at the far end of the domain; at the near end it is 1
 constexpr double kNearDepth = 1e-3;        // least depth at which lines are drawn, in domain diagonals
 
-/// An edge of a cell, or the part of the edge that a clipping plane leaves.
+/// An edge of a cell, or the part of the edge that a clipping plane does not remove.
 struct Segment {
   Vector3 a, b;
   double edgeLength;  ///< length of the whole edge, world units
@@ -33,17 +32,17 @@ struct Segment {
 struct Edge {
   Segment segment;
   PicturePoint from, to;
-  float strength = 0;  ///< 0 for an edge that is not drawn
+  float strength = 0;  ///< opacity of the line; 0 for an edge that is not drawn
 };
 
-/// Identifies an edge of a cell. All cells of one size that share an edge give the same key.
+/// Identifies an edge of a cell. All cells of one size that share the edge have the same key for it.
 struct EdgeKey {
-  std::array<std::uint64_t, 3> from;  ///< lower end, in cells of the greatest depth
-  std::uint64_t kind;                 ///< axis and depth
+  std::array<std::uint64_t, 3> from;  ///< lower end of the edge, in units of the smallest possible cell
+  std::uint64_t kind;                 ///< axis and octree depth of the edge
   bool operator==(const EdgeKey&) const = default;
 };
 
-/// Collects the edges of cells, each once.
+/// Collects the edges of cells. An edge that cells of one size share is collected once.
 class EdgeCollector {
  public:
   EdgeCollector(const Field& field, std::size_t mostCells)
@@ -54,7 +53,7 @@ class EdgeCollector {
     keys_.reserve(12 * mostCells);
   }
 
-  /// Adds the edges of a cell. `box` is the part of the cell that a clipping plane leaves.
+  /// Adds the edges of a cell. `box` is the part of the cell that a clipping plane does not remove.
   void add(const Cell& cell, const Box& box) {
     const Vector3 first = (cell.box.min() - lower_).cwiseProduct(cellsPerUnit_);
     const std::uint64_t size = std::uint64_t{1} << (kMaxDepth - cell.depth);
@@ -112,14 +111,14 @@ class EdgePainter {
     farthest_ = std::max(middle + half, nearest_ + 1e-9 * half);
   }
 
-  /// False where all edges of a box are too small in the picture or behind the eye.
+  /// Returns false if all edges of a box are too small in the picture or behind the eye.
   bool mayShow(const Box& box) const {
     const double middle = (box.center() - camera_.eye).dot(camera_.forward);
     const double half = 0.5 * box.sizes().dot(camera_.forward.cwiseAbs());
     return middle + half > nearDepth_ && pixelsAt(box.sizes().maxCoeff(), middle - half) > kGoneLength * width_;
   }
 
-  /// Projects the part of a segment in front of the eye to the picture, and finds the strength of its line.
+  /// Projects the part of a segment in front of the eye to the picture, and sets the strength of its line.
   Edge projected(Segment segment) const {
     const auto toPicture = [&](const Vector3& p) { return project(camera_, p, buffers_.width, buffers_.height); };
     Edge edge{segment, toPicture(segment.a), toPicture(segment.b)};
@@ -157,8 +156,8 @@ class EdgePainter {
   void paintPixel(const Edge& edge, const NearPixel& near) const {
     const double t = near.t, covered = std::min(radius_ - near.distance, 1.0);
     const std::size_t i = std::size_t(near.y) * buffers_.width + near.x;
-    // Find the parameter s of the point along the edge in space. Equal steps in a perspective picture are not equal
-    // steps in space.
+    // Find the parameter s of the point along the edge in space, because equal steps in a perspective picture are not
+    // equal steps in space.
     const double toFar = parallel_ ? 1 - t : (1 - t) * edge.to.depth, toNear = parallel_ ? t : t * edge.from.depth;
     const double s = toNear / (toFar + toNear);
     const double depth = edge.from.depth + s * (edge.to.depth - edge.from.depth);
@@ -167,8 +166,7 @@ class EdgePainter {
     if (strength <= coverage_[i]) return;
     if (buffers_.covered(i)) {
       const Vector3 p = edge.segment.a + s * (edge.segment.b - edge.segment.a);
-      // Allow for the sampling: the buffers may show the surface at a point one or two pixels away from the line on
-      // it.
+      // Allow a tolerance, because the buffers show the surface at sample points up to two pixels away from the line.
       const double tolerance = (width_ + 2) * (parallel_ ? pixel_ : pixel_ * depth);
       if ((parallel_ ? depth : (p - camera_.eye).norm()) > double(buffers_.distance[i]) + tolerance) return;
     }
@@ -182,7 +180,7 @@ class EdgePainter {
   double width_;               ///< width of lines, pixels
   double radius_;              ///< distance from a line's middle up to which pixels are covered, pixels
   double nearDepth_;           ///< least depth at which lines are drawn, world units
-  double nearest_, farthest_;  ///< depths of the domain's ends
+  double nearest_, farthest_;  ///< least and greatest depth of the domain
   std::vector<float>& coverage_;
 };
 

@@ -7,9 +7,9 @@
 
 namespace hpsdf::render {
 
-/// The share of each pixel, 0 to 1, that the edges of cells cover when drawn as lines of `lineWidth` pixels.
-/// What the buffers show hides lines behind it. Lines fade with their distance, and vanish if their cells are
-/// small in the picture. A clipping plane cuts cells.
+/// The share of each pixel, 0 to 1, that lines of `lineWidth` pixels along the edges of cells cover. Lines behind the
+/// objects in the buffers are hidden. Lines fade with their distance, and vanish if their cells are small in the
+/// picture. A clipping plane cuts cells.
 std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
                              const ViewBuffers& buffers, double lineWidth);
 

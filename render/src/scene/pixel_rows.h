@@ -13,10 +13,10 @@
 
 namespace hpsdf::render {
 
-/// The pixels of a view whose centres may lie in the convex hull of the points. Returns no pixels if all depths
-/// are below `leastDepth`, and the whole view if only some are, because the hull then extends behind the eye.
+/// The pixels of a view whose centres may lie in the convex hull of the points. Returns no pixels if all points have
+/// depths below `leastDepth`, and the whole view if only some have, because the hull then extends behind the eye.
 inline PixelRect pixelsAround(std::span<const PicturePoint> points, double leastDepth, int width, int height) {
-  constexpr double kMargin = 1e-6;  // for rounding, pixels
+  constexpr double kMargin = 1e-6;  // margin for rounding errors, pixels
   Eigen::AlignedBox2d hull;
   std::size_t behind = 0;
   for (const PicturePoint& p : points) {

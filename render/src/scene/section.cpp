@@ -13,7 +13,7 @@ namespace {
 struct ScenePlane {
   Vector3 point;
   Vector3 normal;                          ///< unit vector
-  Vector3 lookupOffset = Vector3::Zero();  ///< vector from a point of the plane to where its cell and value are taken
+  Vector3 lookupOffset = Vector3::Zero();  ///< offset from the plane at which cells and values are looked up
 };
 
 /// The intersection of a pixel's ray with a plane.
@@ -24,8 +24,7 @@ struct PlaneHit {
   Vector3 ray;  ///< unit direction of the ray
 };
 
-/// Shows the part of a plane within the domain, in the pixels for which both `visible(hit)` and `keeps(value)`
-/// are true.
+/// Shows the part of a plane within the domain, in pixels for which both `visible(hit)` and `keeps(value)` are true.
 template <typename Visible, typename Keeps>
 void addScenePlane(const Field& field, const Camera& camera, const ScenePlane& plane, Shown shown,
                    const Visible& visible, const Keeps& keeps, ViewBuffers& buffers) {
@@ -40,7 +39,8 @@ void addScenePlane(const Field& field, const Camera& camera, const ScenePlane& p
       const double distance = plane.normal.dot(plane.point - eye) / plane.normal.dot(ray);
       if (!(distance > 0)) continue;
       Vector3 point = eye + distance * ray;
-      // The coordinate along the normal of an axis-aligned plane must be exact, because cells are half-open.
+      // Remove the rounding error perpendicular to an axis-aligned plane, because the plane may lie on a face between
+      // cells.
       if (axis >= 0) point[axis] = plane.point[axis];
       const PlaneHit hit{std::size_t(y) * buffers.width + x, distance, point, ray};
       if (!field.domain().contains(point) || !visible(hit)) continue;
@@ -83,8 +83,7 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
   ScenePlane plane{offset * Vector3::Unit(axis), Vector3::Unit(axis)};
   const double nudge = kClipNudge * field.domain().sizes()[axis];
   plane.lookupOffset[axis] = eyeAbove(view.camera, *view.clip) ? -nudge : nudge;
-  // Show the section in all pixels that see it. It lies in front of all other hits, because rays start behind the
-  // clipping plane.
+  // Show the section in all pixels that see it. It hides all other hits, because rays start behind the clipping plane.
   addScenePlane(
       field, view.camera, plane, Shown::section, [](const PlaneHit&) { return true; },
       [&](double value) { return value < view.offset; }, buffers);

@@ -10,7 +10,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// A node and its box, in cells of depth kMaxDepth counted from the domain's lower corner.
+/// A node and its box. Lengths are in units of the smallest possible cell, from the domain's lower corner.
 struct NodeBox {
   std::uint32_t node;
   int depth;
@@ -65,8 +65,7 @@ void visitTouching(const FieldData& field, const NodeBox& leaf, const Visit& vis
   });
 }
 
-/// A polynomial on a box. With n = degree + 1, the coefficient of L_i L_j L_k has the index (i · n + j) · n +
-/// k.
+/// A polynomial on a box. With n = degree + 1, the coefficient of L_i L_j L_k has the index (i · n + j) · n + k.
 class Polynomial {
  public:
   template <typename T>
@@ -86,7 +85,7 @@ class Polynomial {
     if (scale == 1 && shift == 0) return;
     findRows(scale, shift);
     const int n = size_, along = axis == 0 ? n * n : axis == 1 ? n : 1;
-    const int first = axis == 0 ? n : n * n, second = axis == 2 ? n : 1;  // strides of the other axes
+    const int first = axis == 0 ? n : n * n, second = axis == 2 ? n : 1;  // strides of the two other axes
     for (int a = 0; a < n; ++a)
       for (int b = 0; a + b < n; ++b) {
         double* line = c_.data() + a * first + b * second;
@@ -104,15 +103,15 @@ class Polynomial {
     for (std::size_t n = 0; n < c_.size(); ++n) c_[n] -= other.c_[n];
   }
 
-  /// The sum of the coefficients' magnitudes. It is an upper bound of the polynomial's magnitude on its box.
+  /// The sum of the coefficients' magnitudes, an upper bound of the polynomial's magnitude on its box.
   double magnitude() const {
     double sum = 0;
     for (const double c : c_) sum += std::abs(c);
     return sum;
   }
 
-  /// An upper bound of the length of the polynomial's gradient on the box. The gradient is with respect to
-  /// coordinates of which one unit is `perUnit` units of this box's coordinates.
+  /// An upper bound of the length of the polynomial's gradient on the box, with respect to other coordinates. `perUnit`
+  /// is the derivative of the box's coordinates by these coordinates, for each axis.
   double gradientBound(const Vector3& perUnit) {
     Vector3 gradient = Vector3::Zero();
     for (int i = 0; i < size_; ++i)
@@ -171,8 +170,8 @@ class LeafBounder {
     return deepest;
   }
 
-  /// Restricts the polynomials of both leaves to the part of `leaf` into which the weight of `other` may extend.
-  /// Returns the sum of the magnitudes of all coefficients of the two restricted polynomials.
+  /// Restricts the polynomials of `leaf` and `other` to the part of `leaf` into which the blending weight of `other`
+  /// may extend. Returns the sum of the magnitudes of all coefficients of the two restricted polynomials.
   double restrictBoth(const NodeBox& leaf, const NodeBox& other) {
     const int size = std::max(degree(leaf), degree(other)) + 1;
     assign(ofLeaf_, leaf, size);
@@ -203,7 +202,7 @@ class LeafBounder {
   const FieldData& field_;
   const std::vector<std::uint32_t>& extents_;
   Polynomial ofLeaf_, ofOther_;
-  Vector3 perUnit_;  // change of the restricted box's coordinates where those of the leaf change by 1
+  Vector3 perUnit_;  // derivative of the restricted box's local coordinates by those of the leaf
 };
 
 }  // namespace

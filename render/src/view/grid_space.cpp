@@ -35,7 +35,7 @@ SliceGeometry::SliceGeometry(const GridSpace& space, const SliceView& view, int 
 }
 
 bool eyeAbove(const Camera& camera, const ClipPlane& clip) {
-  constexpr double kParallel = 1e-9;  // component of a unit direction that counts as rounding of 0
+  constexpr double kParallel = 1e-9;  // components of a unit direction up to this size count as 0
   const double ahead = camera.forward[clip.axis];
   if (camera.projection == Projection::orthographic && std::abs(ahead) > kParallel) return ahead < 0;
   return camera.eye[clip.axis] >= clip.offset;
@@ -58,8 +58,8 @@ RayGeometry::RayGeometry(const GridSpace& space, const Camera& camera, int w, in
   checkCamera(camera, w, h);
   checkClip(clip);
   if (!clip) return;
-  // The visible part of the domain ends slightly behind the clipping plane. If the plane lies along faces of
-  // cells, rays then start in a cell behind the plane in single precision too.
+  // Let the visible part of the domain end slightly behind the clipping plane. If the plane lies along faces of cells,
+  // rays then start in a cell behind the plane in single precision too.
   const bool above = eyeAbove(camera, *clip);
   const double cut = space.point(Vector3::Constant(clip->offset))[clip->axis];
   const double behind = cut + (above ? -kClipNudge : kClipNudge) * space.grid[clip->axis];

@@ -10,8 +10,8 @@
 
 namespace hpsdf::render {
 
-/// The transform from world to grid coordinates. Its operations have the same order as in the queries of core,
-/// so that renderers and queries put a plane through the middle of the domain on the same side of a face.
+/// The transform from world to grid coordinates. Its operations have the same order as in the queries of a field, so
+/// that both put a plane through the middle of the domain on the same side of a face.
 struct GridSpace {
   explicit GridSpace(const FieldData& field);
 
@@ -44,8 +44,7 @@ struct SliceGeometry {
 /// The cells that a section shows are looked up at the same distance behind the plane.
 constexpr double kClipNudge = 1e-6;
 
-/// Returns true if a clipping plane removes its side of greater coordinates. A clipping plane removes the side
-/// from which the camera looks at it.
+/// Returns true if a clipping plane removes its side of greater coordinates, because the camera looks at it from there.
 bool eyeAbove(const Camera& camera, const ClipPlane& clip);
 
 /// The rays of a camera. Let across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY. In perspective the ray
@@ -68,7 +67,7 @@ struct RayGeometry {
   }
 
   bool parallel;               ///< whether rays are parallel: an orthographic view
-  Vector3 eye;                 ///< grid coordinates
+  Vector3 eye;                 ///< the camera's eye, grid coordinates
   Vector3 lo, hi;              ///< corners of the visible part of the domain, grid coordinates
   Vector3 forward, right, up;  ///< vectors of the camera, world units
   Vector3 scale;               ///< grid coordinates per world unit
@@ -76,7 +75,7 @@ struct RayGeometry {
   double stepX, stepY;  ///< 1/w, 1/h
 
  private:
-  /// `middle` plus the vector from the middle of the picture to pixel (x, y), in world units.
+  /// Adds to `middle` the vector from the centre of the picture to pixel (x, y), in world units.
   Vector3 onPicture(const Vector3& middle, int x, int y) const {
     return middle + right * ((2 * x + 1 - width) * stepX) + up * ((height - 2 * y - 1) * stepY);
   }

@@ -16,12 +16,12 @@ Field scaled(const Field& field, double factor) {
         for (auto& c : coefficients) c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
       },
       data.coefficients);
-  data.bounds.clear();  // they would have to be scaled, and no renderer uses them
+  data.bounds.clear();  // the bounds would have to be scaled, and no renderer uses them
   return Field(std::move(data));
 }
 
-/// A renderer that passes views on to the renderer `inner`. The unit of length of `inner` is `unit` world
-/// units. The buffers of `inner` are converted to world units.
+/// Passes views on to the renderer `inner`, whose unit of length is `unit` world units, and converts the buffers of
+/// `inner` to world units.
 class ScaledRenderer final : public Renderer {
  public:
   ScaledRenderer(std::unique_ptr<Renderer> inner, double unit) : inner_(std::move(inner)), unit_(unit) {}

@@ -11,9 +11,9 @@ namespace hpsdf::render {
 
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const Field&)>;
 
-/// A renderer for the field. `make` creates it for a field with lengths near 1: the field itself if the size of
-/// its domain lies within 2^±30, else a copy in units of a power of two, which rounds nothing. Views and
-/// buffers of the returned renderer are in the units of the field. The renderer that `make` creates must keep
+/// Makes a renderer for a field of any size by calling `make` with a field whose lengths are near 1: with the field
+/// itself if the size of its domain lies within 2^±30, else with a copy in units of a power of two, which is exact.
+/// Views and buffers of the returned renderer are in the field's own units. The renderer that `make` creates must keep
 /// no reference to its argument.
 std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make);
 

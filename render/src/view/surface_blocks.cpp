@@ -18,7 +18,7 @@ struct Projected {
   double x0 = std::numeric_limits<double>::infinity(), y0 = x0, x1 = -x0, y1 = -x0;
   int behind = 0;                    ///< number of corners behind the eye, which perspective leaves out of the bounds
   std::array<int, 4> outside{};      ///< number of corners beyond each edge of the view's frustum
-  Vector3 corner = Vector3::Zero();  ///< the lower corner in the camera's frame
+  Vector3 corner = Vector3::Zero();  ///< the box's lower corner in the camera's frame
 };
 
 class BlockFinder {
@@ -57,8 +57,8 @@ class BlockFinder {
  private:
   static constexpr float kNone = std::numeric_limits<float>::infinity();
 
-  /// Guesses the sign of f − offset, 1 or −1, where rays start. A wrong guess costs time but does not change the
-  /// picture.
+  /// Guesses the sign of f − offset, 1 or −1, at the point p, where rays start. A wrong guess costs time but does not
+  /// change the picture.
   float sideAt(const Vector3& p) const {
     std::uint32_t node = 0;
     for (int axis = 2; axis >= 0; --axis)
@@ -116,7 +116,8 @@ class BlockFinder {
     if (box.behind == 8 || std::ranges::count(box.outside, 8) > 0) return {0, 0, 0, 0};
     if (box.behind > 0 && !rays_.parallel) return whole;
     if (!std::isfinite(box.x0 + box.x1 + box.y0 + box.y1)) return whole;
-    // The centre of pixel i is at the x with 2i + 1 = (1 + x) · width. The rectangle gets a margin of one pixel.
+    // Pixel i has its centre at the view coordinate x for which 2i + 1 = (1 + x) · width. The rectangle gets a margin
+    // of one pixel.
     const auto first = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) - 1) / kBlock); };
     const auto last = [](double x, int pixels) { return std::floor((0.5 * ((1 + x) * pixels - 1) + 1) / kBlock) + 1; };
     const auto clamped = [](double block, int blocks) { return int(std::clamp(block, 0.0, double(blocks))); };
@@ -124,7 +125,7 @@ class BlockFinder {
             clamped(last(box.x1, rays_.width), columns_), clamped(last(box.y1, rays_.height), rows_)};
   }
 
-  /// A lower bound, which allows for rounding, of the distance along rays from the start of a ray to a box.
+  /// A lower bound of the distance along any ray from its start to a box, with a margin for rounding.
   float distance(const Vector3& lo, double size) const {
     constexpr double kRoundingFactor = 1 - 1e-6;
     if (rays_.parallel) {
@@ -138,7 +139,7 @@ class BlockFinder {
     return static_cast<float>(kRoundingFactor * (nearest - rays_.eye).cwiseProduct(worldFromGrid_).norm());
   }
 
-  /// Lowers the start distance of all blocks in a rectangle to `start`, unless it is lower already.
+  /// Lowers `Block::start` of all blocks in a rectangle to `start`, unless it is lower already.
   void mark(const BlockRect& rect, float start) {
     for (int y = rect.y0; y < rect.y1; ++y)
       for (int x = rect.x0; x < rect.x1; ++x) {

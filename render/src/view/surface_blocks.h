@@ -12,8 +12,8 @@ namespace hpsdf::render {
 constexpr int kBlock = 8;  // pixels along each side of a block
 
 struct Block {
-  float x, y;   ///< upper left pixel
-  float start;  ///< distance along the block's rays, world units, up to which none has left `SurfaceBlocks::side`
+  float x, y;   ///< upper left pixel of the block
+  float start;  ///< distance along all rays of the block, world units, up to which f − offset has the sign `side`
 };
 
 struct SurfaceBlocks {
@@ -24,8 +24,8 @@ struct SurfaceBlocks {
   std::vector<Block> blocks;
 };
 
-/// Finds the blocks. Projects the nodes in which f − offset may lack the sign `SurfaceBlocks::side` to the
-/// view, down to nodes that cover about one block.
+/// Finds the blocks of pixels whose rays may hit the surface. Projects the nodes in which f − offset may not have the
+/// sign `SurfaceBlocks::side` to the view, down to nodes that cover about one block.
 SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<SurfaceBounds>& bounds, const GridSpace& space,
                             const RayGeometry& rays, double offset);
 

@@ -10,14 +10,14 @@
 namespace hpsdf::render {
 namespace {
 
-/// Greatest magnitude of L_i' and of L_i'' on [−1, 1]. Both occur at the ends of the interval.
+/// Greatest magnitudes of L_i' and L_i'' on [−1, 1], which occur at the ends of the interval.
 double firstDerivative(int i) { return 0.5 * i * (i + 1); }
 double secondDerivative(int i) { return 0.125 * (i - 1) * i * (i + 1) * (i + 2); }
 
 template <typename T>
 std::array<float, 4> linearPart(const T* c, int degree) {
   if (degree == 0) return {0, 0, 0, float(c[0])};
-  // Coefficients are in lexicographic order of (i, j, k).
+  // The coefficients c_ijk are in lexicographic order, in which c_100 has the index x.
   const int x = coefficientCount(degree) - coefficientCount(degree - 1);
   return {float(c[x]), float(c[degree + 1]), float(c[1]), float(c[0])};
 }
@@ -28,8 +28,8 @@ SurfaceBounds leafBounds(const T* c, int degree) {
   double sum = 0;
   double nonlinear = 0;
   Vector3 gradient = Vector3::Zero();  // bound of the nonlinear part's gradient
-  Vector3 pure = Vector3::Zero();      // second derivatives xx, yy, zz
-  Vector3 mixed = Vector3::Zero();     // second derivatives yz, zx, xy
+  Vector3 pure = Vector3::Zero();      // bounds of the second derivatives xx, yy, zz
+  Vector3 mixed = Vector3::Zero();     // bounds of the second derivatives yz, zx, xy
   const T* next = c;
   for (int i = 0; i <= degree; ++i)
     for (int j = 0; j <= degree - i; ++j)

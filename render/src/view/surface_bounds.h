@@ -14,13 +14,12 @@ namespace hpsdf::render {
 /// leaf without passing a zero. All bounds except the range [lo, hi] are for the leaf's polynomial, before
 /// blending.
 struct SurfaceBounds {
-  float lo;  ///< least value of the field within the node, blended or not
-  float hi;  ///< greatest value of the field within the node, blended or not
-  /// In leaves: greatest length of the polynomial's gradient minus the gradient of its linear part, in local
-  /// coordinates. In internal nodes: −1.
+  float lo;  ///< lower bound of the field within the node, including any blending
+  float hi;  ///< upper bound of the field within the node, including any blending
+  /// In leaves: upper bound of |∇(polynomial − its linear part)| in local coordinates. In internal nodes: −1.
   float gradientDeviation;
-  float valueDeviation;         ///< leaves: greatest difference between the polynomial and its linear part
-  float secondDerivative;       ///< leaves: greatest second derivative along any unit vector, in local coordinates
+  float valueDeviation;         ///< leaves: upper bound of |polynomial − its linear part|
+  float secondDerivative;       ///< leaves: upper bound of second derivatives along unit vectors, in local coordinates
   std::array<float, 4> linear;  ///< leaves: the linear part's coefficients c_100, c_010, c_001 and c_000
 };
 

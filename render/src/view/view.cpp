@@ -12,7 +12,7 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr double kSectionMargin = 0.025;  // margin around the section, in parts of the picture's width or height
+constexpr double kSectionMargin = 0.025;  // margin around the section, as a share of the picture's width or height
 constexpr double kRayMargin = 0.01;       // distance from the start of parallel rays to the domain, in domain diagonals
 
 std::string text(double x) { return printed("%.6g", x); }
@@ -22,8 +22,8 @@ void checkDomain(const Box& domain) {
     throw Error("a view's domain is empty or not finite: give a field's domain");
 }
 
-/// A slice view with square pixels that shows the rectangle [lo, hi] of a plane. The coordinates of `lo` and
-/// `hi` are along the unit vectors `right` and `up`, from the point `base`.
+/// A slice view with square pixels that shows the rectangle [lo, hi] of a plane. `lo` and `hi` are given along the unit
+/// vectors `right` and `up`, from the point `base`.
 SliceView framed(const Eigen::Vector2d& lo, const Eigen::Vector2d& hi, const Vector3& base, const Vector3& right,
                  const Vector3& up, int width, int height) {
   const Eigen::Vector2d center = 0.5 * (lo + hi);
@@ -65,7 +65,7 @@ std::vector<Vector3> section(const Box& box, const Vector3& point, const Vector3
   return corners;
 }
 
-/// `middle` plus the vector from the middle of the picture to pixel (x, y).
+/// Adds to `middle` the vector from the centre of the picture to pixel (x, y).
 Vector3 onPicture(const Camera& camera, const Vector3& middle, int x, int y, int width, int height) {
   return middle + camera.right * (2 * (x + 0.5) / width - 1) + camera.up * (1 - 2 * (y + 0.5) / height);
 }
@@ -113,8 +113,8 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
     return Error("the slice plane through (" + text(point.x()) + ", " + text(point.y()) + ", " + text(point.z()) +
                  ") misses the domain: give a point within it");
   };
-  // Treat a plane that is perpendicular to an axis without rounding, so that a plane on a face between cells
-  // stays there.
+  // Treat a plane that is perpendicular to an axis without rounding, so that a plane on a face between cells stays on
+  // it.
   for (int axis = 0; axis < 3; ++axis) {
     if (normal[(axis + 1) % 3] != 0 || normal[(axis + 2) % 3] != 0) continue;
     if (!(point[axis] >= domain.min()[axis] && point[axis] <= domain.max()[axis])) throw misses();
@@ -124,7 +124,7 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
   const std::vector<Vector3> corners = section(domain, point, unit);
   if (corners.empty()) throw misses();
   const auto [right, up] = screenAxes(unit);
-  // Count coordinates in the plane from its point nearest to the centre of the domain, so that they stay small.
+  // Measure coordinates in the plane from its point nearest to the centre of the domain, so that they stay small.
   const Vector3 base = domain.center() - unit.dot(domain.center() - point) * unit;
   Eigen::AlignedBox2d extent;
   for (const Vector3& corner : corners) extent.extend(Eigen::Vector2d(right.dot(corner - base), up.dot(corner - base)));
@@ -141,7 +141,7 @@ Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int hei
   const bool upY = camera.up == UpAxis::y;
   const Vector3 vertical = upY ? Vector3::UnitY() : Vector3::UnitZ();
   const Vector3 front = upY ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
-  const Vector3 outward = std::sin(azimuth) * Vector3::UnitX() + std::cos(azimuth) * front;  // level, towards the eye
+  const Vector3 outward = std::sin(azimuth) * Vector3::UnitX() + std::cos(azimuth) * front;  // horizontal, to the eye
   const Vector3 right = std::cos(azimuth) * Vector3::UnitX() - std::sin(azimuth) * front;
   const Vector3 towardsEye = std::cos(elevation) * outward + std::sin(elevation) * vertical;
   const Vector3 up = std::cos(elevation) * vertical - std::sin(elevation) * outward;

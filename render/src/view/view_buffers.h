@@ -4,8 +4,8 @@
 
 namespace hpsdf::render {
 
-/// Buffers of a view in which no pixel shows anything. With `surface`, they include the buffers that only
-/// surfaces have.
+/// Buffers of a view in which no pixel shows anything. If `surface` is true, they include the buffers that views of
+/// surfaces have and slices lack.
 inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
   const std::size_t pixels = std::size_t(width) * height;
   ViewBuffers buffers;

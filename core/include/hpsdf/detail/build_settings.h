@@ -1,6 +1,6 @@
 #pragma once
-// The table of all settings of a construction. The program's options, the settings stored with a field, the
-// identity of a checkpoint and the checks of ranges are derived from this table.
+// The table of all settings of a construction. The program's options, the settings stored with a field, the identity of
+// a checkpoint file and the checks of ranges are derived from this table.
 
 #include <cstdint>
 #include <limits>
@@ -24,34 +24,34 @@ constexpr std::string_view kAsked = "What you ask for", kResult = "What you get"
 /// list is empty if the setting is off or unset.
 struct BuildSetting {
   enum class Type : std::uint8_t { number, wholeNumber, wholeNumbers, choice, flag };
-  /// The way in which a setting ends the construction.
+  /// The event at which a setting ends the construction.
   enum class Ending : std::uint8_t {
-    none,           ///< not at all
-    target,         ///< when the target error is reached
-    byDistance,     ///< when the errors by distance are reached, which replace the target error
-    otherQuantity,  ///< at a maximum error or a limit of bytes; the target error then has no default
-    steps,          ///< after a number of steps, whatever the target
+    none,           ///< the setting does not end the construction
+    target,         ///< the target error is reached
+    byDistance,     ///< the errors of `NearFarError`, which replace the target error, are reached
+    otherQuantity,  ///< a maximum error or a limit of bytes is reached; the target error then has no default
+    steps,          ///< a number of steps is done, even if the target error is not reached
   };
 
   std::string_view name = {};  ///< as users write it: "max-depth"
   Type type = Type::number;
   std::string_view help = {};
-  std::string_view group = {};  ///< heading above it in help texts
+  std::string_view group = {};  ///< heading above the setting in help texts
   std::string_view unit = {};
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
   bool minimumExcluded = false;
-  std::vector<std::string_view> words = {};  ///< the words of a choice
+  std::vector<std::string_view> words = {};  ///< the words from which users choose, for a choice
   std::vector<double> fallback = {};         ///< default of a setting that `BuildOptions` leaves unset
   Ending ending = Ending::none;
   std::string_view exclusive = {};  ///< a setting that this one replaces, so that both cannot be given
-  std::string_view owner = {};      ///< the setting, with its word, without which it has no effect: "continuity weak"
+  std::string_view owner = {};      ///< setting, and its word, without which this one has no effect: "continuity weak"
   bool (*hasOwner)(const BuildOptions&) = nullptr;
   int storedAt = 0;           ///< position among the settings in a field's file; 0: not stored
-  bool decides = true;        ///< the field depends on it
-  bool isOffered = true;      ///< the program has an option for it
-  bool isAdvanced = false;    ///< help texts show it only where all options are asked for
-  bool isChecked = false;     ///< `checkBuild` refuses values out of range, which C++ code could set
+  bool decides = true;        ///< the finished field depends on the value of this setting
+  bool isOffered = true;      ///< the command-line program has an option for this setting
+  bool isAdvanced = false;    ///< only the complete help texts show this setting
+  bool isChecked = false;     ///< `checkBuild` checks the range, because C++ code could set a value out of range
   std::string_view key = {};  ///< name in JSON if it differs from `name` with underscores
   std::vector<double> (*get)(const BuildOptions&) = nullptr;
   void (*set)(BuildOptions&, std::span<const double>) = nullptr;
@@ -68,15 +68,15 @@ const BuildSetting& buildSetting(std::string_view name);
 /// empty string if the setting is off or unset.
 std::string settingText(const BuildSetting& setting, const BuildOptions& options);
 
-/// Returns the value, as users write it, that a setting has if users do not give it.
+/// Returns the default value of a setting, as users write it.
 std::string defaultText(const BuildSetting& setting);
 
-/// Returns `options` with the settings that files do not store reset. These settings get the values that they
-/// have in the metadata of a field that `build` did not make.
+/// Returns `options` in which all settings that field files do not store are reset to the values that they have in a
+/// default `FieldMetadata`.
 BuildOptions storedSettings(const BuildOptions& options);
 
-/// Returns options with which `build` makes a field like `field`. They combine the settings that the field
-/// stores with settings that follow from its arrays.
+/// Returns options with which `build` makes a field like `field`. They combine the settings in the field's metadata
+/// with settings that follow from the field's arrays, such as the base grid.
 BuildOptions settingsOf(const FieldData& field);
 
 }  // namespace hpsdf

@@ -41,11 +41,12 @@ struct CubicGrid {
   double value(const Vector3& x) const;
 };
 
-/// Returns the size in bytes of the file of a grid with this resolution. The size is exact up to
+/// Returns the size in bytes of the `.cdf` file of a grid with this resolution. The size is exact up to
 /// `kMaxCubicGridBytes`.
 double cubicGridBytes(const GridResolution& resolution);
 
-/// Returns the resolution with `alongLongest` cells along the domain's longest side and nearly cubic cells.
+/// Returns a resolution with `alongLongest` cells along the domain's longest side, for which the cells are nearly
+/// cubic.
 GridResolution cubicGridResolution(const Box& domain, std::uint32_t alongLongest);
 
 /// Returns the finest resolution with nearly cubic cells whose file has at most `bytes` bytes. Throws `Error`
@@ -58,20 +59,19 @@ GridResolution finestCubicGrid(const Box& domain, std::uint64_t bytes);
 CubicGrid sampleCubicGrid(const Field& field, const GridResolution& resolution, int threads = 0,
                           const Progress& progress = {});
 
-/// Figures of the difference |grid − f| between a grid's interpolation and its field over a set of points; 0 if
-/// there are no points.
+/// Statistics of the difference |grid − f| between a grid's interpolation and the field f, over a set of points. All
+/// values are 0 if there are no points.
 struct GridDifference {
   std::size_t points = 0;
   double rms = 0;
   double max = 0;
 };
 
-/// The interpolation error of a grid: its difference from the field. It comes in addition to the field's own
-/// error.
+/// The interpolation error of a grid: its difference from the field f. The error of f itself comes in addition.
 struct CubicGridError {
   GridDifference everywhere;
   GridDifference nearSurface;  ///< difference over the points at which |f| ≤ `near`
-  double near = 0;             ///< diagonal of a cell
+  double near = 0;             ///< greatest |f| that counts as near the surface: the diagonal of a cell
 };
 
 /// Compares a grid with the field from which the grid was sampled, at `points` random points that are uniform

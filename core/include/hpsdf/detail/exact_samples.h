@@ -26,9 +26,8 @@ struct SampleOptions {
   int threads = 0;  ///< greatest number of threads; 0: all that the machine offers
 };
 
-/// Draws points uniformly from the domain or, if `band` is above 0, from the part of the domain where |Φ| ≤
-/// band. Throws `Error` if no point with |Φ| ≤ band is found or if Φ is not finite. Throws `Cancelled` when
-/// `progress` says so.
+/// Draws points uniformly from the domain or, if `band` is above 0, from the part of the domain where |Φ| ≤ `band`.
+/// Throws `Error` if no such point is found or if Φ is not finite. Throws `Cancelled` when `progress` says so.
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band = 0,
                            const SampleOptions& options = {}, const Progress& progress = {});
 

@@ -1,5 +1,5 @@
 #pragma once
-// Jumps of a field's value and gradient as queries see them, measured at random points on the faces of leaves.
+// Jumps of a field's value and gradient between leaves, measured by queries on both sides of the leaves' faces.
 
 #include <cstddef>
 #include <cstdint>

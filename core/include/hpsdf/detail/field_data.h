@@ -17,26 +17,27 @@ namespace hpsdf {
 /// are in the field's own units.
 struct FieldMetadata {
   Source source;
-  /// The settings that took effect. If errors by distance were asked for, τ is the error that the construction
-  /// reached, and θ the exponent that it derived from these errors. Files store the settings that have a
-  /// `BuildSetting::storedAt`.
+  /// The settings that took effect. If the target was given as `NearFarError`, `targetError` is the error τ that the
+  /// construction reached, and `nearness` the exponent θ that it derived. Field files store the settings whose
+  /// `BuildSetting::storedAt` is not 0.
   BuildOptions settings = {.targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .quadrature = 0};
-  double totalError = 0;               ///< ε, weighted by nearness, at the paper's scale: comparable with τ
-  double referenceLength = 2;          ///< L; an error at the paper's scale times (L/2)^5 is in the field's own units^5
+  double totalError = 0;               ///< weighted error ε, scaled to a surface of size 2 like the target error τ
+  double referenceLength = 2;          ///< size L of the surface; ε·(L/2)^5 is the error at this size
   std::uint64_t exactEvaluations = 0;  ///< evaluations of Φ during the construction
   /// Number of steps of the construction, each of which raised the degree of a leaf or split a leaf. It is
   /// std::nullopt if the number is unknown, as in files of version 1.
   std::optional<std::uint64_t> steps = {};
   double roundingRms = 0;  ///< RMS change of the field by rounding its coefficients to float; 0 for double
-  /// Greatest |f − Φ| at the probed points, without blending, if a maximum error was asked for. The effect of
-  /// rounding is included if it exceeds a hundredth of the maximum error.
+  /// Greatest error |f − Φ| that the construction found when it probed the cells, without blending, if a maximum error
+  /// was asked for. The effect of rounding is included if it exceeds a hundredth of the maximum error.
   double measuredError = 0;
 
-  /// Returns √(ε/|Ω|), the estimated RMS error over the domain Ω at the end of the construction.
+  /// Returns √(ε/|Ω|), the estimated RMS error over the domain Ω at the end of the construction, where ε is converted
+  /// to the surface's size L.
   double rmsEstimate(const Box& domain) const;
 };
 
-/// Proven bounds that hold throughout one leaf (see `safe_distance.h`).
+/// Proven upper bounds that hold throughout one leaf (see `safe_distance.h`).
 struct CellBound {
   float error = 0;  ///< bound of |f − Φ| in the field's units
   float slope = 0;  ///< bound of ‖∇f‖
@@ -56,7 +57,7 @@ struct FieldData {
   /// Width of the zones along the faces of a leaf in which the leaf is blended with its neighbours. It is
   /// measured in edges of the leaf, from 0 (no blending) to `kMaxBlend`.
   double blend = 0;
-  std::vector<CellBound> bounds = {};  ///< by node, 0 for internal nodes; empty if the field has no bounds
+  std::vector<CellBound> bounds = {};  ///< one for each node, 0 for internal nodes; empty if the field has no bounds
   FieldMetadata metadata = {};
 };
 
@@ -76,10 +77,10 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
-/// Blend extents of a leaf. The blend extent at a face is the distance to either side of the face within which
-/// the leaf's weight grows from 0 outside the leaf to 1 inside. It is `FieldData::blend` times the edge of the
-/// deepest leaf that touches the face, the leaf itself included. 5 bits hold the depth of the deepest leaf, or
-/// `kDomainFace` if the face lies on the boundary of the domain.
+/// Packs the six blend extents of a leaf into 32 bits. The blend extent at a face is the distance to either side of the
+/// face within which the leaf's weight grows from 0 outside the leaf to 1 inside. It is `FieldData::blend` times the
+/// edge of the deepest leaf that touches the face, the leaf itself included. 5 bits per face hold the depth of the
+/// deepest leaf, or `kDomainFace` if the face lies on the boundary of the domain.
 namespace blend_extent {
 constexpr int kDomainFace = 31;
 constexpr std::uint32_t packed(int axis, bool upper, int depth) {
@@ -96,7 +97,7 @@ struct Cell {
   Box box;           ///< half-open [min, max) up to rounding
   int degree;
   int depth;     ///< 0 for a base cell
-  double error;  ///< embedded estimate ε_e of the squared L2 error, in units^5, without nearness (paper, eq. 6)
+  double error;  ///< squared L2 error, estimated by the coefficients of the highest degree (ε_e; paper, eq. 6)
 };
 
 struct ValueAndGradient {

@@ -1,5 +1,5 @@
 #pragma once
-// Restricts the polynomial of a cell to a part of the cell.
+// Expresses the polynomial of a cell in the local coordinates of a part of the cell.
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace hpsdf::detail {
 
-/// Coefficients row[i][a], a ≤ i, with which L_i(shift + scale·t) = Σ_a row[i][a] L_a(t). Elements beyond the
-/// degree of the polynomial are not set.
+/// Coefficients row[i][a], a ≤ i, with which the Legendre polynomials satisfy L_i(shift + scale·t) = Σ_a row[i][a]
+/// L_a(t). Elements beyond the degree of the polynomial are not set.
 using LegendreRows = std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2>;
 
 inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
@@ -31,15 +31,16 @@ inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
   return row;
 }
 
-/// Restricts a polynomial to a part of its cell along one axis; `rows` describes the part. The coefficients c
-/// are a cube of (degree + 1)³ numbers, z fastest. Coefficients above the total degree are 0.
+/// Converts the coefficients c of a cell's polynomial to the local coordinates of a part of the cell, along one axis.
+/// `rows` describes the part and comes from `legendreOfPart`. c is a cube of (degree + 1)³ numbers, z fastest, with
+/// zeros above the total degree.
 inline void restrictToPart(std::vector<double>& c, int degree, int axis, const LegendreRows& rows) {
   const int n = degree + 1;
   const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};
   for (int j = 0; j < n; ++j)
     for (int k = 0; j + k < n; ++k) {
       double* const line = &c[j * stride[(axis + 1) % 3] + k * stride[(axis + 2) % 3]];
-      for (int a = 0; a + j + k < n; ++a) {  // a ascends, because each sum needs the former coefficients above a
+      for (int a = 0; a + j + k < n; ++a) {  // a ascends, because each sum reads the old coefficients from a upwards
         double sum = 0;
         for (int i = a; i + j + k < n; ++i) sum += line[i * stride[axis]] * rows[i][a];
         line[a * stride[axis]] = sum;

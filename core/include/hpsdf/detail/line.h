@@ -15,11 +15,11 @@ struct Piece {
   double tEnter, tLeave;     ///< ends of the piece, 0 at the segment's start and 1 at its end; tEnter < tLeave
 };
 
-/// Cuts a segment into pieces at the faces of leaves. The pieces are in order of the parameter t from 0 to 1,
-/// and each piece begins where the previous piece ends. Leaves are half-open. Therefore a segment along a face
-/// or an edge runs through the leaves of greater coordinates, and a segment through an edge or a corner
-/// continues in the opposite leaf. Leaves that hold less than 1e-12 of the segment are left out, because
-/// rounding decides whether the segment crosses them. Throws `Error` if the points are equal or not finite.
+/// Cuts a segment into pieces at the faces of leaves. The pieces are in order of the parameter t from 0 to 1, and each
+/// piece begins where the previous piece ends. Leaves are half-open. Therefore a segment that runs along a face or an
+/// edge belongs to the leaf on the side of greater coordinates, and a segment through an edge or a corner continues in
+/// the opposite leaf. Leaves that hold less than 1e-12 of the segment are left out, because rounding decides whether
+/// the segment crosses them. Throws `Error` if the points are equal or not finite.
 std::vector<Piece> piecesAlong(const Field& field, const Vector3& from, const Vector3& to);
 
 struct LineSample {

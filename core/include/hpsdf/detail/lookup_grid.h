@@ -10,7 +10,7 @@ namespace hpsdf {
 struct GridFrame {
   std::array<double, 3> lower, upper, size;  ///< the domain's corners and edge lengths in world units
   std::array<double, 3> cells;               ///< number of base cells
-  std::array<std::int64_t, 3> last;          ///< greatest grid coordinate, fixed-point with kMaxDepth fractional bits
+  std::array<std::int64_t, 3> last;          ///< greatest grid coordinate in fixed point with kMaxDepth fractional bits
 };
 
 /// A regular grid that holds the octree's nodes of one depth. Queries start their descent of the octree in this
@@ -18,12 +18,12 @@ struct GridFrame {
 struct LookupGrid {
   GridFrame frame;
   int depth = 0;
-  std::int64_t row = 0, slab = 0;  ///< number of entries along x, and in a plane of x and y
+  std::int64_t row = 0, slab = 0;  ///< number of entries in a row along x, and in a plane of x and y
   /// Octree nodes, x fastest, with the depth of each node in bits 40 to 47. A leaf that is less deep than `depth`
   /// covers several entries.
   std::vector<std::uint64_t> entries;
-  /// Blend extents of the leaves (`namespace blend_extent`): one element for each node of the octree, then one
-  /// for each element of `entries`; 0 for internal nodes. Empty without blending.
+  /// How far each leaf is blended across its six faces (`namespace blend_extent`): one element for each node of the
+  /// octree, then one for each element of `entries`; 0 for internal nodes. Empty without blending.
   std::vector<std::uint32_t> blendExtents;
 
   static constexpr std::uint64_t entry(std::uint64_t node, int depth) { return node | std::uint64_t(depth) << 40; }

@@ -8,25 +8,25 @@
 namespace hpsdf {
 namespace detail {
 
-/// Returns the bytes that control groups (Linux) of version 1 and 2 allow this process: the lowest limit of its
-/// own control group and of those above it, or infinity without a limit. `root` is the folder that contains
-/// proc and sys.
+/// Returns the memory limit in bytes that Linux control groups (cgroups, versions 1 and 2) set for this process: the
+/// lowest limit of its own group and of the groups above it, or infinity without a limit. `root` is the folder that
+/// contains proc and sys.
 double memoryOfControlGroups(const std::filesystem::path& root = "/");
 
-/// Returns the bytes of the machine's memory, or fewer if control groups limit this process. The first call
-/// determines the number.
+/// Returns the bytes of the machine's memory or, if it is lower, the limit that Linux control groups set for this
+/// process. The first call determines the number.
 double machineMemory();
 
 }  // namespace detail
 
-/// Returns the bytes that this process may take: three quarters of the machine's memory or, if that is less, of
-/// the memory that control groups (Linux) allow.
+/// Returns the bytes that this process may take: three quarters of the machine's memory or, if it is lower, of the
+/// limit that Linux control groups set.
 double allowedMemory();
 
 /// Returns a number of bytes as text with a suitable unit, such as "8.40 MB".
 std::string bytesText(double bytes);
 
-/// Throws `Error` (limit) if `what`, such as "a cloth of 1e6 nodes", would take more bytes than
+/// Throws `Error` (of the kind `limit`) if `what`, such as "a cloth of 1e6 nodes", would take more bytes than
 /// `allowedMemory`. The error message ends with `advice`, which says what the user can do.
 void requireMemory(const std::string& what, double bytes, std::string_view advice);
 

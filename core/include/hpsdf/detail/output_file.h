@@ -13,14 +13,14 @@ namespace hpsdf {
 /// destructor removes the temporary file.
 class OutputFile {
  public:
-  /// Throws `Error` (file) if the folder of `file` does not exist or cannot be written, or if `file` exists and
-  /// is not a regular file.
+  /// Throws `Error` (of the kind `file`) if the folder of `file` does not exist or cannot be written, or if `file`
+  /// exists and is not a regular file.
   explicit OutputFile(const std::filesystem::path& file);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Appends bytes to the file. Throws `Error` (file) if the disk is full or fails.
+  /// Appends bytes to the file. Throws `Error` (of the kind `file`) if the disk is full or fails.
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
 
@@ -39,7 +39,7 @@ class OutputFile {
   /// The processes whose temporary files `removeAbandoned` removes.
   enum class Writers {
     killed,  ///< processes of this machine that no longer run
-    others,  ///< all processes but this one; for a caller that holds the lock on the file
+    others,  ///< all processes but this one; for a caller that holds a lock on the file
   };
 
   /// Removes temporary files that earlier writers of `file` left in the folder of `file`. `writers` selects the
@@ -54,8 +54,8 @@ class OutputFile {
   std::FILE* stream_ = nullptr;
 };
 
-/// Throws the `Error` that writing `file` would throw, as far as it can be foreseen. Call this function before
-/// long work.
+/// Checks before long work whether `file` can be written, as far as this can be foreseen. Throws the `Error` that the
+/// constructor of `OutputFile` would throw.
 void checkWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

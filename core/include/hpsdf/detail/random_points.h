@@ -10,8 +10,8 @@
 
 namespace hpsdf::detail {
 
-/// The SplitMix64 random number generator (Steele, Lea, Flood 2014). Each index of a sequence has its own
-/// generator.
+/// The SplitMix64 random number generator (Steele, Lea, Flood 2014). Each item of a sequence has a generator of its
+/// own, which is seeded with the sequence's seed and the item's index.
 class Random {
  public:
   Random(std::uint64_t seed, std::uint64_t index) : state_(mixed(mixed(seed) + index)) {}

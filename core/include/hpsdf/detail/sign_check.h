@@ -19,9 +19,9 @@ struct SignCheck {
   std::size_t points = 0;
   std::size_t tooNear = 0;          ///< points within `tolerance` of the surface, which are not compared
   double tolerance = 0;             ///< 1e-6 of the mesh's longest side
-  std::size_t wrong = 0;            ///< points at which the distance's sign is not that of the winding number
+  std::size_t wrong = 0;            ///< points at which the sign of the distance contradicts the winding number
   Vector3 worst = Vector3::Zero();  ///< the wrong point that is farthest from the surface
-  double worstDistance = 0;         ///< its distance, 0 or more
+  double worstDistance = 0;         ///< distance of `worst` from the surface, 0 or more
 };
 
 /// Compares the sign of a distance to `mesh` with the winding number by brute force, on all threads. Half of

@@ -17,10 +17,10 @@
 namespace hpsdf {
 namespace {
 
-/// Number of points for which Φ is called at once.
+/// Number of points for which the exact distance is computed at once.
 constexpr std::size_t kBatch = 512;
 
-/// Drawing fails if an accepted sample takes more candidate points than this on average.
+/// Drawing random samples fails if an accepted sample takes more candidate points than this on average.
 constexpr std::size_t kMaxCandidates = 1000;
 
 /// Spreads the low 21 bits of a number to every third bit.
@@ -57,7 +57,7 @@ std::vector<T> permuted(const std::vector<T>& items, const std::vector<std::uint
   return result;
 }
 
-/// Computes Φ at points, which may come in any order. Throws `Error` if a value of Φ is not finite.
+/// Computes the exact distances of points, which may come in any order. Throws `Error` if a distance is not finite.
 std::vector<double> distancesAt(const DistanceFunction& distance, const std::vector<Vector3>& points, const Box& domain,
                                 const Progress& progress) {
   const std::vector<std::uint32_t> order = mortonOrder(points, domain);
@@ -100,8 +100,8 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
   return {permuted(samples.points, order), permuted(samples.distances, order)};
 }
 
-/// Divides the domain into blocks and returns the blocks that may intersect the narrow band. All other blocks
-/// lie outside the band, because Φ is 1-Lipschitz.
+/// Divides the domain into blocks and returns the blocks that may intersect the narrow band. All other blocks lie
+/// outside the band, because the exact distance is 1-Lipschitz.
 std::vector<Box> blocksInBand(const DistanceFunction& distance, const Box& domain, double band) {
   constexpr int kBlocks = 32;  // along each axis
   const Vector3 size = domain.sizes() / kBlocks;
@@ -146,7 +146,7 @@ class SurfacePoints {
 
  private:
   const TriangleMesh& mesh_;
-  std::vector<double> cumulativeAreas_;  ///< total area of the triangles up to each
+  std::vector<double> cumulativeAreas_;  ///< total area of each triangle and all before it
 };
 
 }  // namespace

@@ -13,7 +13,7 @@
 namespace hpsdf {
 namespace {
 
-/// Queries a field at grid coordinates, in which faces lie exactly on representable numbers.
+/// Queries a field at grid coordinates, in which the faces of cells lie exactly at representable numbers.
 ValueAndGradient queryAt(const Field& field, const std::array<double, 3>& gridCoordinates) {
   const LookupGrid& lookupGrid = field.lookupGrid();
   const query::GridPoint point = query::gridPoint(lookupGrid.frame, gridCoordinates);

@@ -39,8 +39,8 @@ struct Samples {
 /// Returns the two axes in the plane of a face that is perpendicular to `axis`, in cyclic order after `axis`.
 constexpr std::array<int, 2> axesAlong(int axis) { return {(axis + 1) % 3, (axis + 2) % 3}; }
 
-/// The trace of a leaf's field on a face: values and gradients in world units at the samples. The samples are
-/// the product of two coordinate lists, and the second coordinate varies fastest.
+/// The trace of a leaf's field on a face: values and gradients in world units at sample points. The points form a
+/// grid in the plane of the face, with the second in-plane coordinate varying fastest.
 class FaceTrace {
  public:
   const double* value() const { return out_[0].data(); }
@@ -82,8 +82,7 @@ class FaceTrace {
     }
   }
 
-  /// Computes the coefficients on the plane of a face, for the leaf's polynomial and for its derivative
-  /// perpendicular to the plane.
+  /// Restricts the leaf's polynomial, and its derivative perpendicular to the face, to the plane of the face.
   template <typename T>
   void restrictToPlane(const T* coefficients, int degree, int axis, double t) {
     const int n = degree + 1;
@@ -101,7 +100,7 @@ class FaceTrace {
         }
   }
 
-  /// Computes the coefficients on the line through sample s1 of the second in-plane axis.
+  /// Restricts the polynomials in the plane to the line through sample s1 of the second in-plane axis.
   void restrictToLine(int degree, std::size_t s1) {
     const int n = degree + 1;
     for (int i = 0; i < n; ++i) {
@@ -140,9 +139,9 @@ class FaceTrace {
   };
 
   std::array<std::vector<double>, 2> basis_, slope_;   ///< L_i and L_i' at the samples of each axis
-  std::vector<double> plane_;                          ///< pairs of coefficients, of the value and of the derivative
-  std::array<LineCoefficients, kMaxDegree + 1> line_;  ///< by degree along the first axis
-  std::array<std::vector<double>, 4> out_;             ///< value, then derivatives
+  std::vector<double> plane_;                          ///< coefficient pairs: polynomial and its normal derivative
+  std::array<LineCoefficients, kMaxDegree + 1> line_;  ///< by degree along the first in-plane axis
+  std::array<std::vector<double>, 4> out_;             ///< at all samples: value, derivatives along x, y and z
 };
 
 /// Measures the jumps of a field on faces. Each thread needs an object of its own.
@@ -151,7 +150,7 @@ class FaceMeter {
   FaceMeter(const Field& field, std::span<const Samples> samples)
       : field_(field), data_(field.data()), samplesOfDegree_(samples) {}
 
-  /// Measures the interfaces that `forEachInterface` assigns to a leaf, and appends them to `faces`.
+  /// Measures the faces that `forEachInterface` visits for a leaf, and appends them to `faces`.
   void measureLeaf(const OctreeNode& leaf, std::vector<Interface>& faces) {
     forEachInterface(data_, leaf, [&](int axis, int step, const OctreeNode& neighbour) {
       faces.push_back(measure(leaf, neighbour, axis, step));
@@ -171,7 +170,7 @@ class FaceMeter {
       face.depths[side] = static_cast<std::uint8_t>(sides[side]->depth);
     }
 
-    // Compute the traces of both leaves at the samples for the higher one of their degrees.
+    // Evaluate the field on both sides of the face, at the samples for the higher degree of the two leaves.
     const Samples& samples = samplesOfDegree_[std::max(face.degrees[0], face.degrees[1])];
     for (int side = 0; side < 2; ++side) {
       if (data_.blend > 0)
@@ -196,8 +195,8 @@ class FaceMeter {
     return face;
   }
 
-  /// Computes the jumps of a face from the traces of both leaves. Returns the index of the sample with the
-  /// greatest jump of the value.
+  /// Computes the jumps at a face from the fields of the leaves on its two sides. Returns the index of the sample
+  /// with the greatest jump of the value.
   std::size_t compareTraces(const Samples& samples, Interface& face) const {
     const std::size_t n = samples.points.size();
     std::size_t worst = 0;
@@ -276,11 +275,10 @@ class FaceMeter {
   const Field& field_;
   const FieldData& data_;
   std::span<const Samples> samplesOfDegree_;
-  std::array<FaceTrace, 2> traces_;           ///< of the leaf on the lower and on the upper side
+  std::array<FaceTrace, 2> traces_;           ///< traces of the leaves on the lower and on the upper side
   std::array<std::vector<double>, 2> along_;  ///< local coordinates of the samples along the face
 };
 
-/// Computes the totals of the jumps over all interfaces.
 void computeTotals(Jumps& jumps) {
   double valueSquares = 0, gradientSquares = 0;
   for (const Interface& face : jumps.interfaces) {

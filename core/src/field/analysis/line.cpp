@@ -16,9 +16,9 @@ namespace {
 /// The shortest piece of a segment, as a fraction of the segment's length. Shorter pieces are rounding errors.
 constexpr double kShortest = 1e-12;
 
-/// One coordinate along a segment, in units of cells of the greatest depth, so that faces lie at integers. All
-/// leaves at a face compute the same parameter t for the face. Faces farther along the segment never get a
-/// smaller t.
+/// One coordinate of the points of a segment, which is linear in the parameter t from 0 to 1. The unit is the
+/// edge of a cell of the greatest depth, so that faces of cells lie at integers. Even with rounding, all leaves
+/// at a face compute the same t for it, and faces farther along the segment never get a smaller t.
 struct Axis {
   double start = 0, speed = 0;  ///< coordinate at t = 0 and its change over the whole segment
   std::int64_t cells = 0;
@@ -46,7 +46,7 @@ Axes segmentAxes(const GridFrame& frame, const Vector3& from, const Vector3& to)
   return axes;
 }
 
-/// A range of the segment's parameter t.
+/// A range of the parameter t along a segment.
 struct Span {
   double first, last;
 };
@@ -80,8 +80,8 @@ Vector3 centerOf(const GridFrame& frame, const query::CellIndex& corner, std::in
   return query::worldPoint(frame, center);
 }
 
-/// Returns the parameter t at which the segment leaves a leaf along one axis, or infinity if it runs parallel
-/// to the faces.
+/// Returns the parameter t at which the segment leaves a leaf along one axis, or infinity if the coordinate on
+/// this axis is constant.
 double tAtExit(const Axis& axis, std::int64_t corner, std::int64_t width) {
   if (axis.speed > 0) return axis.tAtFace(corner + width);
   return axis.speed < 0 ? axis.tAtFace(corner) : std::numeric_limits<double>::infinity();
@@ -89,7 +89,7 @@ double tAtExit(const Axis& axis, std::int64_t corner, std::int64_t width) {
 
 /// Divides a segment into one piece for each leaf, in the order along the segment. Despite rounding, each step
 /// advances along at least one axis and goes back along none, so that the loop ends and visits no leaf twice.
-/// Cells have the greatest depth.
+/// Cell indices refer to the greatest depth.
 std::vector<Piece> walk(const Field& field, const GridFrame& frame, const Axes& axes, const Span& span) {
   std::vector<Piece> pieces;
   query::CellIndex cell, corner;
@@ -139,8 +139,9 @@ ValueAndGradient valueAndGradientIn(const Field& field, const Cell& cell, const 
   return query::evaluateInLeaf<ValueAndGradient>(field.data(), field.lookupGrid(), coordinates, leaf);
 }
 
-/// Evaluates the continuation of the field outside the domain. The gradient is taken slightly inside the piece,
-/// because on the domain's boundary the gradient of the boundary leaf differs from that of the continuation.
+/// Evaluates the continuation of the field outside the domain. The gradient is taken slightly inside the piece of
+/// the segment, because on the domain's boundary the gradient of the boundary leaf differs from the gradient of
+/// the continuation.
 ValueAndGradient evaluateOutside(const Field& field, const Line& line, const Piece& piece, double t) {
   constexpr double kMargin = 1e-9;
   const double margin = kMargin * (piece.tLeave - piece.tEnter);

@@ -28,7 +28,8 @@ detail::Sums sumsOf(std::span<const double> values) {
   return detail::sumOfChunks<detail::Sums>(values.size(), kPointsPerTask, {}, "", add);
 }
 
-/// Returns the least of the ascending values that at least `percent` percent of the values do not exceed.
+/// Returns a percentile of values in ascending order: the least value that at least `percent` percent of the
+/// values do not exceed.
 double percentile(std::span<const double> ascending, double percent) {
   const double rank = std::ceil(percent / 100 * static_cast<double>(ascending.size()));
   return ascending[std::clamp<std::size_t>(static_cast<std::size_t>(rank), 1, ascending.size()) - 1];
@@ -78,7 +79,8 @@ double angleDegrees(const Vector3& a, const Vector3& b) {
   return 180 / std::numbers::pi * std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// Returns the angles between the gradients ∇f and ∇Φ at about `wanted` samples, chosen with a constant stride.
+/// Returns the angles between the gradients of the field and of the exact distance at about `wanted` samples,
+/// chosen with a constant stride.
 std::vector<double> anglesAt(const VerifiedSurface& surface, const ExactSamples& samples,
                              std::span<const ValueAndGradient> found, std::size_t wanted, const Progress& progress) {
   if (wanted == 0) return {};
@@ -126,8 +128,7 @@ GradientFigures gradientFigures(const ExactSamples& samples, std::span<const Val
   return figures;
 }
 
-/// Random points, either all uniform or all near the surface, with the field's values and gradients at the
-/// points.
+/// Random points, all uniform or all near the surface, with the field's values and gradients at the points.
 struct Sampled {
   ExactSamples samples;
   std::vector<ValueAndGradient> found;
@@ -197,8 +198,7 @@ void checkOptions(const VerifyOptions& options) {
       throw Error("verify: a length is below 0 or not finite; give near, band and sign bound as 0 or more");
 }
 
-/// Returns a callback that maps the progress of one task to the range from `from` to `to` of the whole
-/// progress.
+/// Returns a callback that maps the progress of one task to the range `from` to `to` of the whole progress.
 Progress part(const Progress& progress, double from, double to) {
   if (!progress.report) return progress;
   return {.report = [&progress, from, to](std::string_view task,

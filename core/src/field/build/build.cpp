@@ -23,7 +23,7 @@ namespace {
 
 using namespace detail;
 
-/// Returns the error goal of the octree's growth. If pruning follows, this goal is smaller than the goal of the
+/// Returns the error down to which the octree is refined. If pruning follows, it is smaller than the goal of the
 /// whole construction.
 ErrorGoal growthGoal(const BuildOptions& options, const ErrorGoal& goal) {
   return options.criterion == Criterion::optimal ? goal.times(kGrowth) : goal;
@@ -34,7 +34,7 @@ double nearDistance(const BuildOptions& options, double referenceLength) {
   return asked > 0 ? asked : 0.01 * referenceLength;
 }
 
-/// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other on one state.
+/// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.
 class Construction {
  public:
   Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
@@ -52,7 +52,7 @@ class Construction {
     state_.nearness = nearnessOf(options, domain);
     state_.tree.domain = domain;
     state_.tree.grid = options.grid;
-    refiner_.requireMemory();  // checks the memory of Φ before anything is built
+    refiner_.requireMemory();  // checks the memory of the exact distance before anything is built
   }
 
   /// From now on, saves the state of the construction to a file. If the file already holds a state, continues
@@ -77,30 +77,28 @@ class Construction {
 
   /// Returns the field of the present state. It is made from a copy of the state's tree.
   Field snapshot() { return Field(finish(BuildTree(state_.tree))); }
-  /// The field of the final state.
   FieldData finish() { return finish(std::move(state_.tree)); }
 
  private:
-  /// Makes a field from a tree, which is the state's own or a copy. Prunes and enriches the tree, lays it out in
-  /// arrays, applies continuity, rounds the coefficients and computes bounds.
+  /// Makes a field from the state's tree or a copy of it. Prunes the tree, raises its degrees, lays it out in
+  /// arrays, applies continuity, rounds the coefficients and computes bounds, as far as the options ask for it.
   FieldData finish(BuildTree&& tree) {
     const BuildOptions& options = setup_.options;
     const std::uint64_t before = fitter_.evaluations();
 
-    // Prune and enrich the tree, after which its cells are final.
+    // Prune the tree and raise its degrees. After that its cells are final.
     if (options.criterion == Criterion::optimal) prune(tree);
     if (options.enrich) enrich(tree);
     FieldMetadata built = metadata(sumOfErrors(tree));
     FieldData field = layOut(std::move(tree), std::move(built));
 
-    // Reduce the jumps, if that is asked for, and then round. The coefficients are final after that. Jumps are
-    // reduced in double precision.
+    // Reduce the jumps between cells in double precision, then round the coefficients. After that they are final.
     if (options.continuityWeight)
       continuity::makeWeaklyContinuous(field, {.weight = *options.continuityWeight}, setup_.progress);
     roundCoefficients(budget_.coefficientType(), field);
     field.blend = options.blend;
 
-    // Compute the bounds. They hold for the rounded coefficients and include blending.
+    // Compute the error bounds, which hold for the rounded coefficients and include blending.
     if (options.bounds) field.metadata.exactEvaluations += findBounds(field, setup_.distance, setup_.progress);
     ownEvaluations_ += fitter_.evaluations() - before;
     return field;
@@ -110,8 +108,8 @@ class Construction {
     const BuildOptions& options = setup_.options;
     PruneLimits limits{.goal = setup_.goal, .nodeBytes = budget_.nodeBytes()};
     for (int degree = 0; degree <= kMaxDegree; ++degree) limits.leafBytes[degree] = budget_.leafBytes(degree);
-    // Relax the goal if the growth ended before its goal, but not because of the limit of bytes. Pruning can then
-    // still undo refinements.
+    // If the refinement missed its goal for another reason than the limit of bytes, relax the goal of pruning, so
+    // that pruning can still undo refinements.
     if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)
       limits.goal = setup_.goal.relaxedTo(state_.totals, 1 / kGrowth);
     if (options.maxBytes) limits.mostBytes = budget_.limit();
@@ -120,8 +118,8 @@ class Construction {
     detail::prune(tree, state_.nearness, limits);
   }
 
-  /// Fits every leaf of the tree anew, one degree higher. All coefficients of a leaf then come from samples of
-  /// its own.
+  /// Fits every leaf of the tree anew, one degree higher. All coefficients of a leaf then come from samples in
+  /// this leaf.
   void enrich(BuildTree& tree) const {
     constexpr std::size_t kChunk = 4096;
     std::size_t coefficients = 0;
@@ -166,7 +164,7 @@ class Construction {
   CellFitter fitter_;
   GrowthObserver observer_{.afterStep = {}, .atWholeState = [] {}};
   Refiner refiner_;
-  std::uint64_t ownEvaluations_ = 0;  ///< evaluations of Φ by earlier `finish`, which later fields do not count
+  std::uint64_t ownEvaluations_ = 0;  ///< evaluations of the exact distance by earlier calls of `finish`
 };
 
 }  // namespace

@@ -16,11 +16,11 @@
 namespace hpsdf::detail {
 namespace {
 
-constexpr Magic kMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
+constexpr Magic kCheckpointMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
 // Version of the checkpoint file. It must be increased whenever the file's layout changes or a construction
 // would continue differently from the same state.
-constexpr std::uint32_t kVersion = 3;
-constexpr FileKind kKind{"checkpoint", "another output", "delete it to build from the start"};
+constexpr std::uint32_t kCheckpointVersion = 3;
+constexpr FileKind kCheckpointKind{"checkpoint", "another output", "delete it to build from the start"};
 
 class Digest {
  public:
@@ -46,7 +46,7 @@ class Digest {
 std::uint64_t digestOf(const Source& source) {
   Digest digest;
   digest.add(source.fingerprint);
-  if (source.fingerprint == 0) digest.add(source.name);  // a fingerprint allows the mesh file to be renamed
+  if (source.fingerprint == 0) digest.add(source.name);  // with a fingerprint, the mesh file may be renamed
   digest.add(source.vertices);
   digest.add(source.faces);
   digest.add(source.box);
@@ -71,7 +71,7 @@ std::uint64_t digestOf(const BuildOptions& options, const Box& domain, std::stri
   return digest.value();
 }
 
-/// Digest of values of Φ on a lattice that avoids planes of symmetry.
+/// Returns a digest of the exact distances on a lattice of points that avoids planes of symmetry.
 std::uint64_t digestOf(const DistanceFunction& distance, const Box& domain) {
   constexpr int kAxis = 16;
   Digest digest;
@@ -104,8 +104,8 @@ void checkTimes(const Checkpoint& checkpoint) {
     throw Error("checkpoint: expected a share of the time above 0 up to 1");
 }
 
-/// Bits that describe a cell's fit in the checkpoint file: kFitted and kCached tell which parts follow; kOutsideBand
-/// and kNear are flags of the fit.
+/// Bits that describe a cell in the checkpoint file: kFitted and kCached tell whether its polynomial and its
+/// cached projection follow; kOutsideBand and kNear tell where the cell lies.
 enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kAllBits = 15 };
 
 // The functions named …Item and …Items work in both directions. With a `CheckedWriter` they write the state and
@@ -173,8 +173,7 @@ void setCellIndices(const CheckedReader& reader, BuildTree& tree, int maxDepth) 
   }
 }
 
-/// Throws `Error` if a cell lacks a polynomial that the construction needs, or has a polynomial that it cannot
-/// have.
+/// Throws `Error` if a cell lacks a polynomial that the construction needs, or has one that it cannot have.
 void checkFits(const CheckedReader& reader, const BuildTree& tree, std::uint64_t fittedBaseCells, bool keepsAll) {
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
     const BuildNode& node = tree.nodes[n];
@@ -188,7 +187,7 @@ void checkFits(const CheckedReader& reader, const BuildTree& tree, std::uint64_t
 }
 
 void readTree(CheckedReader& reader, BuildTree& tree, std::uint64_t fittedBaseCells, const BuildOptions& options) {
-  constexpr std::uint64_t kLeastBytes = sizeof(std::uint32_t) + 1;  // of a node
+  constexpr std::uint64_t kLeastBytes = sizeof(std::uint32_t) + 1;  // least size of a node in the file
   const std::uint64_t base = tree.baseCells();
   std::uint64_t count = 0;
   reader.item(count);
@@ -244,18 +243,18 @@ CheckpointFile::CheckpointFile(const Checkpoint& checkpoint, const DistanceFunct
 
 std::optional<CheckedReader> CheckpointFile::open() const {
   if (!std::filesystem::exists(checkpoint_.file)) return std::nullopt;
-  CheckedReader reader(checkpoint_.file, kKind);
-  const std::string remedy = "; " + std::string(kKind.remedy) + ", or give what it was begun with";
-  const std::optional<std::uint32_t> version = reader.begin(kMagic);
+  CheckedReader reader(checkpoint_.file, kCheckpointKind);
+  const std::string remedy = "; " + std::string(kCheckpointKind.remedy) + ", or give what it was begun with";
+  const std::optional<std::uint32_t> version = reader.begin(kCheckpointMagic);
   if (!version) reader.refuse("is no checkpoint of a construction; move it away, or give another output");
-  if (*version != kVersion)
+  if (*version != kCheckpointVersion)
     reader.refuse("is a checkpoint of format version " + std::to_string(*version) + ", this program reads " +
-                  std::to_string(kVersion) + "; " + std::string(kKind.remedy));
+                  std::to_string(kCheckpointVersion) + "; " + std::string(kCheckpointKind.remedy));
   Identity found;
   identityItems(reader, found);
   if (found.program != identity_.program)
     reader.refuse("is a checkpoint of hpsdf " + found.program + ", this is " + identity_.program + "; " +
-                  std::string(kKind.remedy));
+                  std::string(kCheckpointKind.remedy));
   if (found.surface != identity_.surface) reader.refuse("is a checkpoint of another surface" + remedy);
   if (found.options != identity_.options) reader.refuse("is a checkpoint of a build with other options" + remedy);
   if (found.distance != identity_.distance) reader.refuse("is a checkpoint of another distance" + remedy);
@@ -268,7 +267,7 @@ void CheckpointFile::keep(const std::function<void(CheckedWriter&)>& writeState)
   const Clock::time_point start = Clock::now();
   try {
     CheckedWriter writer(checkpoint_.file);
-    writer.begin(kMagic, kVersion);
+    writer.begin(kCheckpointMagic, kCheckpointVersion);
     identityItems(writer, identity_);
     writeState(writer);
     writer.finish();

@@ -1,5 +1,5 @@
 #pragma once
-// The file that keeps the state of a construction.
+// The file in which the state of an unfinished construction is saved.
 
 #include <chrono>
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace hpsdf::detail {
 
 class CheckpointFile {
  public:
-  /// Prepares the file of a construction. Throws `Error` if the file cannot be written.
+  /// Prepares the checkpoint file of a construction. Throws `Error` if the file cannot be written.
   CheckpointFile(const Checkpoint& checkpoint, const DistanceFunction& distance, const Box& domain,
                  const BuildOptions& options);
 
@@ -41,7 +41,7 @@ class CheckpointFile {
     std::string program;  ///< version of the program
     std::uint64_t surface = 0;
     std::uint64_t options = 0;   ///< digest of settings and domain
-    std::uint64_t distance = 0;  ///< digest of the values of Φ at 4096 points
+    std::uint64_t distance = 0;  ///< digest of the exact distances at 4096 points
   };
 
   void waitFor(double seconds);
@@ -51,13 +51,13 @@ class CheckpointFile {
   Clock::time_point next_;
 };
 
-/// Writes the construction state and the number of evaluations of Φ. The state is not changed, although it is
-/// passed as non-const (see `…Item` in checkpoint_file.cpp).
+/// Writes the construction state and the number of evaluations of the exact distance. Does not change the state,
+/// which is non-const only because the same functions also read it.
 void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations);
 
-/// Reads into `state` what `save` wrote. The domain and the grid of `state` must already be set. Throws `Error`
-/// unless a construction with these options could have saved such a state. Returns the number of evaluations of
-/// Φ.
+/// Reads the construction state that `save` wrote, and returns the number of evaluations of the exact distance.
+/// The domain and the grid of `state` must already be set. Throws `Error` unless a construction with these
+/// options could have saved this state.
 std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const BuildOptions& options,
                       const ByteBudget& budget);
 

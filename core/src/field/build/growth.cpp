@@ -17,9 +17,9 @@ namespace {
 
 using Stage = ConstructionState::Stage;
 
-/// Estimates the progress of the growth from the decay of the error with the work, which is the number of
-/// evaluations of Φ. The error is assumed to follow a power law of the work, with the exponent measured over
-/// the last decade of the error.
+/// Estimates the progress of the refinement from the decay of the error with the work, which is the number of
+/// evaluations of the exact distance. The error is assumed to follow a power law of the work. Its exponent is
+/// measured over the last tenfold decrease of the error.
 class GrowthProgress {
  public:
   /// Records the present work and error. Returns the fraction of the work that is done, which never decreases and
@@ -28,7 +28,7 @@ class GrowthProgress {
     if (error <= target) return 1;
     if (history_.empty() || error < 0.8 * history_.back().error) history_.push_back({work, error});
     const Sample& past = latestAbove(10, error);
-    double exponent = 0.7;  // typical of scanned meshes; holds until an exponent can be measured
+    double exponent = 0.7;  // typical of scanned meshes; used until an exponent can be measured
     if (past.error > 2 * error && work > past.work)
       exponent = std::log(work / past.work) / std::log(past.error / error);
     fraction_ = std::max(fraction_, std::min(0.99, std::pow(target / error, exponent)));
@@ -37,7 +37,7 @@ class GrowthProgress {
 
   /// Returns a lower bound of the final work divided by the present work. The bound assumes that the error falls
   /// exponentially with further work, at its present rate, which is faster than a power law. Returns 1 until the
-  /// error has fallen by a decade, because less data does not suffice for an estimate.
+  /// error has fallen by a factor of 10, because less data does not suffice for an estimate.
   double leastFactor(double work, double error, double target) const {
     if (history_.empty() || !(history_.front().error > 10 * error) || !(error > target)) return 1;
     const Sample& past = latestAbove(3, error);
@@ -89,8 +89,7 @@ class Growth {
     bool operator<(const Entry& other) const { return std::pair(error, other.node) < std::pair(other.error, node); }
   };
 
-  /// Returns true if the errors have reached the goal of the growth. If this is false at the end, the growth
-  /// ended early, for instance by the limit of steps or bytes.
+  /// Returns true if the errors are small enough to end the refinement.
   bool reachedGoal() const { return setup_.growthGoal.reached(state_.totals); }
 
   void fitBaseCells() {
@@ -125,8 +124,8 @@ class Growth {
     setup_.budget.requireRoomForBaseGrid(refiner_.bytes(), least);
   }
 
-  /// Chooses the exponent θ of the nearness weight. With it, a cell at the mean distance of the far cells has a
-  /// weight equal to the ratio of the squared error goals, near to far.
+  /// Chooses the exponent θ of the weight with which errors count at a distance from the surface. A cell at the mean
+  /// distance of the far cells then has the weight (near error / far error)², with the errors that the user asked for.
   void chooseNearness() {
     double distance = 0, volume = 0;
     for (const BuildNode& node : state_.tree.nodes) {
@@ -144,14 +143,14 @@ class Growth {
   }
 
   /// Returns false if the goal of the construction is a maximum error alone. Refinement by the integrated errors
-  /// of cells would then leave no bytes for the refinement by the maximum error.
+  /// of cells would then use up the bytes that the refinement by the maximum error needs.
   bool growsByErrors() const { return !setup_.options.targetError.isNone() || !(setup_.options.maxError > 0); }
 
   void refineWorstCells() {
     while (!reachedGoal() && refiner_.mayStep() && (!queue_.empty() || enqueueDeferred())) {
       refineRound();
-      // Sum the errors exactly where rounding errors of the running total could end the construction too early or
-      // keep it from ending.
+      // Sum the errors anew if rounding errors of the running total could end the construction too early or keep
+      // it from ending.
       if (reachedGoal() || state_.totals.weighted < 1e-6 * state_.lastSum) refiner_.sumTotals();
       refiner_.observer.atWholeState();
     }
@@ -163,17 +162,17 @@ class Growth {
     const std::vector<std::uint32_t> worst = worstLeaves();
     std::vector<Trial> trials = tryAll(worst);
     for (std::size_t w = 0; w < worst.size(); ++w) {
-      if (reachedGoal() || !refiner_.mayStep())  // an exact sum may still show that the goal is not reached
+      if (reachedGoal() || !refiner_.mayStep())  // keep the leaf: an exact sum may still show that the goal is missed
         enqueue(worst[w]);
       else
         refine(worst[w], std::move(trials[w]));
     }
   }
 
-  /// Takes the leaves of one round from the queue. Defers near leaves if the near error has reached its goal, and
-  /// far leaves if the far error has.
+  /// Takes the leaves with the greatest errors from the queue. Puts a leaf near the surface aside if the near
+  /// error has reached its goal, and a leaf far from the surface if the far error has.
   std::vector<std::uint32_t> worstLeaves() {
-    constexpr std::size_t kRound = 32;  // few enough to stay close to the paper's order, which refines cells one by one
+    constexpr std::size_t kRound = 32;  // few leaves at a time, because the paper refines cells one by one
     std::vector<std::uint32_t> worst;
     while (worst.size() < kRound && !queue_.empty()) {
       const std::uint32_t next = queue_.top().node;
@@ -212,15 +211,15 @@ class Growth {
     for (std::uint32_t child = first; child < first + 8; ++child) enqueue(child);
   }
 
-  /// Returns true if the error of all near cells, for a near cell, or of all far cells, for a far cell, has
+  /// Returns true if the total error of all cells of this cell's kind, near the surface or far from it, has
   /// reached its goal.
   bool isExactEnough(const CellError& cell) const {
     const ErrorGoal& goal = setup_.growthGoal;
     return setup_.goal.byDistance() && (cell.near ? goal.nearReached(state_.totals) : goal.farReached(state_.totals));
   }
 
-  /// Moves deferred leaves back to the queue: near leaves if the near error no longer meets its goal, far leaves
-  /// if the far error does not. Returns false if the queue stays empty.
+  /// Moves leaves that were put aside back to the queue if the near error, for leaves near the surface, or the
+  /// far error, for all others, no longer meets its goal. Returns false if the queue stays empty.
   bool enqueueDeferred() {
     for (const std::uint32_t leaf : std::exchange(state_.deferred, {})) {
       if (isExactEnough(state_.tree.nodes[leaf].fit.error))

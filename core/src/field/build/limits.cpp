@@ -13,13 +13,12 @@
 namespace hpsdf::detail {
 namespace {
 
-/// Returns the number of bytes of memory that a construction may take.
 double allowedMemory(const BuildOptions& options) {
   const double most = hpsdf::allowedMemory();
   return options.memoryLimit ? std::min(most, double(*options.memoryLimit)) : most;
 }
 
-/// Returns a rounded number of cells as text for messages.
+/// Returns a number of cells as rounded text for messages.
 std::string cellsText(double cells) {
   constexpr double kFew = 1e4;
   std::ostringstream text;
@@ -28,12 +27,12 @@ std::string cellsText(double cells) {
   return text.str();
 }
 
-// Bytes of memory for a node of the octree: the node itself, its queue entry, the vector of its fit, and its
-// part of the final arrays.
+// Bytes of memory for a node of the octree: the node, its queue entry, its fit's vector and its part of the final
+// arrays.
 constexpr double kBytesPerNode = 250;
 constexpr double kBytesPerCoefficient = 8;
 
-/// Returns the target error τ converted to units^5.
+/// Converts the target error τ, which refers to a mesh of size 2, to a mesh of size `referenceLength`.
 double scaledTarget(double weighted, double referenceLength) {
   if (weighted == 0) return 0;
   const double target = weighted * std::pow(referenceLength / 2, 5);
@@ -89,9 +88,9 @@ void checkEnds(const BuildOptions& options) {
     refuse("the optimal criterion needs a target: a target error, near and far error, or bytes");
 }
 
-/// Returns the part of the byte limit that remains without the lookup grid. The grid has one entry for each
-/// base cell, or takes a sixteenth of the bytes of nodes and coefficients if that is more. Blending makes each
-/// entry half as large again.
+/// Returns the part of the byte limit that is left for nodes and coefficients. The lookup grid takes the rest:
+/// one entry for each base cell, or a sixteenth of the bytes of nodes and coefficients if that is more. Blending
+/// makes each entry half as large again.
 double limitWithoutLookup(const BuildOptions& options) {
   if (!options.maxBytes) return HUGE_VAL;
   const auto limit = double(*options.maxBytes);
@@ -153,7 +152,7 @@ void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
 double referenceLength(const Source& source, const Box& domain) {
   if (source.box.isEmpty()) return domain.sizes().maxCoeff() / 1.1;
   const double longest = source.box.sizes().maxCoeff();
-  if (!(longest > 0) || !std::isfinite(longest)) throw Error(source.name + ": the surface has no extent");
+  if (!(longest > 0) || !std::isfinite(longest)) throw Error(ErrorKind::mesh, source.name, "the surface has no extent");
   return longest;
 }
 
@@ -167,8 +166,8 @@ double ByteBudget::nodeBytes() const {
 }
 
 double ByteBudget::growthLimit() const {
-  // During the growth the field may exceed the byte limit by this factor, because pruning needs refinements to
-  // choose from. The factor was measured in the same way as `kGrowth` in limits.h.
+  // Before pruning, the field may exceed the byte limit by this factor, so that there are refinements from which
+  // pruning can choose. The factor was found by measurements, like `kGrowth`.
   constexpr double kByteGrowth = 1.6;
   return options_.criterion == Criterion::optimal ? limit_ * kByteGrowth : limit_;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Checks of the build settings, limits of memory and bytes, and values that follow from the settings.
+// Checks of the build settings, limits of the memory and of the field's size, and values that follow from the settings.
 
 #include <algorithm>
 #include <cstddef>
@@ -10,9 +10,9 @@
 
 namespace hpsdf::detail {
 
-/// If pruning follows, the growth continues until the error is this fraction of the error goal. Compared with
-/// no pruning on bunny_69k at τ = 1e-6, 0.7 takes 1.3 times the evaluations of Φ for 0.49 times the
-/// coefficients; 0.5 takes 1.7 times the evaluations for 0.48 times.
+/// If pruning follows, the octree is refined until the error is this fraction of the target. Compared with no
+/// pruning, on the mesh bunny_69k at τ = 1e-6, 0.7 takes 1.3 times the evaluations of the exact distance for 0.49
+/// times the coefficients; 0.5 takes 1.7 times the evaluations for 0.48 times the coefficients.
 constexpr double kGrowth = 0.7;
 
 /// The degree of the base cells before any refinement.
@@ -25,7 +25,7 @@ int mostDegree(const BuildOptions& options);
 /// for a surface without extent.
 double referenceLength(const Source& source, const Box& domain);
 
-/// Returns the error goal of a construction in the units of its field.
+/// Returns the errors at which a construction ends, in the units of its field.
 ErrorGoal errorGoal(const BuildOptions& options, double referenceLength);
 
 /// The memory that a construction needs now, and by how much it will grow.
@@ -35,8 +35,7 @@ struct MemoryNeed {
   std::size_t fixedBytes = 0;  ///< bytes besides the octree
 };
 
-/// Throws `Error` if the octree and the fixed bytes exceed the allowed memory now, or will exceed it at the
-/// end.
+/// Throws `Error` if the construction exceeds the allowed memory now, or will exceed it at the end.
 void requireMemory(const MemoryNeed& need, const BuildOptions& options);
 
 /// Computes the bytes of the finished field from its numbers of nodes and coefficients. The lookup grid does
@@ -45,14 +44,14 @@ class ByteBudget {
  public:
   explicit ByteBudget(const BuildOptions& options);
 
-  /// Returns the degree in the finished field of a leaf that now has this degree. It is one higher if leaves are
-  /// enriched.
+  /// Returns the degree that a leaf of degree `degree` has in the finished field. It is one higher if the option
+  /// `enrich` raises all degrees at the end.
   int finalDegree(int degree) const {
     return options_.enrich ? std::max(degree, std::min(degree + 1, options_.maxDegree)) : degree;
   }
-  /// Returns the number of coefficients in the finished field of a leaf that now has this degree.
+  /// Returns the number of coefficients that a leaf of degree `degree` has in the finished field.
   std::size_t finalCoefficients(int degree) const { return std::size_t(coefficientCount(finalDegree(degree))); }
-  /// Bytes of a node, including its blend extent and bound if the field has them.
+  /// Returns the bytes of a node, including those for blending and for error bounds if the field has them.
   double nodeBytes() const;
   double leafBytes(int degree) const { return bytes(1, double(finalCoefficients(degree))); }
   double bytes(double nodes, double coefficients) const {
@@ -77,7 +76,7 @@ class ByteBudget {
   double limit_;
 };
 
-/// Throws `Error` if the domain or a setting is out of range, for the first of them; see `checkBuild`.
+/// Throws `Error` if the domain or a setting is out of range. The error names the first fault; see `checkBuild`.
 void checkOptions(const Box& domain, const BuildOptions& options);
 
 }  // namespace hpsdf::detail

@@ -17,14 +17,15 @@ namespace {
 
 constexpr int kAcross = 8;
 
-/// The probes of a cell: a lattice of 8 × 8 × 8 points from the lower to the upper corner of the cell.
+/// The points at which the error of a cell is measured: a lattice of 8 × 8 × 8 points between opposite corners of
+/// the cell.
 struct Probes {
   std::vector<std::array<int, 3>> index;  ///< position in the lattice
   std::vector<Vector3> local;             ///< the points in local coordinates
 };
 
-/// Returns the lattice of probes. Its points are ordered in compact blocks, because exact distances are fastest
-/// for eight neighbouring points.
+/// Returns the lattice of probes, in blocks of eight neighbours. Exact distances are fastest for eight
+/// neighbouring points at a time.
 const Probes& probes() {
   static const Probes all = [] {
     constexpr int kBlocks = kAcross / 2;  // number of blocks of eight neighbours along an axis
@@ -42,9 +43,9 @@ const Probes& probes() {
   return all;
 }
 
-/// Returns the greatest error |f − Φ| at the probes, plus half of the greatest difference of this error between
-/// two neighbouring probes. The error is assumed to rise no faster between probes than from probe to probe.
-/// `exact` holds Φ at the probes. Probes with |Φ| above `farthest` do not count.
+/// Returns the greatest error |f − Φ| of the fit f to the exact distance Φ at the probes, plus half of the greatest
+/// difference of this error between two neighbouring probes. The error is assumed to rise no faster between probes than
+/// from probe to probe. `exact` holds Φ at the probes. Probes with |Φ| above `farthest` do not count.
 double worstError(const Fit& fit, std::span<const double> exact, double farthest) {
   constexpr std::array<int, 3> kStride = {1, kAcross, kAcross * kAcross};
   std::array<double, kAcross * kAcross * kAcross> errors;
@@ -98,10 +99,10 @@ class MaxErrorPass {
   }
 
  private:
-  /// The result of probing one leaf: its greatest error and, if that error is too great, a trial of its
+  /// The result of probing one leaf: its greatest error and, if that error is too great, the fits of its possible
   /// refinements.
   struct Candidate {
-    double worst = 0;  ///< |f − Φ|, see `worstError`
+    double worst = 0;  ///< greatest error, from `worstError`
     std::optional<Trial> trial;
     bool raises = false;
   };
@@ -124,7 +125,7 @@ class MaxErrorPass {
     const bool mayStep = refiner_.mayStep();
     if (mayStep) refiner_.apply(leaf, std::move(*candidate.trial), candidate.raises);
     if (!mayStep || state_.isFull || candidate.raises) {
-      state_.pending.push_back(leaf);  // probed again; if no step is left, only to measure it
+      state_.pending.push_back(leaf);  // probe the leaf again; if no step is left, only to measure its error
       return;
     }
     const std::uint32_t first = state_.tree.nodes[leaf].firstChild;
@@ -148,8 +149,8 @@ class MaxErrorPass {
       return candidate;
     }
 
-    // Probe the leaf, that is, compare it with Φ at the lattice points. A probe slightly outside the narrow band
-    // represents the points around it that lie within the band.
+    // Compare the leaf with the exact distance at the probes. A probe slightly outside the narrow band counts
+    // too, because it represents the points around it that lie within the band.
     const Box box = state_.tree.boxOf(leaf);
     const std::vector<double> exact = fitter_.distances(box, probes().local);
     const double band = setup_.options.band;
@@ -158,8 +159,8 @@ class MaxErrorPass {
     candidate.worst = worstError(leaf.fit, exact, farthest);
     if (candidate.worst <= most || !mayRefine) return candidate;
 
-    // Try both refinements. Raise the degree if that makes the error small enough, else decide by the paper's
-    // criterion.
+    // Try the allowed refinements. Raise the degree if that makes the error small enough, else decide by the
+    // criterion of the paper.
     candidate.trial = refiner_.attempt(leaf, allowed);
     const std::optional<Fit>& raised = candidate.trial->raised;
     candidate.raises =

@@ -40,7 +40,7 @@ bool Refiner::mayStep() const {
 }
 
 void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
-  constexpr std::size_t kStepsBetweenSums = 1000;  // between exact sums of the total error (paper, sec. 3.6)
+  constexpr std::size_t kStepsBetweenSums = 1000;  // steps after which the total error is summed anew (paper, sec. 3.6)
   BuildTree& tree = state.tree;
   if (tree.nodes.size() > 0xffffffffu - 8)
     throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
@@ -54,7 +54,8 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
     return;
   }
 
-  // Update the totals of the state: replace the leaf's coefficients and error by those of its refinement.
+  // Update the totals of the state: replace the leaf's coefficients and error by the coefficients and errors of
+  // its refinement.
   state.coefficients += added;
   state.totals.add(tree.nodes[leaf].fit.error, -1);
   if (raises) {
@@ -76,8 +77,8 @@ void Refiner::sumTotals() {
 }
 
 void Refiner::requireMemory(double factor) const {
-  // Estimate the memory. If pruning follows, cached projections and internal nodes need additional memory, about
-  // three times that of the coefficients of the leaves.
+  // Estimate the memory. If pruning follows, the projections and the internal nodes that are kept for it need
+  // about three times as much memory as the coefficients of the leaves.
   const bool keepsAll = setup.options.criterion == Criterion::optimal;
   detail::requireMemory({.nodes = state.tree.nodes.size(),
                          .coefficients = keepsAll ? 4 * state.coefficients : state.coefficients,

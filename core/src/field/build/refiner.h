@@ -18,16 +18,16 @@ struct ConstructionState {
 
   Stage stage = Stage::fitBaseCells;
   std::uint64_t fittedBaseCells = 0;
-  std::uint64_t steps = 0;  ///< leaves raised or split so far
+  std::uint64_t steps = 0;  ///< refinements so far: leaves whose degree was raised, or that were split
   Nearness nearness;
-  ErrorTotals totals;           ///< running sums, updated with each step
-  double lastSum = 0;           ///< weighted total when the totals were last summed exactly
+  ErrorTotals totals;           ///< sums of errors over all leaves, updated with each step
+  double lastSum = 0;           ///< `totals.weighted` when it was last summed anew from all leaves
   double measuredError = 0;     ///< greatest error among the leaves that the max-error pass has finished
-  bool isFull = false;          ///< a refinement would exceed the limit of bytes
+  bool isFull = false;          ///< true once a refinement would have exceeded the limit of bytes
   std::uint64_t processed = 0;  ///< number of entries of `pending` that the max-error pass has finished
   BuildTree tree;
-  std::vector<std::uint32_t> deferred;  ///< leaves put aside because their kind, near or far, had reached its goal
-  std::vector<std::uint32_t> pending;   ///< leaves of the max-error pass, in the order in which they are probed
+  std::vector<std::uint32_t> deferred;  ///< leaves set aside while the near or the far error meets its goal
+  std::vector<std::uint32_t> pending;   ///< leaves whose maximum error is measured, in this order
   std::size_t coefficients = 0;         ///< number of coefficients of the finished field; derived, not stored
 };
 
@@ -36,13 +36,13 @@ struct ConstructionSetup {
   const DistanceFunction& distance;
   const BuildOptions& options;
   const Progress& progress;
-  double referenceLength;  ///< L
+  double referenceLength;  ///< length L by which the target error is scaled
   ErrorGoal goal;
-  ErrorGoal growthGoal;  ///< a smaller error than `goal` if pruning follows
+  ErrorGoal growthGoal;  ///< goal before pruning: a smaller error than `goal` if pruning follows
   const ByteBudget& budget;
 };
 
-/// Callbacks that are called while the octree grows.
+/// Callbacks during the refinement of the octree.
 struct GrowthObserver {
   /// Called with the number of refinement steps: with 0 once the base cells are fitted, then after each step. May
   /// be empty.
@@ -75,15 +75,15 @@ struct Refiner {
 
   /// Computes the error totals anew from all leaves, which removes the rounding errors of the running totals.
   void sumTotals();
-  /// Returns the bytes of the field as it would be made from the present octree, computed by `ByteBudget`.
+  /// Returns the size in bytes of the field that would be made from the present octree.
   double bytes() const { return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)); }
   /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by `factor`.
   void requireMemory(double factor = 1) const;
 };
 
-/// The hp decision (paper, eqs. 7 to 9), with errors weighted by nearness. Returns true if a higher degree
-/// reduces the error more per coefficient than a split does. If only one refinement was tried, the decision is
-/// for that one.
+/// Decides between a higher degree and a split (paper, eqs. 7 to 9), with errors weighted by nearness to the
+/// surface. Returns true if a higher degree reduces the error more per additional coefficient. If only one
+/// refinement was tried, the decision is for that one.
 bool prefersDegree(const Fit& current, const Trial& trial);
 
 ErrorTotals sumOfErrors(const BuildTree& tree);
@@ -93,8 +93,8 @@ ErrorTotals sumOfErrors(const BuildTree& tree);
 /// bytes is reached.
 void growByErrors(Refiner& refiner);
 
-/// Probes every leaf and refines it while its greatest error exceeds `BuildOptions::maxError`. The limits may
-/// stop this early; the state then stores the greatest error that remains.
+/// Measures the error of every leaf at probe points, and refines the leaf while its greatest error exceeds
+/// `BuildOptions::maxError`. If a limit ends this early, the state stores the greatest error that remains.
 void refineByProbes(Refiner& refiner);
 
 }  // namespace hpsdf::detail

@@ -94,11 +94,13 @@ Part partOf(const std::vector<double>& cube, int degree, const Box& box, int num
   return part;
 }
 
-/// Number of points at which Φ is evaluated to bound Φ over one part of a leaf: the part's centre and one point
-/// on either side of it, one leaf edge away along the polynomial's gradient. A point y gives the bounds Φ(y) ±
-/// |x − y|. The farther away y is, the more nearly these bounds are linear in x over the part.
+/// Number of points at which the exact distance Φ is evaluated to bound Φ over one part of a leaf: the part's
+/// centre and one point on either side of it, one leaf edge away along the polynomial's gradient. A point y gives
+/// the bounds Φ(y) ± |x − y|. The farther away y is, the more nearly these bounds are linear in x over the part.
 constexpr std::size_t kPointsPerPart = 3;
-constexpr double kSideDistance = 1;  // in edges; 0.7, 1.4 and 2 multiply bunny's median bound by 1.03, 1.2 and 2.1
+/// Distance of the two outer points from the centre, in leaf edges. With 0.7, 1.4 and 2, the median bound for the mesh
+/// bunny is 1.03, 1.2 and 2.1 times as great.
+constexpr double kSideDistance = 1;
 
 std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain, double edge) {
   std::array<Vector3, kPointsPerPart> partPoints;
@@ -113,14 +115,14 @@ std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain
   return partPoints;
 }
 
-/// Upper bounds of f(x) + |x − y| and of |x − y| − f(x) over the points x of one part of a leaf.
+/// Upper bounds, for one point y, of f(x) + |x − y| and of |x − y| − f(x) over the points x of one part of a leaf.
 struct ConeBounds {
   double over, under;
 };
 
-/// Computes upper bounds of f(x) + |x − y| and |x − y| − f(x) over a part. A function that is linear in each
-/// coordinate or convex along each axis is greatest at a corner. If the quadratic terms are more concave than
-/// |x − y| is convex, the maximum may exceed the corner values by the height of a parabola.
+/// Computes upper bounds of f(x) + |x − y| and |x − y| − f(x) over the points x of a part. A function that is
+/// linear in each coordinate or convex along each axis is greatest at a corner. If the quadratic terms are more
+/// concave than |x − y| is convex, the maximum may exceed the corner values by the height of a parabola.
 ConeBounds coneBounds(const Part& part, const Vector3& y) {
   // Find the greatest values of f + |x − y| and |x − y| − f at the corners of the part.
   double over = -std::numeric_limits<double>::infinity(), under = over, farthest = 0;
@@ -143,7 +145,7 @@ ConeBounds coneBounds(const Part& part, const Vector3& y) {
   for (int axis = 0; axis < 3; ++axis) {
     const double square = part.half[axis] * part.half[axis];
     const double along = nearest > 0 ? std::min(1.0, (std::abs(offset[axis]) + part.half[axis]) / nearest) : 1;
-    const double bend = (1 - along * along) / farthest * square;  // least curvature of the distance
+    const double bend = (1 - along * along) / farthest * square;  // least curvature of |x − y| along the axis
     const double curvature = 3 * part.squares[axis];
     over += std::max(0.0, -curvature - bend) / 2;
     under += std::max(0.0, curvature - bend) / 2;
@@ -151,8 +153,8 @@ ConeBounds coneBounds(const Part& part, const Vector3& y) {
   return {over, under};
 }
 
-/// Returns an upper bound of |f − Φ| over a part. For every point y, Φ(x) lies between Φ(y) − |x − y| and Φ(y)
-/// + |x − y|.
+/// Returns an upper bound of |f − Φ| over a part. For every point y, the exact distance Φ(x) lies between Φ(y) −
+/// |x − y| and Φ(y) + |x − y|.
 double errorBound(const Part& part, std::span<const Vector3> partPoints, std::span<const double> distances) {
   double above = std::numeric_limits<double>::infinity(), below = above;  // bounds of f − Φ and of Φ − f
   for (std::size_t p = 0; p < partPoints.size(); ++p) {
@@ -195,7 +197,7 @@ class BoundFinder {
     const std::vector<double> cube = cubeOf(field_, leaf.node, degree);
     std::array<Part, 8> parts;
     std::array<std::array<Vector3, kPointsPerPart>, 8> partPoints;
-    std::array<Vector3, 8 * kPointsPerPart> points;  // sorted by kind, since exact distances are fastest for neighbours
+    std::array<Vector3, 8 * kPointsPerPart> points;  // neighbours are adjacent, which makes exact distances faster
     for (int number = 0; number < 8; ++number) {
       parts[number] = partOf(cube, degree, box, number, halves_);
       partPoints[number] = pointsOf(parts[number], field_.domain, box.sizes().maxCoeff());
@@ -251,8 +253,8 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
   for (int axis = 0; axis < 3; ++axis) {  // lengths are in edges of the small cell
     const std::int64_t smallAt = small.cellIndex[axis], largeAt = large.cellIndex[axis] << levels;
     const std::int64_t width = std::int64_t{1} << levels, wall = std::int64_t{field.grid[axis]} << small.depth;
-    // Compute the extent of the zone relative to the small leaf's lower corner. Such positions stay exact far from
-    // the domain's corner.
+    // Compute the extent of the zone relative to the small leaf's lower corner. Relative positions are exact even
+    // far from the domain's corner.
     const auto low = static_cast<double>(std::max<std::int64_t>(0, largeAt - smallAt));
     const auto high = static_cast<double>(std::min<std::int64_t>(1, largeAt + width - smallAt));
     const double from = std::max(low - field.blend, static_cast<double>(-smallAt));
@@ -296,8 +298,8 @@ void forEachPair(const FieldData& field, const query::OctreeNode& leaf, const F&
   });
 }
 
-/// Returns one depth for each node. For a leaf, it is the depth of the deepest leaf among its neighbours and
-/// the neighbours of these neighbours.
+/// Returns for each leaf, by node index, the depth of the deepest leaf among the leaf, its neighbours and their
+/// neighbours.
 std::vector<int> deepestAround(const FieldData& field, const std::vector<query::OctreeNode>& leaves) {
   std::vector<int> deepest(field.nodes.size(), 0);
   for (const query::OctreeNode& leaf : leaves) deepest[leaf.node] = leaf.depth;
@@ -341,12 +343,12 @@ void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& le
         disagreement[pair.node].widen(pair.disagreement);
       }
   }
-  // Find the deepest leaf around each leaf. The neighbours of a neighbour determine the blend extent of the
-  // neighbour.
+  // Find the deepest leaf around each leaf, because weights are steepest in the narrowest blend zone. The
+  // neighbours of a neighbour determine its blend zones.
   const std::vector<int> deepest = deepestAround(field, leaves);
   // Bound the slope of the normalized weights: Σ ‖∇(w_n/Σw)‖ ≤ 2 Σ‖∇w_n‖ / Σw over at most eight leaves, of which
   // at least one has a weight of 1/8 or more. A weight is a product of three ramps, and the slope of a ramp is at
-  // most 3/4 over the blend extent.
+  // most 3/4 divided by the half width of the blend zone.
   constexpr double kSlopes = 2 * 8 * 8 * 1.7320508075688773 * 0.75;
   const double rounding = kRounding * field.domain.diagonal().norm();
   for (const query::OctreeNode& leaf : leaves) {
@@ -365,7 +367,7 @@ std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, con
   std::vector<CellBound> bounds(field.nodes.size());
   const std::vector<query::OctreeNode> leaves = query::allLeaves(field);
   const BoundFinder find(field, distance);
-  const double share = field.blend > 0 ? 0.5 : 1;  // share of the progress
+  const double share = field.blend > 0 ? 0.5 : 1;  // part of the whole progress that this loop makes
   for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
     report(progress, share * double(begin) / double(leaves.size()));
     tbb::parallel_for(begin, std::min(begin + kLeavesPerStep, leaves.size()),

@@ -10,8 +10,8 @@
 
 namespace hpsdf::detail {
 
-/// Computes proven bounds of each leaf and stores them in `field.bounds`; see `withBounds`. Uses the threads of
-/// the calling TBB arena. Returns the number of evaluations of Φ.
+/// Computes proven bounds of the error and of the slope in each leaf, and stores them in `field.bounds`; see
+/// `withBounds`. Uses the threads of the calling TBB arena. Returns the number of evaluations of the exact distance.
 std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, const Progress& progress);
 
 }  // namespace hpsdf::detail

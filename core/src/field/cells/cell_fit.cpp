@@ -10,10 +10,12 @@
 namespace hpsdf::detail {
 namespace {
 
-/// Points of one call of Φ: enough to amortise the call, few enough to notice a cancellation soon.
+/// Number of points for which the exact distance is called at once: enough to amortise the call, few enough to
+/// notice a cancellation soon.
 constexpr std::size_t kBatch = 512;
 
-/// Returns the projection for cells of the given degree p. It has enough sample points for degree p+1 as well.
+/// Returns the projection for cells of degree p = `degree`. It projects samples onto degree p+1, for which their
+/// number suffices.
 std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildOptions& options) {
   const int order = std::max(options.quadrature * degree, 2 * (degree + 1));
   if (options.cubature == CubatureKind::compact)
@@ -21,12 +23,12 @@ std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildO
   return basis::productProjection(basis::gaussLegendre(order / 2 + 1), degree + 1);
 }
 
-/// Number of points that the exact distance searches as one packet. The search is fastest if these points lie
-/// close to each other.
+/// Number of points whose exact distances are searched together. The search is fastest if these points lie close
+/// to each other.
 constexpr std::size_t kGroup = 8;
 
-/// Sorts the point indices in `order` into compact groups. It halves the set of points recursively across its
-/// widest extent.
+/// Sorts the point indices in `order` into compact groups. Halves the set of points recursively along the longest
+/// axis of its box.
 void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& points) {
   if (order.size() <= kGroup) return;
   Box box;
@@ -135,9 +137,10 @@ double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
   const double residual = std::max(meanSquare - represented, 0.0);
   if (options_.estimator == Estimator::residual) return residual;
 
-  // Compute the embedded error estimate. If Φ is even or odd about the cell's centre, the coefficients of every
-  // other total degree vanish, and the embedded estimate may vanish too. The residual ∫Φ² − Σc² then replaces it,
-  // but only if the residual is far greater, so that the paper's estimate decides everywhere else.
+  // The paper's estimate is the squared norm of the coefficients of the top degree. If Φ is even or odd about the
+  // cell's centre, the coefficients of every other degree vanish, and the estimate may vanish too. The residual
+  // ∫Φ² − Σc² then replaces it, but only if the residual is far greater, so that the paper's estimate decides
+  // everywhere else.
   const double shell = basis::topDegreeError(fit.coefficients.data(), fit.degree, 1.0);
   return residual > 1000 * shell && residual > 1e-12 * meanSquare ? residual : shell;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Fits of polynomials to the exact distance in single cells, and trials of the refinements of a cell.
+// Fits of polynomials to the exact distance in single cells, and trial fits of a cell's possible refinements.
 
 #include <array>
 #include <atomic>
@@ -24,7 +24,7 @@ void requireFinite(std::span<const Vector3> points, std::span<const double> dist
 struct CachedProjection {
   std::vector<double> coefficients;
   int degree = 0;
-  double meanSquare = 0;  ///< ∫Φ² / V by the same samples
+  double meanSquare = 0;  ///< mean of Φ² over the cell, by quadrature of the samples
 };
 
 /// A cell's polynomial and its error.
@@ -33,24 +33,23 @@ struct Fit {
   int degree = 0;
   CellError error;
   bool outsideBand = false;
-  CachedProjection cached;  ///< of at least the fit's degree; kept for pruning
+  CachedProjection cached;  ///< projection of at least the fit's degree; kept for pruning
 };
 
 /// The fits that result from the two possible refinements of a cell: a higher degree, or a split into eight
 /// children.
 struct Trial {
-  std::optional<Fit> raised;                   ///< the same cell one degree higher
-  std::optional<std::array<Fit, 8>> children;  ///< its eight children at its own degree
+  std::optional<Fit> raised;                   ///< fit of the cell, one degree higher
+  std::optional<std::array<Fit, 8>> children;  ///< fits of the eight children, at the cell's degree
 };
 
 enum class Refinement : std::uint8_t { degree, octree, either };
 
-/// Samples Φ and fits polynomials. Thread-safe: cells are fitted in parallel.
+/// Samples the exact distance and fits polynomials to it. Thread-safe: cells are fitted in parallel.
 class CellFitter {
  public:
-  /// Keeps references to its arguments. `nearness` may be changed between two fits. A cell counts as near the
-  /// surface if the absolute value of its field's mean is at most `nearDistance` plus half of the cell's
-  /// diagonal.
+  /// Keeps references to its arguments. `nearness` may be changed between two fits. A cell counts as near the surface
+  /// if the mean of the field in the cell is in magnitude at most `nearDistance` plus half of the cell's diagonal.
   CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
              double nearDistance, const Progress& progress);
 
@@ -59,14 +58,14 @@ class CellFitter {
   /// Fits the allowed refinements of a cell whose fit is `current`.
   Trial attempt(const Box& cell, const Fit& current, Refinement allowed) const;
 
-  /// Returns Φ at points that are given by local coordinates of a cell.
+  /// Returns the exact distances at points that are given by local coordinates of a cell.
   std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const {
     return sample({&cell, 1}, local, {});
   }
 
-  /// Number of evaluations of Φ so far.
+  /// Number of evaluations of the exact distance so far.
   std::uint64_t evaluations() const { return evaluations_; }
-  /// Sets the number of evaluations of Φ, to continue that of a restored construction.
+  /// Sets the number of evaluations so far, for a construction that continues from a file.
   void setEvaluations(std::uint64_t evaluations) { evaluations_ = evaluations; }
 
  private:
@@ -74,13 +73,13 @@ class CellFitter {
   struct Rules {
     std::unique_ptr<const basis::Projection>
         projection;                           ///< onto degree p+1, which contains the projection onto degree p
-    std::vector<std::uint32_t> orderOfOne;    ///< order in which a cell is sampled; empty: that of the points
-    std::vector<std::uint32_t> orderOfEight;  ///< order for eight children, child · points + point
+    std::vector<std::uint32_t> orderOfOne;    ///< order in which the points of a cell are sampled; empty: as listed
+    std::vector<std::uint32_t> orderOfEight;  ///< order for eight children; an entry is child · points per cell + point
   };
 
   const Rules& rules(int degree) const;
-  /// Returns Φ at the same local points of several cells, one cell after another. Φ is evaluated in the order
-  /// `order`; if `order` is empty, in the order of the points.
+  /// Returns the exact distances at the same local points of several cells, one cell after another. They are
+  /// evaluated in the order `order` or, if `order` is empty, in the order of the points.
   std::vector<double> sample(std::span<const Box> cells, std::span<const Vector3> local,
                              std::span<const std::uint32_t> order) const;
   bool outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const;

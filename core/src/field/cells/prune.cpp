@@ -14,7 +14,7 @@ namespace hpsdf::detail {
 namespace {
 
 constexpr std::uint8_t kSplit = 0xff;  ///< value in place of a degree for a node that stays split
-constexpr int kHalvings = 60;          // halvings of the range of log λ, down to the last bits of λ
+constexpr int kHalvings = 60;          // bisections of the range of log λ; they determine λ to its last bits
 
 /// Returns the squared errors that a node has as a leaf of degree 0, 1, … up to the degree of its cached
 /// projection.
@@ -48,8 +48,8 @@ class Pruning {
   }
 
   void run() {
-    // Choose λ. With a greater λ the error grows and the bytes fall. Take the greatest λ that keeps the error goal
-    // or, if greater, the least λ that keeps the limit of bytes.
+    // Choose λ, the error that is worth one byte. With a greater λ the error grows and the bytes fall. Take the
+    // greatest λ that keeps the error goal or, if greater, the least λ that keeps the limit of bytes.
     double lambda = bracket([&](const Totals& sum) { return limits_.goal.reached(sum.errors); }).first;
     if (limits_.mostBytes)
       lambda = std::max(lambda, bracket([&](const Totals& sum) { return sum.bytes > *limits_.mostBytes; }).second);
@@ -70,8 +70,8 @@ class Pruning {
     return error;
   }
 
-  /// Chooses for each node, for this λ, whether it stays split or which degree it gets as a leaf. Works from the
-  /// leaves up: in the array of nodes, children come after their parents.
+  /// Chooses for each node whether it stays split or which degree it gets as a leaf, so that error + λ·bytes is
+  /// least. Works from the leaves up: in the array of nodes, children come after their parents.
   void choose(double lambda) {
     std::vector<double> cost(tree_.nodes.size());
     for (std::size_t n = tree_.nodes.size(); n-- > 0;) {
@@ -90,8 +90,8 @@ class Pruning {
   double chooseDegree(std::size_t n, double lambda) {
     const Fit& fit = tree_.nodes[n].fit;
     const int top = std::min<int>(limits_.mostDegree, fit.cached.degree);
-    // Keep the degree of a cell outside the narrow band. No error counts there, so that pruning would lower the
-    // degree to the lowest one.
+    // Keep the degree of a cell outside the narrow band. Its error does not count, so that pruning would choose
+    // the lowest degree.
     const int low = fit.outsideBand ? fit.degree : std::min(limits_.leastDegree, top);
     double least = HUGE_VAL;
     for (int degree = low; degree <= top; ++degree) {
@@ -123,9 +123,9 @@ class Pruning {
     return sum;
   }
 
-  /// Returns two neighbouring values of λ, in squared error per byte: isBelow(totals of the pruned tree) is true
-  /// for the lower λ and false for the upper one. If it never changes, both values are at one end of the range of
-  /// λ.
+  /// Finds by bisection the λ, in squared error per byte, at which isBelow(totals of the pruned tree) changes
+  /// from true to false. Returns the values just below and just above the change. If there is no change, both are
+  /// at one end of the range of λ.
   template <typename IsBelow>
   std::pair<double, double> bracket(const IsBelow& isBelow) {
     double high = 0;
@@ -146,7 +146,7 @@ class Pruning {
     kept.grid = tree_.grid;
     const std::size_t base = tree_.baseCells();
     for (std::size_t n = 0; n < base; ++n) take(kept, n);
-    for (std::size_t n = 0; n < kept.nodes.size(); ++n) {  // the list grows
+    for (std::size_t n = 0; n < kept.nodes.size(); ++n) {  // take() appends nodes to the list
       const std::uint32_t from = kept.nodes[n].firstChild;
       if (from == 0) continue;
       kept.nodes[n].firstChild = static_cast<std::uint32_t>(kept.nodes.size());
@@ -173,7 +173,7 @@ class Pruning {
   const PruneLimits& limits_;
   std::vector<std::vector<double>> squared_;  ///< squared errors by node and degree
   std::vector<double> weight_;
-  std::vector<std::uint8_t> chosen_;  ///< a leaf's degree, or kSplit
+  std::vector<std::uint8_t> chosen_;  ///< for each node, its degree as a leaf or kSplit
 };
 
 }  // namespace

@@ -1,6 +1,5 @@
 #pragma once
-// Pruning of the octree. It undoes refinements, first those that save the most bytes for the error that undoing
-// them adds.
+// Pruning of the octree. It undoes refinements, first those with the greatest saving of bytes per added error.
 
 #include <array>
 #include <optional>
@@ -11,18 +10,18 @@
 namespace hpsdf::detail {
 
 struct PruneLimits {
-  ErrorGoal goal;                                     ///< goal that pruning must not miss
-  std::optional<double> mostBytes = {};               ///< limit that is kept even if the goal is missed
+  ErrorGoal goal;                                     ///< errors that the pruned tree must not exceed
+  std::optional<double> mostBytes = {};               ///< limit of bytes, kept even if the error goal is missed
   double nodeBytes = 8;                               ///< bytes of an internal node
   std::array<double, kMaxDegree + 1> leafBytes = {};  ///< bytes of a leaf with its coefficients, by degree
   int leastDegree = 1;                                ///< least degree of a leaf
   int mostDegree = kMaxDegree;
 };
 
-/// Prunes a tree: turns internal nodes into leaves and lowers degrees. Of all possible results it takes the one
-/// with the least error + λ·bytes, as the pruning of trees in classification and source coding does (Breiman et
-/// al. 1984; Chou, Lookabaugh, Gray 1989). λ is the greatest that keeps the goal. The error of a node at a
-/// degree is the residual ∫Φ² − Σc² of its samples, so that every node needs its `Fit::cached`.
+/// Prunes a tree: turns internal nodes into leaves and lowers degrees. The result has the least error + λ·bytes
+/// of all possible results, as in the pruning of trees in classification and source coding (Breiman et al. 1984;
+/// Chou, Lookabaugh, Gray 1989). λ is the greatest that keeps the error goal. The error of a node at a degree is
+/// the residual ∫Φ² − Σc² of the projection of its samples, which `Fit::cached` of every node must hold.
 void prune(BuildTree& tree, const Nearness& nearness, const PruneLimits& limits);
 
 }  // namespace hpsdf::detail

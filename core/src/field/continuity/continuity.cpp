@@ -39,7 +39,8 @@ void report(const Progress& progress, double fraction) {
   progress.update("closing jumps", std::clamp(fraction, 0.0, 1.0));
 }
 
-/// Solves (M + λ)d = −Mx₀ by conjugate gradients with the diagonal as preconditioner.
+/// Solves (M + λI)d = −Mx₀ for the change d of the coefficients x₀ by conjugate gradients with the diagonal as
+/// preconditioner. M is the matrix of `FaceCoupling`, which measures jumps; λ is the weight of the change.
 class ConjugateGradients {
  public:
   ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
@@ -78,10 +79,10 @@ class ConjugateGradients {
   WeakContinuityFigures figures;
 
  private:
-  /// Residuals smaller than this fraction of |x₀| are rounding errors.
+  /// Residuals whose norm is below this fraction of |x₀| are rounding errors.
   static constexpr double kRounding = 1e-13;
 
-  /// Sums of the squared components of the residual, without and with the preconditioner as weights.
+  /// Sums of the squared components of the residual, without weights and with the preconditioner as weights.
   struct ResidualSquares {
     double sum = 0;
     double weighted = 0;  ///< sum with the preconditioner as weights
@@ -92,7 +93,8 @@ class ConjugateGradients {
     }
   };
 
-  /// Moves the solution by `length` along the search direction. Updates the residual and returns its squares.
+  /// Moves the solution by `length` along the search direction. Updates the residual and returns the sums of its
+  /// squares.
   ResidualSquares step(double length) {
     const auto move = [&](ResidualSquares& squares, std::size_t first, std::size_t count) {
       for (std::size_t i = first; i < first + count; ++i) {
@@ -115,12 +117,12 @@ class ConjugateGradients {
 
   FaceCoupling& coupling_;
   const WeakContinuity& options_;
-  std::vector<float> preconditioner_;  ///< any positive numbers would do; float halves the bytes to read
+  std::vector<float> preconditioner_;  ///< any positive numbers are valid, and float halves the memory traffic
   std::vector<double> change_, residual_, direction_, product_;
 };
 
-/// Returns Σ κ_e ‖f − f₀‖² in the field's units^5. The sum runs over the cells e that count towards the error
-/// ε.
+/// Returns Σ_e κ_e ∫(f − f₀)² for a change of the field from f₀ to f. The sum runs over all cells e, or over those in
+/// the narrow band; κ_e weights a cell by its nearness to the surface. The unit is squared distance times volume.
 double weightedChange(const FieldData& field, std::span<const double> x0, std::span<const double> change) {
   const BuildOptions& settings = field.metadata.settings;
   const double volume = field.domain.sizes().prod();
@@ -159,7 +161,7 @@ WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuit
   const std::vector<double> change = solver.solve(squaredNorm(x), progress);
   FieldMetadata& metadata = field.metadata;
   metadata.settings.continuityWeight = options.weight;
-  metadata.settings.maxError = metadata.measuredError = 0;  // both held only before the change
+  metadata.settings.maxError = metadata.measuredError = 0;  // both are valid only for the unchanged field
   metadata.totalError += weightedChange(field, x, change) / std::pow(metadata.referenceLength / 2, 5);
   field.bounds.clear();
   if (solver.figures.change > 0) {
@@ -192,7 +194,7 @@ Field blended(const Field& field, double width) {
     throw Error("blend zones of a width of " + std::to_string(width) + " edges are out of range: give 0 to 0.25");
   FieldData data = field.data();
   data.blend = width;
-  data.bounds.clear();  // Bounds depend on the leaves that have a weight, which blending changes.
+  data.bounds.clear();  // The bounds depend on which leaves contribute at a point, and blending changes this.
   return Field(std::move(data));
 }
 

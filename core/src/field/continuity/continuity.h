@@ -6,15 +6,15 @@
 
 namespace hpsdf::continuity {
 
-/// The figures that `WeaklyContinuous` reports besides the field.
+/// The figures that `weaklyContinuous` returns besides the field, see `WeaklyContinuous`.
 struct WeakContinuityFigures {
   int iterations = 0;
   double residual = 0;
   double change = 0;
 };
 
-/// Does the same as `weaklyContinuous`, but in place, for a field whose coefficients are double. Runs on the
-/// caller's TBB threads.
+/// Reduces the jumps of a field between leaves like `weaklyContinuous`, but in place. The field's coefficients
+/// must be double. Runs on the caller's TBB threads.
 WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuity& options, const Progress& progress);
 
 }  // namespace hpsdf::continuity

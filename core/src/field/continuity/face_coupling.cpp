@@ -17,14 +17,16 @@ namespace {
 
 constexpr std::size_t kLeavesPerTask = 256;
 
-/// Returns the number of coefficients of a polynomial of total degree p on a face.
+/// Returns the number of coefficients of a polynomial on a face, that is, in two variables, of the given total degree.
 constexpr std::size_t faceCoefficientCount(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
-/// Returns the index, among the coefficients on a face, of the product of the polynomials of degrees a and b.
+/// Returns the index, among the coefficients on a face, of the product of Legendre polynomials of degrees a and b
+/// along the two axes of the face.
 constexpr std::size_t faceIndex(int a, int b) { return std::size_t(a + b) * (a + b + 1) / 2 + b; }
 constexpr std::size_t kMaxFaceCoefficients = faceCoefficientCount(kMaxDegree);
 
-/// Restricts a polynomial on a face to a quarter of the face. `share_[half][i][a]` is the coefficient of
-/// orthonormal polynomial a on the half axis in the expansion of orthonormal polynomial i of the whole axis.
+/// Restricts a polynomial on a face to a quarter of the face. `share_[half][i][a]` is a coefficient in one
+/// dimension: on the lower or upper half of an interval, orthonormal polynomial i of the interval is the sum over
+/// a of share_[half][i][a] times orthonormal polynomial a of the half.
 class QuarterRestriction {
  public:
   QuarterRestriction() {
@@ -35,14 +37,14 @@ class QuarterRestriction {
           share_[half][i][a] = 2 * std::sqrt((2 * a + 1.0) / (2 * i + 1)) * shares[half][i][a];
   }
 
-  /// Replaces the polynomial on a face by its restriction to a quarter of the face. Bit 0 of `quarter` selects
-  /// the upper half of the first axis, bit 1 that of the second axis.
+  /// Replaces the coefficients of a polynomial on a face by its coefficients on a quarter of the face. Bit 0 of
+  /// `quarter` selects the lower or upper half (0 or 1) along the first axis of the face, bit 1 along the second axis.
   template <typename Degree>
   void apply(double* face, Degree degree, int quarter) const {
     for (int along = 0; along < 2; ++along) {
       const auto& share = share_[quarter >> along & 1];
       for (int b = 0; b <= degree; ++b)
-        for (int a = 0; a <= degree - b; ++a) {  // ascending, because a needs the old values from a upwards
+        for (int a = 0; a <= degree - b; ++a) {  // ascending, because sum a needs the old coefficients from a upwards
           double sum = 0;
           for (int i = a; i <= degree - b; ++i) sum += share[i][a] * at(face, along, i, b);
           at(face, along, a, b) = sum;
@@ -73,14 +75,14 @@ class QuarterRestriction {
 
 const QuarterRestriction kQuarterRestriction;
 
-/// Does the same as `FaceCoupling::Trace`, for a degree and an axis that are known at compile time. The
-/// compiler unrolls its loops.
+/// Computes a leaf's polynomial on one of its faces, like `FaceCoupling::Trace`, for a degree and an axis that
+/// are known at compile time. The compiler therefore unrolls the loops.
 template <int P, int Axis>
 struct KnownTrace {
   static constexpr int kCount = coefficientCount(P);
   struct Entry {
     std::uint8_t faceIndex;
-    std::uint8_t order;  ///< degree along the axis across the face
+    std::uint8_t order;  ///< degree along the axis perpendicular to the face
   };
   static constexpr std::array<Entry, kCount> kEntries = [] {
     std::array<Entry, kCount> entries{};
@@ -95,8 +97,8 @@ struct KnownTrace {
     return entries;
   }();
 
-  /// Computes the coefficients on a face from the leaf's coefficients x. `ends` holds the values of the
-  /// orthonormal polynomials at the face.
+  /// Computes the coefficients on a face from the leaf's coefficients x. `ends[i]` is the value of the
+  /// one-dimensional orthonormal polynomial of degree i at the face.
   static void apply(const double* ends, const double* x, double* face) {
     std::array<double, faceCoefficientCount(P)> sums{};
     [&]<std::size_t... C>(std::index_sequence<C...>) {
@@ -106,8 +108,8 @@ struct KnownTrace {
     for (std::size_t a = 0; a < sums.size(); ++a) face[a] = sums[a];
   }
 
-  /// Applies the transpose of the restriction to the coefficients `face`, multiplies the result by `scale` and
-  /// adds it to `out`.
+  /// Multiplies the coefficients `face` by the transpose of the linear map in `apply` and by `scale`, and adds
+  /// the result to `out`.
   static void addTransposed(const double* ends, double scale, const double* face, double* out) {
     std::array<double, faceCoefficientCount(P)> scaled;
     for (std::size_t a = 0; a < scaled.size(); ++a) scaled[a] = scale * face[a];
@@ -118,7 +120,8 @@ struct KnownTrace {
   }
 };
 
-/// The values of the orthonormal polynomials at the lower and at the upper end of an axis.
+/// The values of the one-dimensional orthonormal Legendre polynomials at the lower (0) and the upper (1) end of
+/// an axis.
 const auto kEndValues = [] {
   std::array<std::array<double, kMaxDegree + 1>, 2> values{};
   for (int i = 0; i <= kMaxDegree; ++i) {
@@ -136,7 +139,7 @@ bool withAxis(int axis, const F& f) {
   return true;
 }
 
-/// Calls f(KnownTrace) if the degree is one that most leaves have. Returns true if f was called.
+/// Calls f with a `KnownTrace` if the degree is one that most leaves have, 2 to 5. Returns true if f was called.
 template <typename F>
 bool withKnownTrace(int degree, int axis, const F& f) {
   switch (degree) {
@@ -263,8 +266,8 @@ void FaceCoupling::restrictToFace(const Link& link, std::uint32_t leaf, int side
   for (std::size_t c = 0; c < trace.faceIndex.size(); ++c) face[trace.faceIndex[c]] += trace.factor[side][c] * x[c];
 }
 
-/// Applies the transpose of `restrictToFace` to `face`, multiplies the result by `scale` and adds it to the
-/// leaf's part of `out`.
+/// Multiplies `face` by the transpose of the linear map in `restrictToFace` and by `scale`, and adds the result
+/// to the leaf's part of `out`.
 void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, double scale, const double* face,
                                double* out) const {
   out += start_[leaf];
@@ -276,9 +279,9 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
     out[c] += scale * trace.factor[side][c] * face[trace.faceIndex[c]];
 }
 
-/// Computes the jump across link n, times √(w_F·area/|Ω|), as coefficients on the face of the small leaf. The
-/// unknowns of the large leaf contain the square root of a greater volume. `scale` converts them to the volume
-/// of the small leaf.
+/// Computes the jump (the difference of the polynomials) across the face of link n, times √(w_F·area/|Ω|), as
+/// coefficients on the small leaf's face. The unknowns of the large leaf contain the square root of a greater volume;
+/// `scale` converts them to the volume of the small leaf.
 void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
   std::array<double, kMaxFaceCoefficients> large;
@@ -296,8 +299,8 @@ void FaceCoupling::computeJump(std::size_t n, const double* x) {
   for (std::size_t c = 0; c < largeCount; ++c) jump[c] -= scale * large[c];
 }
 
-/// Adds the contribution of link n to Mx for one of the link's two leaves: the transpose of `computeJump` times
-/// the jump.
+/// Adds the contribution of link n to the product Mx, for one of the two leaves at the link: the jump times the
+/// transpose of the linear map in `computeJump`.
 void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const {
   const Link& link = links_[n];
   const double* face = &jumps_[jumpStart_[n]];

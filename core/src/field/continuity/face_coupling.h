@@ -11,49 +11,48 @@
 
 namespace hpsdf::continuity {
 
-/// Computes products of vectors with the matrix M, which is too large to be stored. M is defined by xᵀMx = Σ_F
-/// w_F ∫_F (f_left − f_right)² dA / |Ω|, where w_F is the edge of the smaller leaf perpendicular to the face F
-/// (Koschier et al. 2017).
+/// Multiplies vectors by a matrix M that measures the jumps of a field between leaves. M is too large to be stored. It
+/// is defined by xᵀMx = Σ_F w_F ∫_F (f_left − f_right)² dA / |Ω|, where F runs over the faces between leaves, w_F is
+/// the edge length of the smaller leaf perpendicular to F, and |Ω| is the volume of the domain (Koschier et al. 2017).
 ///
-/// The vector x holds the coefficients of all leaves in the order of the octree, each multiplied by
-/// √(V/|Ω|)·‖L_i L_j L_k‖. Hence |x|² is the mean of f² over the domain, and M has no unit. Repeated halving
-/// restricts the trace of a large leaf to the face of a small one. This is exact, because on a part of a face a
-/// trace of degree p still has degree p.
+/// The vector x holds the coefficients of all leaves in octree order, each multiplied by √(V/|Ω|)·‖L_i L_j L_k‖,
+/// where V is the leaf's volume. Hence |x|² is the mean of f² over the domain, and M has no unit. Where leaves of
+/// different sizes meet, the larger leaf's polynomial on the face is restricted to the smaller face by repeated
+/// halving. This is exact, because the restriction does not raise the degree.
 ///
 /// The methods run on TBB. Their results do not depend on the number of threads.
 class FaceCoupling {
  public:
   explicit FaceCoupling(const FieldData& field);
 
-  /// Returns the vector x of a field. The field has the same nodes as the one given to the constructor, and its
-  /// coefficients are double.
+  /// Returns the vector x of scaled coefficients of a field. The field must have the same octree as the field
+  /// given to the constructor, and its coefficients must be double.
   std::vector<double> toUnknowns(const FieldData& field) const;
-  /// Sets the coefficients of a field from the vector x, whose order is that of the leaves in the octree.
+  /// Sets the coefficients of a field from the vector x, and stores them in the order of x.
   void fromUnknowns(std::span<const double> x, FieldData& field) const;
 
   /// Computes out = Mx + weight·x and returns xᵀ·out.
   double apply(double weight, const std::vector<double>& x, std::vector<double>& out);
 
-  /// Returns the diagonal of M. If a large leaf has smaller neighbours, each of them contributes, as an
-  /// approximation, a share of the integral over the leaf's whole face.
+  /// Returns the diagonal of M. It is approximate for a leaf with smaller neighbours: each neighbour contributes
+  /// a share of the integral over the leaf's whole face.
   std::vector<double> diagonal() const;
 
  private:
-  /// A face of a small leaf, and the leaf on the other side of the face. The other leaf is equally large or
-  /// larger.
+  /// A face between a leaf (`small`) and an equally large or larger leaf (`large`).
   struct Link {
     std::uint32_t small, large;          ///< indices into `leaves_`
-    std::array<std::uint32_t, 2> along;  ///< position of the small face in the large one, in small faces
-    std::uint8_t axis;                   ///< axis across the face
+    std::array<std::uint32_t, 2> along;  ///< offset of the small leaf's face in the large one's, in small faces
+    std::uint8_t axis;                   ///< axis perpendicular to the face
     std::uint8_t levels;                 ///< difference of the leaves' depths
     std::uint8_t side;                   ///< 0 if the face lies at the small leaf's lower end, 1 at its upper end
   };
-  /// The map from a leaf's coefficients to the coefficients on one of its faces. The coefficients on the face
-  /// belong to products of orthonormal polynomials and are ordered by total degree, so that a lower degree uses
-  /// only the first ones.
+  /// The linear map from a leaf's coefficients to the coefficients of its polynomial on one of its faces. The
+  /// basis on the face consists of products of orthonormal Legendre polynomials, sorted by total degree, so that
+  /// a polynomial of lower degree uses only the first coefficients.
   struct Trace {
-    std::vector<std::uint16_t> faceIndex;       ///< index of the coefficient on the face, by coefficient
-    std::array<std::vector<double>, 2> factor;  ///< factor at the lower and the upper end, by coefficient
+    std::vector<std::uint16_t> faceIndex;       ///< by leaf coefficient: the face coefficient to which it contributes
+    std::array<std::vector<double>, 2> factor;  ///< by leaf coefficient: its factor on the lower and the upper face
   };
 
   void makeTraces();
@@ -65,15 +64,15 @@ class FaceCoupling {
   void addJump(std::uint32_t leaf, std::size_t link, double* out) const;
 
   std::vector<query::OctreeNode> leaves_;
-  std::vector<std::uint8_t> degree_;           ///< by leaf
-  std::vector<std::size_t> start_;             ///< index of a leaf's first unknown, and the number of unknowns
-  std::vector<double> scale_;                  ///< √(V/|Ω|) by depth
-  std::vector<Link> links_;                    ///< in the order of their small leaves
-  std::vector<double> jumps_;                  ///< face coefficients of the jumps of the last x
-  std::vector<std::size_t> jumpStart_;         ///< index of a link's first number in `jumps_`, and their number
-  std::vector<std::uint32_t> linksOfLeaf_;     ///< links grouped by leaf
-  std::vector<std::size_t> linksOfLeafStart_;  ///< index of a leaf's first link in `linksOfLeaf_`, and their number
-  std::array<std::array<Trace, 3>, kMaxDegree + 1> traces_;  ///< by degree and axis; empty for unused degrees
+  std::vector<std::uint8_t> degree_;           ///< polynomial degree of each leaf
+  std::vector<std::size_t> start_;             ///< index of each leaf's first entry in x; at the end the length of x
+  std::vector<double> scale_;                  ///< √(leaf volume V / domain volume |Ω|), by depth in the octree
+  std::vector<Link> links_;                    ///< the faces, in the order of their small leaves
+  std::vector<double> jumps_;                  ///< face coefficients of the jumps for the x given to `apply` last
+  std::vector<std::size_t> jumpStart_;         ///< index of each link's first entry in `jumps_`; at the end its length
+  std::vector<std::uint32_t> linksOfLeaf_;     ///< indices into `links_`, grouped by leaf
+  std::vector<std::size_t> linksOfLeafStart_;  ///< index of a leaf's first entry in `linksOfLeaf_`; last, its length
+  std::array<std::array<Trace, 3>, kMaxDegree + 1> traces_;  ///< by degree and axis; empty for degrees that no leaf has
 };
 
 }  // namespace hpsdf::continuity

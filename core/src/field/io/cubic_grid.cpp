@@ -1,4 +1,5 @@
-// Writes files whose layout docs/export.md describes.
+// Samples fields at the nodes of a regular grid whose cells have cubic shape functions, and writes the samples to
+// files (docs/export.md describes their layout).
 #include "hpsdf/detail/cubic_grid.h"
 
 #include <algorithm>
@@ -80,9 +81,9 @@ class Numbering {
   std::array<std::uint64_t, 4> first_{};  ///< number of the first node on edges along each axis; then the node count
 };
 
-/// Returns the n-th node of the cell with the lower corner `corner`. Nodes 0 to 7 are the cell's corners, n = x
-/// + 2y + 4z. They are followed by the nodes on edges along x, then along y, then along z. Of the four edges
-/// along an axis a, those that differ only along axis a+2 (cyclic) come directly one after the other.
+/// Returns the n-th node of the cell with the lower corner `corner`. Nodes 0 to 7 are the cell's corners, n = x +
+/// 2y + 4z. They are followed by the nodes on edges along x, then along y, then along z. Two edges along an axis
+/// a that differ only in their position along axis a+2 (cyclic) come directly one after the other.
 Node nodeOfCell(GridIndex corner, int n) {
   if (n < 8) {
     for (int axis = 0; axis < 3; ++axis) corner[axis] += n >> axis & 1;
@@ -94,8 +95,7 @@ Node nodeOfCell(GridIndex corner, int n) {
   return {corner, axis, n % 2};
 }
 
-/// Returns the position of a node. The operations and their order are the same as in the programs that load the
-/// files, so that the positions are equal.
+/// Returns the position of a node, bit for bit as the programs that load the files compute it.
 Vector3 positionOf(const Node& node, const Vector3& lower, const Vector3& cellSize) {
   Vector3 x = lower;
   for (int axis = 0; axis < 3; ++axis) x[axis] += cellSize[axis] * static_cast<double>(node.index[axis]);
@@ -132,7 +132,7 @@ void writeAll(OutputFile& out, std::span<const T> values) {
 void writeSize(OutputFile& out, std::uint64_t size) { writeAll(out, std::span<const std::uint64_t>(&size, 1)); }
 void writeVector(OutputFile& out, const Vector3& v) { writeAll(out, std::span<const double>(v.data(), 3)); }
 
-/// Computes the numbers of the nodes of a row of cells along x.
+/// Computes the node numbers of the cells in a row along x.
 void numberRow(const Numbering& numbering, std::uint32_t cells, std::uint64_t y, std::uint64_t z,
                std::vector<std::uint32_t>& row) {
   row.clear();
@@ -250,12 +250,12 @@ void writeCubicGrid(const CubicGrid& grid, OutputFile& out, const Progress& prog
   writeSize(out, cells);
   writeSize(out, 1);  // number of fields
 
-  // Write the lists of nodes. The file has one such list for each field, and it has one field.
+  // Write the list of the values at the nodes. The file has one such list for each field, and it has one field.
   writeSize(out, 1);
   writeSize(out, grid.nodes.size());
   writeAll(out, std::span<const double>(grid.nodes));
 
-  // Write the lists of cells. The file has one such list for each field, and it has one field.
+  // Write the list of each cell's nodes. The file has one such list for each field, and it has one field.
   writeSize(out, 1);
   writeSize(out, cells);
   detail::Parts parts(progress, "writing", std::size_t{ny} * nz);
@@ -268,7 +268,7 @@ void writeCubicGrid(const CubicGrid& grid, OutputFile& out, const Progress& prog
       parts.end();
     }
 
-  // Write the list of each cell's position in the list of cells. It is the identity because no cell is omitted.
+  // Write each cell's position in the list of cells. The positions are 0, 1, 2, … because no cell is omitted.
   writeSize(out, 1);
   writeSize(out, cells);
   std::vector<std::uint32_t> positions(cells);

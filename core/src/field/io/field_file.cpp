@@ -18,13 +18,13 @@ namespace {
 
 // First bytes of a field file. As in PNG files, the carriage return, line feed and end-of-file mark reveal that
 // the file was transferred as text.
-constexpr detail::Magic kMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
+constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
 // and criteria; version 4 the inside test.
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kFieldVersion = 4;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
-constexpr detail::FileKind kKind{"field file", "a .hpsdf file", "build or copy it again"};
+constexpr detail::FileKind kFieldFile{"field file", "a .hpsdf file", "build or copy it again"};
 
 struct Sizes {
   std::uint64_t nodes = 0;
@@ -125,11 +125,11 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
 void save(const Field& field, const std::filesystem::path& file) {
   const FieldData& data = field.data();
   detail::CheckedWriter writer(file);
-  writer.begin(kMagic, kVersion);
+  writer.begin(kFieldMagic, kFieldVersion);
   std::visit(
       [&](const auto& coefficients) {
         const Sizes sizes{data.nodes.size(), coefficients.size(), sizeof(coefficients[0]), data.bounds.size()};
-        header(writer, data, sizes, kVersion);
+        header(writer, data, sizes, kFieldVersion);
         writer.array(data.nodes, sizes.nodes);
         writer.array(coefficients, sizes.coefficients);
       },
@@ -139,22 +139,22 @@ void save(const Field& field, const std::filesystem::path& file) {
 }
 
 Field load(const std::filesystem::path& file) {
-  detail::CheckedReader reader(file, kKind);
-  const bool isTooShort = reader.remaining() < kMagic.size();
-  const std::optional<std::uint32_t> version = reader.begin(kMagic);
+  detail::CheckedReader reader(file, kFieldFile);
+  const bool isTooShort = reader.remaining() < kFieldMagic.size();
+  const std::optional<std::uint32_t> version = reader.begin(kFieldMagic);
   if (!version)
     reader.refuse(std::string("is not a .hpsdf file") + (isTooShort ? " (too short)" : "") +
                   "; build one with `hpsdf build`");
-  if (*version == 0 || *version > kVersion)
+  if (*version == 0 || *version > kFieldVersion)
     reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to " +
-                  std::to_string(kVersion) + "; build it again");
+                  std::to_string(kFieldVersion) + "; build it again");
   FieldData data;
   Sizes sizes;
   header(reader, data, sizes, *version);
   reader.require(sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8, "its coefficients have an unknown type");
   Source& source = data.metadata.source;
   reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
-  if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // their only inside test
+  if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
   reader.array(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == 4)
     reader.array(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);

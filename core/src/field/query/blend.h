@@ -15,8 +15,9 @@
 
 namespace hpsdf::query {
 
-/// Returns a bit mask of axes, with bit 0 for x. A bit is set if the point is so close to a face of its leaf
-/// across that axis that other leaves may have a weight at the point. Returns 0 for a field without blending.
+/// Returns a bit mask of axes, with bit 0 for x. A bit is set if the point is so close to one of the two faces of
+/// its leaf perpendicular to that axis that other leaves may have a weight at the point. Returns 0 for a field
+/// without blending.
 inline unsigned blendZoneAxes(const FieldData& field, const std::array<double, 3>& local) {
   if (!(field.blend > 0)) return 0;
   const double core = 1 - 2 * field.blend;
@@ -24,21 +25,21 @@ inline unsigned blendZoneAxes(const FieldData& field, const std::array<double, 3
   return bit(0) | bit(1) | bit(2);
 }
 
-/// One of the three factors of a leaf's weight. It depends on the position along one axis.
+/// One of the three factors of a leaf's blending weight, each of which depends on the position along one axis.
 struct Ramp {
   double value;
-  double slope;  ///< derivative of the value in world units
+  double slope;  ///< derivative of the value with respect to the world coordinate
 };
 
 /// Evaluates the ramp S(t) = 1/2 + 3t/4 − t³/4, the gentlest step with a continuous slope from 0 at t = −1 to 1
-/// at t = 1. Here t is the signed distance to the nearer of the leaf's two faces across `axis`, in units of the
-/// blend extent at that face. A point lies in the blend zone of at most one of these faces.
+/// at t = 1. Here t is the signed distance to the nearer of the leaf's two faces perpendicular to `axis`, divided
+/// by the half width of the zone in which leaves are blended at this face.
 inline Ramp rampAlong(const FieldData& field, const LookupGrid& lookupGrid, const LeafPoint& leaf, int axis) {
   const GridFrame& frame = lookupGrid.frame;
   const bool upper = leaf.local[axis] > 0;
   const int depth = blend_extent::depth(lookupGrid.blendExtents[leaf.blendExtentsIndex], axis, upper);
   if (depth == blend_extent::kDomainFace) return {1, 0};
-  // The factor 2^(depth − leaf.depth) / (2 · blend) converts local coordinates to units of the blend extent.
+  // The factor 2^(depth − leaf.depth) / (2 · blend) converts local coordinates to half widths of the blend zone.
   const double scale = std::bit_cast<double>(std::uint64_t(1022 + depth - leaf.depth) << 52) / field.blend;
   const double t = std::clamp((1 - std::abs(leaf.local[axis])) * scale, -1.0, 1.0);
   const double toWorld = 2.0 * (std::uint32_t{1} << leaf.depth) * frame.cells[axis] / frame.size[axis];
@@ -51,14 +52,15 @@ inline std::int64_t fixedPointAcross(std::int64_t cellIndex, int depth, bool upp
   return upper ? (cellIndex + 1) << (kMaxDepth - depth) : (cellIndex << (kMaxDepth - depth)) - 1;
 }
 
-/// Returns true if only two leaves have a weight at a point. The point must be near only one face of its leaf,
-/// a face across `axis`. `localAcross` holds the point's local coordinates in the leaf across that face. Most
-/// points in blend zones have only two leaves.
+/// Returns true if only two leaves have a weight at a point, which is the usual case in blend zones. The point
+/// must be near exactly one face of its leaf, perpendicular to `axis`. `localAcross` holds its local coordinates
+/// in the leaf on the other side of this face.
 inline bool onlyTwoOverlap(const FieldData& field, const std::array<double, 3>& localAcross, int axis) {
   return (blendZoneAxes(field, localAcross) & ~(1U << axis)) == 0;
 }
 
-/// Returns the mean of the results a and b of two leaves, weighted by the leaves' ramps along the common axis.
+/// Returns the mean of the values a and b of two leaves, weighted by the leaves' ramps along the axis
+/// perpendicular to their common face.
 inline double blendTwo(double a, const Ramp& rampA, double b, const Ramp& rampB, int) {
   return a + rampB.value / (rampA.value + rampB.value) * (b - a);
 }
@@ -70,8 +72,8 @@ inline ValueAndGradient blendTwo(const ValueAndGradient& a, const Ramp& rampA, c
   return result;
 }
 
-/// The cells of one depth whose distance from a point along each axis is at most `blend` times the cell's edge.
-/// Along each axis there are one or two such cells.
+/// The cells of one depth whose distance from a point along each axis is at most `blend` times the cell's edge:
+/// one or two cells along each axis.
 struct CandidateCells {
   CellIndex first;
   std::array<int, 3> extra;  ///< number of cells besides the first along each axis, 0 or 1
@@ -81,8 +83,8 @@ struct CandidateCells {
     for (int axis = 0; axis < 3; ++axis) {
       const double coordinate = gridCoordinates[axis] * scale;
       const std::int64_t last = frame.last[axis] >> (kMaxDepth - depth);
-      // Find the first and the last cell along the axis. The cast rounds small negative numbers to 0. At the domain's
-      // upper end, rounding loses a tiny blend width, so that the cell index is limited.
+      // The cast rounds small negative numbers to 0. The minimum is needed at the domain's upper end, where a
+      // tiny blend width may be lost by rounding.
       first[axis] = std::min(static_cast<std::int64_t>(coordinate - blend), last);
       extra[axis] = std::min(static_cast<std::int64_t>(coordinate + blend), last) > first[axis];
     }
@@ -98,10 +100,10 @@ struct CandidateCells {
   }
 };
 
-/// The internal nodes of the octree among the candidate cells of one depth.
+/// The internal nodes of the octree among the candidate cells of one depth, which are the cells near a point.
 struct OpenNodes {
   CandidateCells cells;
-  std::array<std::uint64_t, 8> bits;  ///< nodes by slot; 0 for leaves
+  std::array<std::uint64_t, 8> bits;  ///< the packed node in each slot; 0 for a leaf
   bool any = false;
 };
 
@@ -123,8 +125,7 @@ OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
     CellIndex leaf;
     for (int axis = 0; axis < 3; ++axis) {
       leaf[axis] = cell[axis] >> levels;
-      // Skip the leaf unless this is the first candidate entry that the leaf covers. A large leaf covers several
-      // entries.
+      // A large leaf covers several entries of the lookup grid. Skip it at all but the first of its candidate entries.
       if (cell[axis] > open.cells.first[axis] && leaf[axis] << levels != cell[axis]) return;
     }
     visit(leafPoint(bits, depth - levels, (byLookupGrid ? field.nodes.size() : 0) + entry, leaf, gridCoordinates));
@@ -132,8 +133,8 @@ OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
   return open;
 }
 
-/// Visits the leaves among the candidate cells of `depth`. These cells are children of the internal nodes
-/// `parents`, which are one level higher. Returns the internal nodes among the cells.
+/// Visits the leaves among the candidate cells of depth `depth` that are children of the internal nodes
+/// `parents`. Returns the internal nodes among these cells.
 template <typename Visit>
 OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const std::array<double, 3>& gridCoordinates,
                          int depth, const OpenNodes& parents, Visit&& visit) {
@@ -156,10 +157,11 @@ OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const s
 }
 
 /// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. The search
-/// proceeds depth by depth. Measured in its own edge, a child is at least as far from the point as its parent.
-/// Hence only children of candidates can be candidates, at most eight at each depth. `ownDepth` is the depth of
-/// the leaf that holds the point. If that leaf is larger than an entry of the lookup grid, leaves of its size
-/// may have a weight although their entries are not candidates. The search then starts at the base cells.
+/// proceeds depth by depth. A child's distance from the point, in units of its own edge, is not less than its
+/// parent's distance in units of the parent's edge. Hence only children of candidates can be candidates, at most
+/// eight at each depth. `ownDepth` is the depth of the leaf that holds the point. If that leaf is larger than an
+/// entry of the lookup grid, leaves of its size may have a weight although their entries are not candidates. The
+/// search then starts at the base cells.
 template <typename Visit>
 void visitOverlapping(const FieldData& field, const LookupGrid& lookupGrid,
                       const std::array<double, 3>& gridCoordinates, int ownDepth, Visit&& visit) {
@@ -222,8 +224,8 @@ Result evaluateLeaf(const FieldData& field, const GridFrame& frame, const LeafPo
   return result;
 }
 
-/// Returns the blended field at a point, from all leaves that have a weight there. `ownDepth` is the depth of
-/// the leaf that holds the point.
+/// Returns the blended field at a point, from all leaves that have a weight at the point. `ownDepth` is the depth
+/// of the leaf that holds the point.
 template <typename Result>
 Result blendAll(const FieldData& field, const LookupGrid& lookupGrid, const std::array<double, 3>& gridCoordinates,
                 int ownDepth) {
@@ -246,7 +248,7 @@ Result blendInZone(const FieldData& field, const LookupGrid& lookupGrid, const s
                    const LeafPoint& leaf, unsigned axes) {
   if (!std::has_single_bit(axes)) return blendAll<Result>(field, lookupGrid, gridCoordinates, leaf.depth);
 
-  // Find the other leaf: the one across the only face to which the point is near.
+  // Find the leaf on the other side of the only face to which the point is near.
   const GridFrame& frame = lookupGrid.frame;
   const int axis = std::countr_zero(axes);
   GridPoint across{gridCoordinates, {}, 0};

@@ -23,7 +23,7 @@ constexpr std::int64_t kFixedPointOne = std::int64_t{1} << kMaxDepth;
 struct GridPoint {
   std::array<double, 3> coordinates;
   std::array<std::int64_t, 3> fixedPoint;  ///< the coordinates, rounded down to kMaxDepth binary digits
-  std::uint64_t path;                      ///< octree path: the digits after the point, 21 bits an axis
+  std::uint64_t path;                      ///< octree path: digits of `fixedPoint` after the point, 21 bits an axis
 
   /// Returns the index of the cell of depth `depth` that holds the point.
   CellIndex cellIndex(int depth) const {
@@ -32,8 +32,7 @@ struct GridPoint {
   }
 };
 
-/// Returns the child number, from 0 to 7, that an octree path has at a depth: the number of the cell of that
-/// depth within its parent.
+/// Returns which of its parent's children, 0 to 7, the cell at depth `depth` of an octree path is.
 inline std::uint32_t childOnPath(std::uint64_t path, int depth) {
   const std::uint64_t bits = (path >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
   return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
@@ -118,26 +117,25 @@ inline OctreeNode findLeafNode(const FieldData& field, const GridPoint& point) {
 
 /// A point in the local coordinates of a leaf.
 struct LeafPoint {
-  std::uint64_t bits;  ///< the leaf's node
+  std::uint64_t bits;  ///< packed node: the leaf's degree and the offset of its coefficients
   int depth;
-  std::array<double, 3> local;    ///< in [−1, 1] within the leaf; outside where a neighbour's polynomial is continued
-  CellIndex cellIndex;            ///< of the leaf
+  std::array<double, 3> local;  ///< in [−1, 1] within the leaf; beyond it, the polynomial is extrapolated
+  CellIndex cellIndex;
   std::size_t blendExtentsIndex;  ///< index into `LookupGrid::blendExtents`
 };
 
 inline LeafPoint leafPoint(std::uint64_t bits, int depth, std::size_t blendExtentsIndex, const CellIndex& cellIndex,
                            const std::array<double, 3>& gridCoordinates) {
   LeafPoint leaf{bits, depth, {}, cellIndex, blendExtentsIndex};
-  // Compute the local coordinates. Scaling by a power of two and subtracting the integer part are exact
-  // operations.
+  // Scaling by a power of two and subtracting the integer part are exact operations.
   const double scale = std::uint32_t{1} << depth;
   for (int axis = 0; axis < 3; ++axis)
     leaf.local[axis] = 2 * (gridCoordinates[axis] * scale - static_cast<double>(cellIndex[axis])) - 1;
   return leaf;
 }
 
-/// Finds the leaf that holds a point, like `findLeafNode`, but the descent starts at an entry of the lookup
-/// grid.
+/// Finds the leaf that holds a point, like `findLeafNode`. The descent starts in the lookup grid, an array of the
+/// nodes of one depth.
 inline LeafPoint findLeaf(const FieldData& field, const LookupGrid& lookupGrid, const GridPoint& point) {
   const CellIndex top = point.cellIndex(lookupGrid.depth);
   const std::int64_t entry = top[2] * lookupGrid.slab + top[1] * lookupGrid.row + top[0];
@@ -158,8 +156,8 @@ inline Vector3 cellSize(const FieldData& field, int depth) {
   return {size.x() / field.grid[0] * scale, size.y() / field.grid[1] * scale, size.z() / field.grid[2] * scale};
 }
 
-/// A degree that is known at compile time, for which the compiler unrolls the loops over coefficients. A degree that is
-/// known only at run time is an int.
+/// A polynomial degree that is known at compile time, for which the compiler unrolls the loops over coefficients.
+/// A degree that is known only at run time is an int.
 template <int P>
 using Constant = std::integral_constant<int, P>;
 
@@ -179,8 +177,8 @@ using basis::legendreValues;
 using basis::legendreValuesAndDerivatives;
 #include "field/query/polynomial-inl.h"
 
-/// Calls f with the degree. For the degrees that most leaves have, the argument is a `Constant`, otherwise an
-/// int.
+/// Calls f with the degree. For the degrees that most leaves have, the argument is a compile-time `Constant`,
+/// otherwise an int.
 template <typename F>
 auto withDegree(int degree, const F& f) {
   switch (degree) {
@@ -241,8 +239,8 @@ inline Vector3 closestInDomain(const GridFrame& domain, const Vector3& x) {
   return closest;
 }
 
-/// Returns |v|. It avoids squares, which overflow for long and vanish for short vectors. The three-argument
-/// hypot of GCC 12 would not propagate NaN and infinity.
+/// Returns |v| without squares, which overflow for long and vanish for short vectors. The three-argument hypot of
+/// GCC 12 would not propagate NaN and infinity.
 inline double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
 
 /// Continues the field to a point x outside the domain: changes f(q) at the closest point q of the domain to
@@ -253,12 +251,12 @@ inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
   const double distance = length(offset);
   result.value += distance;
   for (int axis = 0; axis < 3; ++axis)
-    if (offset[axis] != 0) result.gradient[axis] = 0;  // q, and with it f(q), does not depend on a clamped coordinate
+    if (offset[axis] != 0) result.gradient[axis] = 0;  // the closest point does not move with a clamped coordinate
   result.gradient += offset / distance;
 }
 
-/// Makes a lookup grid for a field. Its depth is the greatest at which it takes at most a sixteenth of the
-/// bytes of the field's nodes and coefficients.
+/// Makes the lookup grid of a field, an array of the octree nodes of one depth. This is the greatest depth at
+/// which the array takes at most a sixteenth of the bytes of the nodes and coefficients.
 LookupGrid makeLookupGrid(const FieldData& field);
 
 /// Evaluates a field at many points. On every instruction set, the results are bit for bit equal to those of

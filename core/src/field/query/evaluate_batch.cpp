@@ -29,8 +29,8 @@ using Unsigned = hn::RebindToUnsigned<Tag>;
 using Vec = hn::Vec<Tag>;
 constexpr std::size_t kLanes = hn::MaxLanes(Tag());
 
-/// A SIMD vector with one double for each of several points. Its operators make it a `Number` for the
-/// polynomial code.
+/// A SIMD vector with one double for each of several points. Thanks to its operators, the templates that evaluate
+/// polynomials accept it in place of a number.
 struct Lanes {
   Vec v;
   Lanes() = default;
@@ -50,10 +50,12 @@ struct Lanes {
 constexpr std::size_t kBatch = 128;
 static_assert(kBatch % kLanes == 0);
 
-/// The lowest and the highest degree with vector code. `withDegree` has constants for the same degrees.
+/// The lowest and the highest polynomial degree with SIMD code. `withDegree` has compile-time constants for the
+/// same degrees.
 constexpr int kMinVectorDegree = 2, kMaxVectorDegree = 4;
 
-/// Number of lists of points: one list for each degree with vector code, and one for all other degrees.
+/// Number of lists into which the points of a batch are sorted: one for each degree with SIMD code, and one for
+/// all other degrees.
 constexpr std::size_t kLists = kMaxVectorDegree - kMinVectorDegree + 2;
 
 /// A point in the local coordinates of its leaf, and the leaf's node with its depth as packed in
@@ -70,14 +72,14 @@ struct Batch {
   const Vector3* points;
   std::size_t count;
   bool allInDomain;
-  HWY_ALIGN double coordinates[3][kBatch];       ///< as in `GridPoint`
-  HWY_ALIGN double fixedPoint[3][kBatch];        ///< as in `GridPoint`; integers that double holds exactly
-  HWY_ALIGN std::uint64_t path[kBatch];          ///< as in `GridPoint`
+  HWY_ALIGN double coordinates[3][kBatch];       ///< grid coordinates, in which base cells are unit cubes
+  HWY_ALIGN double fixedPoint[3][kBatch];        ///< grid coordinates as fixed-point integers, exact in double
+  HWY_ALIGN std::uint64_t path[kBatch];          ///< octree paths: the bits that select a child at each depth
   HWY_ALIGN std::uint64_t entry[kBatch];         ///< index into `LookupGrid::entries`
-  std::uint64_t blendExtentsIndex[kBatch];       ///< as in `LeafPoint`; not set in fields without blending
-  HWY_ALIGN std::uint64_t bits[kBatch];          ///< nodes with their depth as `LookupGrid::entry` packs it
+  std::uint64_t blendExtentsIndex[kBatch];       ///< index into `LookupGrid::blendExtents`; only for blending
+  HWY_ALIGN std::uint64_t bits[kBatch];          ///< octree nodes with their depths in bits 40 to 47
   HWY_ALIGN PackedLeafPoint leafPoints[kBatch];  ///< set when all leaves are found
-  std::uint8_t listed[kLists][kBatch + kLanes];  ///< the points of each list
+  std::uint8_t listed[kLists][kBatch + kLanes];  ///< indices of the points in each list
   std::size_t listedCount[kLists];
 };
 
@@ -130,9 +132,9 @@ void enterGrid(const LookupGrid& lookupGrid, Batch& batch) {
   batch.allInDomain = hn::AllTrue(d, inDomain);
 }
 
-/// Finds the leaves of all points in a batch. It descends depth by depth, so that the nodes of all points are
-/// fetched at once. Every point is written to the list of points that descend further, but the list's length
-/// grows only for internal nodes. This avoids a branch that would be mispredicted.
+/// Finds the leaves of all points in a batch, depth by depth, so that the nodes of all points are fetched at
+/// once. Every point is written to the list of points that descend further, but the length of this list grows
+/// only for internal nodes. This avoids a branch that would be mispredicted.
 template <bool WithBlendExtents>
 void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch) {
   std::uint8_t descending[kBatch];
@@ -156,8 +158,8 @@ void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch)
   for (std::size_t i = batch.count; i % kLanes != 0; ++i) batch.bits[i] = batch.bits[i - 1];
 }
 
-/// Lists the points of a batch by the degree of their leaves and prefetches the coefficients. Avoids branches
-/// in the same way as `descend`.
+/// Lists the points of a batch by the degree of their leaves and prefetches the coefficients. No branch depends
+/// on the degree.
 template <typename T>
 void listByDegree(const T* coefficients, Batch& batch) {
   std::array<std::size_t, kLists> counts{};
@@ -282,7 +284,7 @@ void evaluateLeaves(const T* coefficients, const GridFrame& frame, const Batch& 
   }
 }
 
-/// Returns the i-th point of a batch as a `LeafPoint` for blending. The cell index is not set.
+/// Returns the i-th point of a batch as a `LeafPoint`. The cell index is not set, because `rampAlong` does not need it.
 HWY_INLINE LeafPoint leafPointOf(const Batch& batch, std::size_t i) {
   const auto& local = batch.leafPoints[i].local;
   return {batch.bits[i],
@@ -300,11 +302,10 @@ Result blendAllAt(const FieldData& field, const LookupGrid& lookupGrid, const Ba
                           LookupGrid::depthOf(batch.bits[i]));
 }
 
-/// The points of a batch that lie in blend zones. The constructor collects them without branches, as `descend`
-/// does.
+/// The points of a batch at which more than one leaf may have a weight. The constructor collects them without branches.
 struct BlendZonePoints {
   std::uint8_t point[kBatch];
-  std::uint8_t axes[kBatch];  ///< as `blendZoneAxes` returns them
+  std::uint8_t axes[kBatch];  ///< bit mask of axes from `blendZoneAxes`
   std::size_t count = 0;
 
   BlendZonePoints(const FieldData& field, const Batch& batch) {
@@ -317,15 +318,15 @@ struct BlendZonePoints {
   }
 };
 
-/// Points that are near one face of their leaf, as a batch that descends to the leaves across these faces.
+/// Points that are near one face of their leaf, as a batch for the evaluation in the leaves on the other side.
 struct AcrossFaces {
   Batch batch;
   std::uint8_t point[kBatch];  ///< index of the point in the original batch
-  std::uint8_t axis[kBatch];   ///< axis across the face
+  std::uint8_t axis[kBatch];   ///< axis perpendicular to the face
 };
 
-/// Adds point i to `across`. The point is near only one face of its leaf, a face across `axis`. Does nothing if
-/// the domain ends at that face.
+/// Adds point i to `across`. The point is near only one face of its leaf, perpendicular to `axis`. Does nothing
+/// if the domain ends at this face.
 HWY_INLINE void addAcrossFace(const LookupGrid& lookupGrid, const Batch& batch, std::size_t i, int axis,
                               AcrossFaces& across) {
   const int depth = LookupGrid::depthOf(batch.bits[i]);

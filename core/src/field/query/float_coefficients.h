@@ -8,7 +8,7 @@ namespace hpsdf::query {
 /// The change of a field when its coefficients are rounded to float, in units of length.
 struct Rounding {
   double rms = 0;
-  double max = 0;  ///< bound of the change anywhere
+  double max = 0;  ///< upper bound of the change at any point
 };
 
 /// Computes by how much rounding the coefficients to float changes a field. The coefficients of the field are

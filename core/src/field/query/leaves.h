@@ -20,9 +20,8 @@ struct OctreeNode {
   CellIndex cellIndex;
 };
 
-/// Calls visit(OctreeNode) for the nodes in the order of the octree: base cells from first to last, and the
-/// children 0 to 7 of a node after the node. The children of an internal node are visited only if `visit`
-/// returns true for the node.
+/// Calls visit(OctreeNode) for the nodes in depth-first order: base cells from first to last, and the children 0 to 7
+/// of a node after the node. The children of an internal node are visited only if `visit` returns true for the node.
 template <typename Visit>
 void visitNodes(const FieldData& field, Visit&& visit) {
   std::vector<OctreeNode> stack;
@@ -45,14 +44,14 @@ void visitNodes(const FieldData& field, Visit&& visit) {
       }
 }
 
-/// Returns all leaves in the order of the octree.
+/// Returns all leaves in depth-first order.
 std::vector<OctreeNode> allLeaves(const FieldData& field);
 
 /// Returns the node of the cell with this index and depth. If the octree has no such node, returns the larger
 /// leaf that holds the cell.
 OctreeNode nodeAt(const FieldData& field, const CellIndex& cellIndex, int depth);
 
-/// Returns the leaf that holds the cell which is `steps` cells away from `leaf`, in cells of the size of
+/// Returns the leaf that holds the cell at an offset of `steps` from `leaf`, counted in cells of the size of
 /// `leaf`. The result is as large as `leaf` or larger. Returns std::nullopt if the cell is subdivided or lies
 /// outside the domain.
 std::optional<OctreeNode> equalOrLargerNeighbour(const FieldData& field, const OctreeNode& leaf,
@@ -69,10 +68,9 @@ void forEachNeighbour(const FieldData& field, const OctreeNode& leaf, const F& f
           if (const auto neighbour = equalOrLargerNeighbour(field, leaf, {x, y, z})) f(*neighbour);
 }
 
-/// Calls f(axis, step, neighbour) for the interfaces of the field that belong to `leaf`. The step is −1 for a
-/// face at the lower end of the axis and 1 for a face at the upper end. The faces to larger leaves belong to
-/// `leaf`, and of the faces to equally large leaves the upper ones, so that each interface belongs to exactly
-/// one leaf.
+/// Calls f(axis, step, neighbour) for the faces of `leaf` towards larger leaves, and for its upper faces towards
+/// leaves of equal size. Called for all leaves, it visits each face that two leaves share exactly once. The step
+/// is −1 for a face at the lower end of the axis and 1 for a face at the upper end.
 template <typename F>
 void forEachInterface(const FieldData& field, const OctreeNode& leaf, const F& f) {
   for (int axis = 0; axis < 3; ++axis)

@@ -12,15 +12,15 @@ namespace {
 /// For each of the six faces of a leaf, by axis and side, the depth of the deepest leaf that touches the face.
 using FaceDepths = std::array<std::array<std::uint8_t, 2>, 3>;
 
-/// Sets `number` to `to` if `to` is greater. Other threads may do the same with the same number at the same
-/// time.
+/// Atomically sets `number` to `to` if `to` is greater.
 void raise(std::uint8_t& number, std::uint8_t to) {
   const std::atomic_ref shared(number);
   for (std::uint8_t now = shared.load(); now < to && !shared.compare_exchange_weak(now, to);) {
   }
 }
 
-/// Updates the depths `deepest` of those faces of the larger leaf `large` that the smaller leaf `leaf` touches.
+/// Raises the entries of `deepest`, one for each face of `large`, to the depth of the smaller leaf `leaf` at
+/// those faces that `leaf` touches.
 void touchFaces(const OctreeNode& leaf, const OctreeNode& large, FaceDepths& deepest) {
   const int levels = leaf.depth - large.depth;
   const std::int64_t last = (std::int64_t{1} << levels) - 1;
@@ -31,7 +31,8 @@ void touchFaces(const OctreeNode& leaf, const OctreeNode& large, FaceDepths& dee
   }
 }
 
-/// Returns the packed blend extents (`namespace blend_extent`) of every node. They are 0 for internal nodes.
+/// Returns for each node how far its blending weight reaches across each of its six faces, packed as in
+/// `namespace blend_extent`. The result is 0 for internal nodes.
 std::vector<std::uint32_t> findBlendExtents(const FieldData& field) {
   const std::vector<OctreeNode> leaves = allLeaves(field);
   const auto forEachLeaf = [&](const auto& visit) {
@@ -58,7 +59,7 @@ std::vector<std::uint32_t> findBlendExtents(const FieldData& field) {
   return extents;
 }
 
-/// Fills the entries of the lookup grid from the nodes of its depth and the leaves above that depth. With
+/// Fills the entries of the lookup grid from the nodes of its depth and from the leaves of smaller depth. With
 /// blending, also fills the blend extents of the entries.
 void fillLookupGrid(const FieldData& field, LookupGrid& lookupGrid) {
   visitNodes(field, [&](const OctreeNode& at) {

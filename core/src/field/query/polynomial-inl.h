@@ -1,5 +1,5 @@
-// Evaluation of polynomials for evaluate.h and the batches. It is generic in `Number`, which is double or a
-// SIMD vector of doubles. Like legendre-inl.h, it is included inside a namespace, once for each instruction
+// Evaluation of polynomials at single points and at batches of points. It is generic in `Number`, which is double
+// or a SIMD vector of doubles. Like legendre-inl.h, it is included inside a namespace, once for each instruction
 // set. Coefficients may also be float.
 
 /// Calls f(0) to f(last).
@@ -36,7 +36,7 @@ Number evaluatePolynomial(const T* c, Degree degree, const std::array<Number, 3>
   return value;
 }
 
-/// Returns the value and the three components of the gradient.
+/// Returns the value and the three components of the gradient in local coordinates.
 template <typename Number, typename T, typename Degree>
 std::array<Number, 4> evaluatePolynomialWithGradient(const T* c, Degree degree, const std::array<Number, 3>& local) {
   Number x[kDegreeCount<Degree>], y[kDegreeCount<Degree>], z[kDegreeCount<Degree>];

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 7> kExtensions = {".obj", ".ply", ".stl", ".off", ".3ds", ".gltf", ".glb"};
 
-/// Throws `Error` if the file is unusable for a reason that can be found before assimp opens it. assimp's own
+/// Throws `Error` if a mesh file can be recognised as unusable before assimp opens it, because assimp's own
 /// messages for such files do not help the user.
 void requireReadable(const fs::path& file) {
   const std::string name = file.string();
@@ -56,7 +56,7 @@ void requireReadable(const fs::path& file) {
 
 constexpr std::size_t kMostHeaderLines = 1000;
 
-/// The lines of a PLY file's header.
+/// Returns the lines of a PLY file's header.
 std::vector<std::string> plyHeader(const fs::path& file) {
   std::vector<std::string> lines;
   std::ifstream stream(file, std::ios::binary);
@@ -78,8 +78,8 @@ double largestPlyCount(const fs::path& file) {
   return largest;
 }
 
-/// Returns the number of vertices or the number of faces in the header of an OFF file, whichever is larger. The
-/// number of edges that follows them is often wrong, and no reader uses it.
+/// Returns the larger of the vertex count and the face count in the header of an OFF file. The edge count in the
+/// header is ignored, because it is often wrong and no reader uses it.
 double largestOffCount(const fs::path& file) {
   double largest = 0;
   std::ifstream stream(file, std::ios::binary);
@@ -106,8 +106,8 @@ bool plyMayExceedFloat(const fs::path& file) {
   });
 }
 
-/// Returns true if an STL file has exactly the size of binary data with the number of faces that it states.
-/// assimp uses the same test.
+/// Returns true if the size of an STL file is exactly that of binary data with the number of faces in its header.
+/// assimp recognises binary STL files by the same test.
 bool isBinaryStl(const fs::path& file) {
   constexpr std::uintmax_t kHeader = 80, kFace = 50;
   std::uint32_t faces = 0;
@@ -118,7 +118,7 @@ bool isBinaryStl(const fs::path& file) {
          fs::file_size(file, error) == kHeader + sizeof faces + kFace * faces;
 }
 
-/// Returns true if a line of the text consists of `line` and blanks only. Any line-end characters are accepted.
+/// Returns true if a line of the text consists of `line` and blanks only. Lines may end with \r, \n or both.
 bool hasLine(std::string_view text, std::string_view line) {
   constexpr std::string_view kBlank = " \t", kLineEnd = "\r\n";
   for (std::size_t at = 0; (at = text.find(line, at)) != std::string_view::npos; at += line.size()) {
@@ -130,11 +130,12 @@ bool hasLine(std::string_view text, std::string_view line) {
   return false;
 }
 
-/// Throws `Error` for a header on which assimp would run out of time or memory.
+/// Throws `Error` if the file's header would make assimp search without end or allocate far too much memory.
 void requireSoundHeader(const fs::path& file) {
   const std::string extension = lowerExtension(file), name = file.string();
   if (extension == ".ply") {
-    // Limit the length of a header. assimp reads on until it finds the header's end, however long that takes.
+    // Limit the length of a PLY header, because assimp reads on until it finds the header's end, however long
+    // that takes.
     constexpr std::size_t kLongestHeader = 1 << 20;
     std::string beginning(kLongestHeader, '\0');
     std::ifstream stream(file, std::ios::binary);
@@ -143,8 +144,8 @@ void requireSoundHeader(const fs::path& file) {
     if (!hasLine(beginning, "end_header"))
       throw Error(ErrorKind::file, name, "its header does not end; check or export the file again");
   }
-  // Check the largest count in the header. assimp allocates memory for that many elements before it reads on, so
-  // that a few wrong bytes could exhaust the memory.
+  // Check the largest element count in the header. assimp allocates memory for that many elements before it reads
+  // them, so that a few wrong bytes could exhaust the memory.
   const double count = extension == ".ply" ? largestPlyCount(file) : extension == ".off" ? largestOffCount(file) : 0;
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
@@ -153,7 +154,7 @@ void requireSoundHeader(const fs::path& file) {
                 "its header promises more vertices or faces than the file has bytes; export it again");
 }
 
-/// Returns an error message of assimp in a form that fits into one line.
+/// Returns an error message of assimp as a single line.
 std::string oneLine(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return std::iscntrl(c); }, ' ');
@@ -180,7 +181,7 @@ void requireValidIndices(const aiScene& scene, const std::string& name) {
   }
 }
 
-/// Reads the scene in a file by means of `importer`, which owns the scene.
+/// Reads the scene in a file. The scene belongs to `importer`.
 const aiScene& readScene(Assimp::Importer& importer, const fs::path& file) {
   const std::string name = file.string();
   const aiScene* scene = nullptr;
@@ -200,7 +201,7 @@ Eigen::Affine3d toEigen(const aiMatrix4x4& m) {
   return result;
 }
 
-/// Returns the triangles of a polygon as vertex indices of the mesh `part`. The result is empty if the polygon
+/// Triangulates a polygon of the mesh `part` into vertex indices of that mesh. The result is empty if the polygon
 /// is a point or a line.
 std::vector<Triangle> trianglesOf(const aiFace& face, const aiMesh& part) {
   if (face.mNumIndices < 3) return {};
@@ -229,7 +230,7 @@ void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Affine3d& world
               "or scale it down, before it is exported again");
     mesh.vertices.push_back(worldFromPart * Vector3(p.x, p.y, p.z));
   }
-  const bool mirrored = worldFromPart.linear().determinant() < 0;  // A reflection reverses all triangles.
+  const bool mirrored = worldFromPart.linear().determinant() < 0;  // A reflection reverses all orientations.
   for (unsigned f = 0; f < part.mNumFaces; ++f)
     for (auto [a, b, c] : trianglesOf(part.mFaces[f], part)) {
       if (mirrored) std::swap(b, c);
@@ -242,8 +243,7 @@ TriangleMesh joined(const aiScene& scene, const fs::path& file) {
   TriangleMesh mesh;
   mesh.name = file.string();
   Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
-  // Undo assimp's rotation of 3DS scenes from z up to y up. The inverse rotation restores the coordinates of the
-  // file.
+  // Undo assimp's rotation of 3DS scenes from z-up to y-up, to restore the coordinates of the file.
   if (lowerExtension(file) == ".3ds") worldFromRoot.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
 
   std::vector<std::pair<const aiNode*, Eigen::Affine3d>> pending = {{scene.mRootNode, worldFromRoot}};

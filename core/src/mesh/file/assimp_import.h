@@ -6,11 +6,11 @@
 
 namespace hpsdf::mesh {
 
-/// Reads all meshes of a file's scene with assimp and joins them under their node transforms. Polygons are
-/// triangulated, and nothing is cleaned. Throws `Error` in the same cases as `importMesh`.
+/// Reads all meshes of a file with assimp, transforms them by their scene nodes and joins them into one mesh. Polygons
+/// are triangulated; degenerate and duplicate triangles remain. Throws `Error` in the same cases as `importMesh`.
 TriangleMesh readByAssimp(const std::filesystem::path& file);
 
-/// Returns true for a file that can hold coordinates with more digits than the `float` of assimp's readers.
+/// Returns true if a file can hold coordinates with more digits than the `float` numbers into which assimp reads them.
 bool mayExceedFloat(const std::filesystem::path& file);
 
 }  // namespace hpsdf::mesh

@@ -36,8 +36,8 @@ void requireUsable(const TriangleMesh& mesh) {
           " has a coordinate that is not a finite number (or beyond 1e100); repair or export the mesh again");
 }
 
-/// Makes all triangles use the first of several vertices with the same position. Returns the number of vertices
-/// that become unused.
+/// Welds vertices at the same position: all triangles use the first of these vertices. Returns the number of
+/// vertices that are replaced by another one.
 std::size_t weld(TriangleMesh& mesh) {
   std::unordered_map<PositionBits, std::uint32_t, HashBits> firstAt;
   firstAt.reserve(mesh.vertices.size());
@@ -54,9 +54,8 @@ std::size_t weld(TriangleMesh& mesh) {
   return mesh.vertices.size() - firstAt.size();
 }
 
-/// Returns true if the corners of a triangle lie on one line up to the rounding errors of this test. The
-/// tolerance is relative to the triangle's edges. The result thus does not depend on the size of the mesh, and
-/// is false for thin slivers with an area.
+/// Returns true if the corners of a triangle are collinear up to rounding errors. The tolerance is relative to the
+/// edge lengths. The result thus does not depend on the size of the mesh, and is false for thin slivers with an area.
 bool hasNoArea(const TriangleMesh& mesh, const Triangle& triangle) {
   const auto [a, b, c] = cornersOf(mesh, triangle);
   std::array<Vector3, 3> edges = {b - a, c - b, a - c};
@@ -74,8 +73,8 @@ bool hasNoArea(const TriangleMesh& mesh, const Triangle& triangle) {
 /// Maps each directed edge to the triangle that it belongs to.
 class EdgeMap {
  public:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();  ///< no triangle
-  static constexpr std::uint32_t kSeveral = kNone - 1;                               ///< more than one triangle
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();  ///< no triangle has the edge
+  static constexpr std::uint32_t kSeveral = kNone - 1;                               ///< several triangles have it
 
   explicit EdgeMap(const std::vector<Triangle>& triangles) {
     faceOf_.reserve(3 * triangles.size());
@@ -113,7 +112,8 @@ Triangle longestEdgeFirst(const TriangleMesh& mesh, Triangle t) {
   return t;
 }
 
-/// Flips the longest edge of a triangle if both new triangles have an area and no edge gets more than two triangles.
+/// Flips the longest edge of a triangle if both new triangles have an area and no edge gets more than two
+/// triangles. Returns true if the edge was flipped.
 bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
   const auto [a, b, middle] = longestEdgeFirst(mesh, mesh.triangles[face]);
   const std::uint32_t neighbour = edges.face(b, a);
@@ -135,12 +135,12 @@ bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
   return true;
 }
 
-/// Removes collinear triangles by flipping their longest edges. Returns the number of flips.
+/// Removes triangles with collinear corners by flipping their longest edges. Returns the number of flips.
 ///
-/// Polygons and CAD facets with corners along a straight side yield collinear triangles. Dropping these would
-/// open the mesh. A flip splits the neighbour across the longest edge at the triangle's middle corner. The
-/// surface and the number of triangles remain, and both new triangles have an area. If a flip is impossible,
-/// the triangle remains unchanged.
+/// Collinear triangles come from polygons and CAD facets with corners along a straight side. Dropping them would
+/// open the mesh. A flip instead splits the neighbour across the longest edge in two, at the collinear triangle's
+/// middle corner. It changes neither the surface nor the number of triangles. If a flip is impossible, the
+/// triangle remains unchanged.
 std::size_t flipCollinearFaces(TriangleMesh& mesh) {
   std::vector<std::uint32_t> pending;
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
@@ -149,8 +149,8 @@ std::size_t flipCollinearFaces(TriangleMesh& mesh) {
 
   EdgeMap edges(mesh.triangles);
   std::size_t flips = 0;
-  // Repeat the search for flips in rounds, because a flip may become possible only after a collinear neighbour is
-  // flipped. Each round except the last flips at least one triangle.
+  // Flip in rounds, because a flip may become possible only after a collinear neighbour is flipped. Each round
+  // except the last flips at least one triangle.
   for (bool changed = true; changed;) {
     const std::size_t flipped = std::erase_if(pending, [&](std::uint32_t face) { return flip(mesh, edges, face); });
     flips += flipped;
@@ -159,7 +159,7 @@ std::size_t flipCollinearFaces(TriangleMesh& mesh) {
   return flips;
 }
 
-/// The number of triangles that were dropped for one reason, and the centroid of the first of these triangles.
+/// The number of triangles that one clean-up step dropped, and the centroid of the first of these triangles.
 struct Dropped {
   std::size_t faces = 0;
   Vector3 position = Vector3::Zero();

@@ -27,15 +27,15 @@ namespace fs = std::filesystem;
 
 double largestCoordinate(const Box& box) { return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff(); }
 
-/// The distance between adjacent floats near a coordinate.
+/// Returns the distance between adjacent `float` numbers near a coordinate.
 double floatSpacing(double coordinate) {
   constexpr int kBits = std::numeric_limits<float>::digits, kSmallest = std::numeric_limits<float>::min_exponent;
   const int exponent = coordinate > 0 ? std::ilogb(coordinate) + 1 : kSmallest;
   return std::ldexp(1.0, std::max(exponent, kSmallest) - kBits);
 }
 
-/// Returns the end of an error message about a mesh without area if rounding to float is the probable cause,
-/// else an empty text.
+/// Returns a hint for the error message about a mesh without area if rounding its coordinates to `float` is the
+/// probable cause, else an empty text.
 std::string spacingHint(const fs::path& file, const Box& box) {
   constexpr double kFew = 16;
   const double largest = largestCoordinate(box), spacing = floatSpacing(largest);
@@ -47,7 +47,7 @@ std::string spacingHint(const fs::path& file, const Box& box) {
   return hint.str();
 }
 
-/// Returns true if any face has three different vertices. Only such a face can have lost its area by rounding.
+/// Returns true if any triangle has three different vertices. Only such a triangle can have lost its area by rounding.
 bool hasThreeCorners(const TriangleMesh& mesh) {
   return std::ranges::any_of(mesh.triangles,
                              [](const auto& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; });
@@ -75,17 +75,17 @@ static_assert(std::endian::native == std::endian::little, "a PLY file is written
 
 constexpr std::size_t kPiece = 1 << 16;  ///< bytes of text written at a time
 
-/// Appends the shortest text that reads as the same number.
+/// Appends the shortest decimal text from which the same number is read back.
 void append(std::string& text, double number) {
   std::array<char, 32> digits;
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   text.append(digits.data(), end);
 }
 
-/// The syntax of a format for meshes as text.
+/// The syntax of vertices and faces in a text format for meshes.
 struct TextForm {
   std::string_view beforeVertex, beforeFace;
-  std::uint64_t firstVertex;  ///< number of the first vertex
+  std::uint64_t firstVertex;  ///< index of the first vertex in the format: 0 or 1
 };
 
 void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) {
@@ -114,8 +114,7 @@ void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) 
 
 void writeObj(const TriangleMesh& mesh, OutputFile& out) { writeText(mesh, {"v ", "f", 1}, out); }
 
-/// Writes a PLY file with binary data. Writes text instead if the first byte of the binary data would be a line
-/// feed, because readers would take that byte for a part of the header.
+/// Writes a PLY file, as text if binary data would begin with a line feed, else as binary data.
 void writePly(const TriangleMesh& mesh, OutputFile& out) {
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
   const auto vertices = std::as_bytes(std::span(mesh.vertices));

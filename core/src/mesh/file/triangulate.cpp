@@ -32,7 +32,7 @@ std::vector<Vector2> flattened(std::span<const Vector3> polygon) {
   return points;
 }
 
-/// A set of corners of a polygon, as bits.
+/// A set of polygon corners, stored as a bit set.
 class CornerSet {
  public:
   /// Makes a set that contains all corners of a polygon with `corners` corners.
@@ -43,8 +43,7 @@ class CornerSet {
   void add(std::uint32_t corner) { words_[corner / 64] |= bit(corner); }
   void remove(std::uint32_t corner) { words_[corner / 64] &= ~bit(corner); }
 
-  /// Returns the first corner of the set at or after `start` in cyclic order, or std::nullopt if the set is
-  /// empty.
+  /// Returns the first corner of the set at or after `start` in cyclic order, or std::nullopt if the set is empty.
   std::optional<std::uint32_t> next(std::uint32_t start) const {
     std::uint64_t bits = words_[start / 64] & ~(bit(start) - 1);
     for (std::size_t i = 0, word = start / 64; i <= words_.size(); ++i, bits = words_[word]) {
@@ -60,8 +59,7 @@ class CornerSet {
   std::vector<std::uint64_t> words_;
 };
 
-/// A grid for finding the corners of a polygon in a box. It has about a quarter as many cells as the polygon
-/// has corners.
+/// A uniform grid that finds the corners of a polygon within a box. It has about one cell per four corners.
 class CornerGrid {
  public:
   explicit CornerGrid(const std::vector<Vector2>& points)
@@ -74,8 +72,8 @@ class CornerGrid {
     for (std::uint32_t i = 0; i < points.size(); ++i) corners_[ends[cellOf(points[i])]++] = i;
   }
 
-  /// Returns a corner for which `is` returns true, or std::nullopt if there is none. Searches all corners in the
-  /// box and some corners near the box.
+  /// Searches all corners in the box, and some corners near it, for one for which `is` returns true. Returns
+  /// std::nullopt if there is none.
   template <typename Predicate>
   std::optional<std::uint32_t> find(const Eigen::AlignedBox2d& box, const Predicate& is) const {
     const std::size_t lastX = column(0, box.max().x()), lastY = column(1, box.max().y());
@@ -97,12 +95,12 @@ class CornerGrid {
   std::size_t side_;
   Eigen::AlignedBox2d box_;
   std::vector<std::uint32_t> starts_;   ///< index of each cell's first corner in `corners_`, row by row
-  std::vector<std::uint32_t> corners_;  ///< the corners, sorted by cell
+  std::vector<std::uint32_t> corners_;  ///< indices of the corners, sorted by cell
 };
 
 /// Triangulates a polygon by ear clipping (Meisters 1975): cuts off one ear after another. An ear is a convex
-/// corner whose triangle contains no other corner. A corner that is not an ear is tested again after a
-/// neighbour, or the corner that was found in its triangle, is cut off.
+/// corner whose triangle with its two neighbours contains no other corner. A corner that is not an ear is tested
+/// again after a neighbour, or the corner found in its triangle, has been cut off.
 class EarClipper {
  public:
   explicit EarClipper(std::span<const Vector3> polygon)
@@ -121,9 +119,9 @@ class EarClipper {
   }
 
   std::vector<Triangle> clip() {
-    // Cut off thin ears only if there is no other ear. Corner positions come from float, which rounds corners away
-    // from a straight side. Ears as thin as that rounding, and ears whose cut passes another corner that closely,
-    // would yield slivers whose normals are noise.
+    // Cut off thin ears only if there is no other ear. Rounding to float moves corners off a straight side. An
+    // ear that is no thicker than this rounding, or whose cut passes another corner as closely, would yield
+    // slivers with random normals. The tolerance is relative to the length of the sides.
     constexpr double kRounding = 1e-4;
     while (left_ > 3) {
       std::optional<std::uint32_t> ear = findEar(kRounding, maybeClear_);
@@ -141,9 +139,9 @@ class EarClipper {
     return corner;
   }
 
-  /// Returns true if `corner` is an ear. The corner must deviate from a straight angle by more than `tolerance`,
-  /// and all other corners must be outside its triangle by more than `tolerance`. The tolerance is relative to
-  /// the triangle's sides.
+  /// Returns true if `corner` is an ear that can be cut off. The corner must deviate from a straight angle by
+  /// more than `tolerance`, and all other corners must be outside its triangle by more than `tolerance`. The
+  /// tolerance is relative to the triangle's sides.
   bool isEar(std::uint32_t corner, double tolerance) {
     const std::uint32_t before = previous_[corner], after = next_[corner];
     const std::array<Vector2, 3> ear = {points_[before], points_[corner], points_[after]};
@@ -157,8 +155,8 @@ class EarClipper {
     return !other;
   }
 
-  /// Returns the box of all points for which `isNear` returns true, that is, of the triangle `ear` with every
-  /// side moved outwards.
+  /// Returns the bounding box of the triangle `ear` with every side moved outwards by `tolerance` times its
+  /// length. It contains all points for which `isNear` returns true.
   static Eigen::AlignedBox2d boxAround(const std::array<Vector2, 3>& ear, double tolerance) {
     Eigen::AlignedBox2d box;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -178,7 +176,8 @@ class EarClipper {
     return true;
   }
 
-  /// Returns the corner to cut off if no ear is left, that is, if the polygon is flat or intersects itself.
+  /// Returns the corner with the smallest triangle. It is cut off if no ear is left because the polygon is flat
+  /// or intersects itself.
   std::uint32_t flattestCorner() const {
     std::uint32_t best = start_;
     double least = std::numeric_limits<double>::infinity();
@@ -199,7 +198,7 @@ class EarClipper {
     triangles_.push_back({before, corner, after});
     next_[before] = after;
     previous_[after] = before;
-    start_ = next_[after];  // Starting at the neighbour would yield a fan of slivers.
+    start_ = next_[after];  // Starting at the neighbour `after` would yield a fan of slivers.
     --left_;
     isLeft_[corner] = false;
     maybeClear_.remove(corner);
@@ -217,14 +216,14 @@ class EarClipper {
 
   std::vector<Vector2> points_;
   CornerGrid grid_;
-  CornerSet maybeClear_, maybe_;                     ///< corners to test as ears, with tolerance and without
-  std::vector<std::vector<std::uint32_t>> blocked_;  ///< for each corner, those whose triangle contains it
+  CornerSet maybeClear_, maybe_;                     ///< corners to test as ears, with and without a tolerance
+  std::vector<std::vector<std::uint32_t>> blocked_;  ///< for each corner, the corners whose triangles contain it
   std::vector<bool> isLeft_;
   std::vector<std::uint32_t> next_;
   std::vector<std::uint32_t> previous_;
   std::vector<Triangle> triangles_;
   std::uint32_t start_ = 0;
-  std::size_t left_;  ///< corners not yet cut off
+  std::size_t left_;  ///< number of corners not yet cut off
 };
 
 }  // namespace

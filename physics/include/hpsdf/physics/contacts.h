@@ -14,7 +14,7 @@
 namespace hpsdf::physics {
 
 struct ContactOptions {
-  double margin = 0;  ///< samples up to this distance outside are contacts too; world units, 0 or more
+  double margin = 0;  ///< samples up to this distance outside the body are contacts too; world units, 0 or more
   /// The maximum number of contacts. The deepest contacts are kept, the deepest first; among equal depths the
   /// contact with the lower sample index comes first. If this is empty, all contacts are returned in the
   /// order of the samples.
@@ -23,7 +23,7 @@ struct ContactOptions {
 
 struct Contact {
   std::uint32_t sample;  ///< index of the sample
-  double depth;          ///< −f at the sample: above 0 inside
+  double depth;          ///< minus the field value at the sample: above 0 inside
   Vector3 position;      ///< position of the sample, in the world
   /// Unit vector in world coordinates that points out of the field's body: the direction of the field's
   /// gradient. If the gradient vanishes, it is the opposite of the sample's normal.
@@ -38,10 +38,10 @@ struct BodyPair {
   Eigen::Isometry3d worldFromField;
 };
 
-/// The amount of work that queries took.
+/// The work that contact queries took.
 struct QueryCost {
-  std::size_t spheres = 0;      ///< spheres tested against the collider's table
-  std::size_t samples = 0;      ///< samples tested against the collider's table
+  std::size_t spheres = 0;      ///< bounding spheres of samples tested against the field's lower bounds
+  std::size_t samples = 0;      ///< samples tested against the field's lower bounds
   std::size_t evaluations = 0;  ///< evaluations of the field
 
   QueryCost& operator+=(const QueryCost& other);
@@ -78,13 +78,13 @@ class PairContacts {
   std::size_t pairs() const { return pairs_; }
   std::span<const Contact> of(std::size_t pair) const;
   std::span<const Contact> all() const { return contacts_; }  ///< contacts of all pairs, in the order of the pairs
-  const QueryCost& cost() const { return cost_; }             ///< total cost
+  const QueryCost& cost() const { return cost_; }             ///< total cost of the last search
 
  private:
   friend void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
 
   std::size_t pairs_ = 0;
-  std::vector<ContactQuery> blocks_;  ///< results of pairs that one task handles
+  std::vector<ContactQuery> blocks_;  ///< contacts of consecutive pairs, one element for each task
   std::vector<std::size_t> ends_;     ///< index in contacts_ after each pair's last contact
   std::vector<Contact> contacts_;
   QueryCost cost_;

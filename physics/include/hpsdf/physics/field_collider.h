@@ -38,19 +38,19 @@ class FieldCollider {
   std::size_t bytes() const { return cells_.size() * sizeof(cells_[0]); }
 
  private:
-  /// Lower bounds of one cell of the table, in multiples of `unit_`, rounded down.
+  /// Lower bounds of the field for one cell of the table, in multiples of `unit_`, rounded down.
   struct Cell {
     std::uint16_t within;  ///< lower bound of the field in the cell
-    std::uint16_t around;  ///< lower bound of the field at any point plus its distance from any point of the cell
+    std::uint16_t around;  ///< lower bound, over all points y, of the field at y plus the distance from the cell to y
   };
 
   const Cell& cellAt(const Vector3& inDomain) const;
 
   const Field* field_;
-  int depth_;                         ///< depth of octree cells that have the size of a grid cell
-  std::array<std::int64_t, 3> size_;  ///< grid cells along each axis
+  int depth_;                         ///< depth at which octree cells are as large as cells of the table
+  std::array<std::int64_t, 3> size_;  ///< cells of the table along each axis
   double unit_;
-  double wall_;              ///< least field value at the domain's sides or, if that is above 0, least `around` there
+  double wall_;              ///< lower bound of f at the domain's sides or, if that is above 0, of `around` there
   std::vector<Cell> cells_;  ///< bounds of all cells, x fastest
 };
 

@@ -9,10 +9,10 @@
 
 namespace hpsdf::physics {
 
-/// A node of the hierarchy. Its sphere surrounds the points at the positions `begin` to `end` (exclusive)
-/// in the tree's order. The nodes are stored in depth-first order. `next` is the index of the first node
-/// after this node's subtree, at which a search continues if it skips this node. If a node has no children,
-/// `next` is the index directly after it.
+/// A node of the hierarchy. Its sphere surrounds the points at the positions `begin` to `end` (exclusive) in
+/// `SphereTree::order`. The nodes are stored in depth-first order. `next` is the index of the first node after
+/// this node's subtree, at which a search continues if it skips this node. If a node has no children, `next` is
+/// the index directly after it.
 struct Sphere {
   Vector3 center;
   double radius;  ///< no point is farther from the centre, in spite of rounding
@@ -22,10 +22,10 @@ struct Sphere {
 
 struct SphereTree {
   std::vector<Sphere> spheres;       ///< the first one contains all points
-  std::vector<std::uint32_t> order;  ///< the points' indices, in the order in which the nodes' ranges are contiguous
+  std::vector<std::uint32_t> order;  ///< indices of the points, sorted so that the points of each node are contiguous
 };
 
-/// Builds the hierarchy of one or more points.
+/// Builds a hierarchy of bounding spheres around one or more points.
 SphereTree buildSphereTree(std::span<const Vector3> points);
 
 }  // namespace hpsdf::physics

@@ -14,7 +14,7 @@
 
 namespace hpsdf::physics {
 
-constexpr std::size_t kMaxSamples = std::size_t{1} << 24;  ///< greatest number of samples; choosing them takes 6 GB
+constexpr std::size_t kMaxSamples = std::size_t{1} << 24;  ///< greatest number of samples; choosing so many takes 6 GB
 
 /// The number of samples, by exactly one of `count` and `spacing`.
 struct SampleOptions {
@@ -25,7 +25,7 @@ struct SampleOptions {
   std::uint64_t seed = 1;  ///< seed of the random candidates
 };
 
-/// Points of a surface with the outward normals of the surface. The points are sorted so that those of each
+/// Points of a surface with the outward normals of the surface. The points are sorted so that the points in each
 /// bounding sphere are contiguous. The object is immutable.
 class SurfaceSamples {
  public:

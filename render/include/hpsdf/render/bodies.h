@@ -16,39 +16,39 @@
 
 namespace hpsdf::render {
 
-/// Returns the colour of the body with this index. The colours of consecutive indices differ, and no colour
-/// is close to `surfaceColor`.
+/// Returns the colour of the body with this index. The colours of consecutive indices differ, and no colour is close to
+/// the clay colour of a field's surface (`surfaceColor`).
 Color bodyColor(std::size_t index);
 
 /// The clay colour of a field's surface in pictures without a colour scale.
 Color surfaceColor();
 
-/// A mesh with a position and an orientation in the world.
+/// A rigid body: a mesh with a position and an orientation in the world.
 struct Body {
-  std::uint32_t mesh = 0;  ///< index of the mesh among those of the renderer
+  std::uint32_t mesh = 0;  ///< index in the list of meshes from which the renderer was made
   Eigen::Isometry3d worldFromBody = Eigen::Isometry3d::Identity();
   Color color = bodyColor(0);
 };
 
-/// For each pixel of a view, the body that the pixel shows; rows from top to bottom. The distances can be
-/// compared with those of `ViewBuffers`, so that the nearer of a body and the field's surface hides the
-/// other. For a pixel that shows no body, `body` is kNoBody and the other buffers are 0.
+/// The body that each pixel of a view shows, in rows from top to bottom. `distance` is measured as in `ViewBuffers`, so
+/// that bodies and a field's surface can hide each other. For a pixel that shows no body, `body` is kNoBody and the
+/// other buffers are 0.
 struct BodyBuffers {
   int width = 0;
   int height = 0;
-  std::vector<std::uint32_t> body;      ///< index of the body among those drawn
+  std::vector<std::uint32_t> body;      ///< index of the body in the list of drawn bodies
   std::vector<std::uint32_t> triangle;  ///< index of the triangle in the body's mesh
-  /// The unit normal of the triangle, on the side of the triangle that faces the eye, because meshes may be
-  /// open or have the wrong orientation. The normal is interpolated where the mesh is smooth. At a silhouette
-  /// it may therefore point slightly away from the eye.
+  /// The unit normal at the visible point. It is flipped if the eye sees the back of the triangle, because meshes may
+  /// be open or wrongly oriented. Where the mesh is smooth, the normal is interpolated between the triangle's corners,
+  /// so that it may point slightly away from the eye at a silhouette.
   std::vector<Eigen::Vector3f> normal;
   std::vector<float> distance;  ///< distance along the ray from its start to the body, world units
 
   bool hit(std::size_t pixel) const { return body[pixel] != kNoBody; }
 };
 
-/// Renders views of bodies, which refer to a fixed list of meshes, into buffers. Not thread-safe: use one
-/// renderer for each thread.
+/// Renders views of bodies into buffers. Each body refers to a mesh in a fixed list. Not thread-safe: use one renderer
+/// for each thread.
 class BodyRenderer {
  public:
   virtual ~BodyRenderer();
@@ -79,10 +79,10 @@ class BodyRenderer {
 /// all meshes together have more than 2^26 triangles.
 std::unique_ptr<BodyRenderer> makeCpuBodyRenderer(std::vector<TriangleMesh> meshes);
 
-/// Makes a renderer that uses OpenGL. Each mesh is uploaded once, and each body is an instance of its mesh.
-/// OpenGL determines which triangle a pixel shows, with corners rounded to about 1/256 of a pixel. Distance
-/// and normal are computed from that triangle in double precision. Throws `Error` as `makeCpuBodyRenderer`
-/// does, and if no device offers OpenGL 4.5.
+/// Makes a renderer that uses OpenGL. Each mesh is uploaded once, and each body is an instance of its mesh. OpenGL
+/// determines which triangle a pixel shows, after rounding the corners to about 1/256 of a pixel. Distance and normal
+/// are then computed in double precision. Throws `Error` as `makeCpuBodyRenderer` does, and if no device offers OpenGL
+/// 4.5.
 std::unique_ptr<BodyRenderer> makeGlBodyRenderer(std::vector<TriangleMesh> meshes,
                                                  GlChoice choice = GlChoice::automatic);
 

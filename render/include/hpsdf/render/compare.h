@@ -1,5 +1,5 @@
 #pragma once
-// Comparison of a picture with its baseline.
+// Comparison of a picture with its baseline, the accepted picture of a test.
 
 #include <array>
 #include <cstddef>
@@ -10,11 +10,10 @@
 
 namespace hpsdf::render {
 
-/// The tolerated difference of a colour channel, out of 255. Processors differ in how they round the lowest
-/// bits.
+/// The tolerated difference of a colour channel, out of 255, because processors round differently.
 constexpr int kFreeDifference = 3;
-/// The tolerated fraction of pixels that differ by more than `kFreeDifference`. At cell edges and
-/// silhouettes the lowest bit of a number may decide which cell a pixel shows.
+/// The tolerated fraction of pixels that differ by more than `kFreeDifference`. At cell edges and silhouettes, a
+/// rounding error may decide which cell a pixel shows.
 constexpr double kPixelBudget = 0.002;
 
 struct Comparison {
@@ -28,7 +27,7 @@ struct Comparison {
 };
 Comparison compare(const Image& baseline, const Image& actual);
 
-/// Describes in one line why a comparison fails. Returns an empty string if the two sizes are equal and at
+/// Describes in one line why a comparison fails. Returns an empty string if both pictures have the same size and at
 /// most the fraction `budget` of the pixels differs.
 std::string problem(const Comparison& comparison, double budget);
 
@@ -44,8 +43,8 @@ struct PixelDifference {
   Color actual;
   int difference;  ///< difference of the channel that differs most
 };
-/// Returns at most `count` of the pixels that differ most, the greatest difference first. Of neighbouring
-/// pixels only the one with the greatest difference is listed. Both pictures must have the same size.
+/// Returns at most `count` of the pixels that differ most, the greatest difference first. From a group of neighbouring
+/// pixels, only the one with the greatest difference is listed. Both pictures must have the same size.
 std::vector<PixelDifference> worstPixels(const Image& baseline, const Image& actual, std::size_t count);
 
 }  // namespace hpsdf::render

@@ -1,5 +1,5 @@
 #pragma once
-// A plot of a field along a straight line, which shows jumps most clearly.
+// A plot of a field along a straight line, which makes jumps of the field between cells visible.
 
 #include <span>
 
@@ -8,11 +8,11 @@
 
 namespace hpsdf::render {
 
-/// Draws several charts over the distance along the line: f with the exact distance; the error f − exact on
-/// a scale of its own; |∇f| with the slope of f along the line; and bands of the cells' degrees and depths.
-/// Thin lines through all charts mark the borders of cells. `exact` holds the exact distance at each sample
-/// of the line. If `exact` is empty, the jumps of f at cell borders are drawn instead of the error. A small
-/// picture omits the lower charts. Throws `Error` if the size is out of range, 16 to 16384 pixels.
+/// Plots the field f over the distance along a line, in charts from top to bottom: f and the exact distance; the error
+/// f − exact; |∇f| and the slope of f along the line; and coloured bands with the cells' degrees and depths. Thin
+/// vertical lines mark the borders of cells. `exact` holds the exact distance at each sample of the line; if it is
+/// empty, the jumps of f at cell borders are drawn instead of the error. A small picture omits the lower charts. Throws
+/// `Error` if the size is out of range, 16 to 16384 pixels.
 Image drawLine(const Field& field, const Line& line, std::span<const double> exact, int width, int height);
 
 }  // namespace hpsdf::render

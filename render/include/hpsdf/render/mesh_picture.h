@@ -14,8 +14,8 @@
 namespace hpsdf::render {
 
 struct MeshPicture {
-  /// The camera orbits the centre of the mesh. The camera's distances are in diagonals of a cube around the
-  /// mesh. In the picture of a field they are in diagonals of the domain.
+  /// The camera, which orbits the centre of the mesh by default. Its distance is in diagonals of a cube around the
+  /// mesh.
   OrbitCamera camera;
   int width = 1280;
   int height = 720;
@@ -23,14 +23,14 @@ struct MeshPicture {
   bool whole = false;  ///< replaces the camera's distance by the nearest one that shows the whole mesh
 };
 
-/// A function that makes a renderer of the given meshes, for example `makeCpuBodyRenderer`.
+/// A function that makes a renderer for bodies with the given meshes, for example `makeCpuBodyRenderer`.
 using MakeBodyRenderer = std::function<std::unique_ptr<BodyRenderer>(std::vector<TriangleMesh>)>;
 
-/// Draws front faces in the colour of clay, back faces in blue, and faces that cross other faces in pale
-/// red. Boundary, non-manifold and inconsistent edges are drawn as lines, and a ring surrounds each defect
-/// that is small in the picture. Hidden parts of lines are dashed. The mesh may lie anywhere and have any
-/// size: `make` receives it moved near the origin and scaled to a size near 1. `defects` are those of
-/// `mesh`. Throws `Error` if a size, the camera or the mesh is out of range.
+/// Draws front faces in the colour of clay, back faces in blue, and faces that cross other faces in pale red. Boundary,
+/// non-manifold and inconsistent edges are drawn as lines, dashed where hidden, and a ring surrounds each defect that
+/// is small in the picture. `defects` are the defects of `mesh`. The mesh may have any position and size, because
+/// `make` receives a copy that is moved near the origin and scaled to a size near 1. Throws `Error` if a size, the
+/// camera or the mesh is out of range.
 Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const MeshDefects& defects,
                const MeshPicture& picture);
 

@@ -1,5 +1,5 @@
 #pragma once
-// Draws finished pictures of a field: view, buffers, colours, legend and caption.
+// Draws finished pictures of a field, with colours, a legend and a caption.
 
 #include <array>
 #include <cstdint>
@@ -17,16 +17,14 @@
 
 namespace hpsdf::render {
 
-/// Draws a picture: the view, its legend or colour bar to the right, and its caption below. The legend
-/// contains all degrees or depths of the field, so that colours keep their meaning from slice to slice.
+/// Draws a picture: the view, its legend or colour bar to the right, and its caption below. The legend contains all
+/// degrees or depths of the field, so that colours keep their meaning from slice to slice. In a picture of a surface,
+/// nearer objects hide farther ones, and a clipping plane cuts everything except bodies.
 ///
-/// In a picture of a surface, nearer things hide farther ones. Surface, section, plane and boxes are
-/// resolved in the buffers; lines are drawn over them. A clipping plane cuts everything except bodies.
-///
-/// Throws `Error`, before memory is allocated, if a size or sample count is out of range (16 to 16384
-/// pixels; 1 to 8; at most 64 Mi samples in all). Throws `Error` if the colours do not suit the kind of
-/// view, if their reference data is missing, if the limits make no scale, if a plane misses the domain, and
-/// if the spacing of arrows is out of range.
+/// Throws `Error`, before memory is allocated, if a size or sample count is out of range (16 to 16384 pixels; 1 to 8;
+/// at most 64 Mi samples in all). Throws `Error` if the colours do not suit the kind of view, if their reference data
+/// is missing, if the limits of the scale are invalid, if a plane misses the domain, and if the spacing of arrows is
+/// out of range.
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const ReferenceData& reference = {});
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const ReferenceData& reference = {});
 
@@ -36,13 +34,13 @@ using View = std::variant<SliceView, SurfaceView>;
 struct Drawn {
   Image image;
   View view;
-  ViewBuffers buffers;  ///< samples × samples for each pixel of the view
+  ViewBuffers buffers;  ///< hold samples × samples entries for each pixel of the view
   int samples = 1;
   bool seen = false;  ///< true if any pixel shows the field
   Legend legend = {};
   std::vector<std::string> details = {};  ///< details of the caption, the most important first
-  ScaleOptions scale = {};  ///< scale with the limits and levels that were chosen: gives another picture these colours
-  std::array<int, 2> corner = {0, 0};  ///< upper left corner of the view in the picture, pixels
+  ScaleOptions scale = {};                ///< the scale as chosen; another picture that uses it gets the same colours
+  std::array<int, 2> corner = {0, 0};     ///< upper left corner of the view in the picture, pixels
 };
 /// Draws a picture as `draw` does. Returns it together with the data from which it was drawn.
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture,
@@ -50,19 +48,19 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
 Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& picture,
                   const ReferenceData& reference = {});
 
-/// The part of the field that the middle sample of a pixel shows.
+/// The point and the cell of the field that a pixel shows at its middle sample.
 struct Pick {
   /// The position in world units. If rounding has moved the position across a face of its cell, it is moved
   /// back into the cell, by at most 1e-5 of the domain's extent along each axis.
   Vector3 position;
   std::uint32_t cell;  ///< `Cell::id`
   int degree, depth;
-  double value;  ///< f as the renderer computed it; on a surface the offset, up to rounding
+  double value;  ///< value of the field as the renderer computed it
 };
 
-/// Returns the part of the field that a pixel shows, ignoring lines and arrows drawn over it. Returns
-/// std::nullopt if the pixel shows no part of the field but paper, backdrop, legend or a body. Throws
-/// `Error` if the pixel is outside of the picture.
+/// Returns the part of the field that a pixel shows, ignoring lines and arrows drawn over it. Returns std::nullopt for
+/// a pixel that shows the background, the legend, the caption or a body. Throws `Error` if the pixel is outside of the
+/// picture.
 std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y);
 
 /// Returns the value of `quantity` at each pixel of a view's buffers, or NaN for a pixel that does not show
@@ -83,12 +81,10 @@ struct ViewSize {
 };
 ViewSize viewSize(const SurfacePicture& picture);
 
-/// Returns the view that `draw` colours. Its pixels are square if the view is rendered at the size
-/// `viewSize`.
+/// Returns the view of the plane that `draw` renders. Its pixels are square at the size that `viewSize` returns.
 SliceView sliceView(const Field& field, const SlicePicture& picture);
 
-/// Returns a view of the same plane, framed for `width` × `height` square pixels. It is used for files of
-/// raw values.
+/// Returns a view of the picture's plane, framed for `width` × `height` square pixels, for files of raw field values.
 SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height);
 
 }  // namespace hpsdf::render

@@ -8,10 +8,10 @@
 
 namespace hpsdf::render {
 
-/// The OpenGL devices that are tried. docs/rendering.md describes the order in which they are tried.
+/// The OpenGL devices to try; docs/rendering.md states their order.
 enum class GlChoice : std::uint8_t {
-  automatic,  ///< hardware devices, then software devices, surfaceless Mesa, the default display
-  software,   ///< a software renderer only: Mesa's llvmpipe, the reference of the pictures
+  automatic,  ///< hardware devices, then software devices, then surfaceless Mesa, then the default display
+  software,   ///< a software renderer only, such as Mesa's llvmpipe
   hardware,   ///< a hardware device only
 };
 

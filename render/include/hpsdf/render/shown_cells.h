@@ -9,7 +9,7 @@ namespace hpsdf::render {
 enum class CellStyle : std::uint8_t {
   none,
   lines,  ///< the edges of the cells; edges fade where their cells are small in the picture
-  boxes,  ///< solid boxes of 0.8 of the cells' extent
+  boxes,  ///< solid boxes with 0.8 times the edge lengths of the cells
 };
 
 /// The leaves of the octree that a picture shows, and how it draws them.

@@ -1,6 +1,5 @@
 #pragma once
-// The views that pictures show (a plane through the field, or a camera) and the buffers that a renderer
-// fills for a view.
+// The views that pictures show (a plane through the field, or a camera) and the buffers into which a view is rendered.
 
 #include <cstdint>
 #include <optional>
@@ -28,8 +27,8 @@ Vector3 pixelPoint(const SliceView& view, int x, int y, int width, int height);
 /// `Error` if the offset is outside of the domain.
 SliceView axisSlice(const Box& domain, int axis, double offset, int width, int height);
 
-/// Returns a view of the plane through `point` that is perpendicular to `normal`, framed as by `axisSlice`.
-/// Throws `Error` if the normal is zero or the plane misses the domain.
+/// Returns a view of the plane through `point` that is perpendicular to `normal`, framed so that the domain's section
+/// fits into the picture. Throws `Error` if the normal is zero or the plane misses the domain.
 SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& normal, int width, int height);
 
 enum class UpAxis : std::uint8_t { y, z };
@@ -57,15 +56,15 @@ struct OrbitCamera {
 struct Camera {
   Vector3 eye;      ///< common start of the rays; orthographic: middle of the plane in which rays start
   Vector3 forward;  ///< unit vector
-  Vector3 right;    ///< vector to the right, half the view's width long, in perspective at distance 1
-  Vector3 up;       ///< vector upwards, half the view's height long, in perspective at distance 1
+  Vector3 right;    ///< vector to the right, half as long as the view is wide (in perspective, wide at distance 1)
+  Vector3 up;       ///< vector upwards, half as long as the view is high (in perspective, high at distance 1)
   Projection projection = Projection::perspective;
 };
 
-/// Returns the `Camera`, which defines the rays, of an orbiting camera. An orthographic view is as high as
-/// the perspective view is at the target. Orthographic rays start just in front of the domain, whatever the
-/// distance of the camera. Thus no ray starts within the domain, and lengths along the rays stay precise.
-/// Throws `Error` if numbers are out of range.
+/// Converts an orbiting camera to a `Camera`, which defines the rays. An orthographic view is as high as a perspective
+/// view is at the target. Orthographic rays start just in front of the domain, whatever the distance of the camera, so
+/// that no ray starts within the domain and lengths along the rays stay precise. Throws `Error` if numbers are out of
+/// range.
 Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height);
 
 /// The start of the ray of pixel (x, y) of a view of width × height pixels, world units.
@@ -76,8 +75,8 @@ Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height);
 
 /// A point projected to the picture that a camera sees.
 struct PicturePoint {
-  double x, y;   ///< pixels from the view's upper left corner: the middle of pixel (0, 0) is at (½, ½)
-  double depth;  ///< distance from the eye along `forward`; x and y are undefined in perspective unless it is above 0
+  double x, y;      ///< pixels from the view's upper left corner: the middle of pixel (0, 0) is at (½, ½)
+  double depth;     ///< distance from the eye along `forward`; in perspective, x and y are undefined if depth <= 0
   double distance;  ///< distance of the point from the start of the ray through it, world units
 };
 
@@ -101,7 +100,7 @@ struct ClipPlane {
 /// of the surface.
 struct SurfaceView {
   Camera camera;
-  double offset = 0;  ///< signed distance, world units
+  double offset = 0;  ///< value of f on the surface, world units
   std::optional<ClipPlane> clip = {};
 };
 
@@ -116,24 +115,22 @@ enum class Shown : std::uint8_t {
   box,      ///< a cell drawn as a solid box
 };
 
-/// What the pixels of a view show; rows from top to bottom. The colouring of a view reads only these
-/// buffers. For a pixel of a slice that is outside of the domain, and for a pixel whose ray misses the
-/// surface, `cell` is kNoCell and the other buffers are 0.
+/// The data of each pixel of a view, in rows from top to bottom; a view is coloured from these buffers alone. For a
+/// pixel of a slice outside of the domain, and for a ray that misses the surface, `cell` is kNoCell and the other
+/// buffers are 0.
 struct ViewBuffers {
   int width = 0;
   int height = 0;
-  std::vector<std::uint32_t> cell;  ///< `Cell::id`
+  std::vector<std::uint32_t> cell;  ///< the cell that the pixel shows (`Cell::id`)
   std::vector<std::uint8_t> degree;
   std::vector<std::uint8_t> depth;
   std::vector<float> value;             ///< f at the point of a slice or at the hit of a ray
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f scaled to a unit vector; empty for slices
   std::vector<float> distance;  ///< distance along the ray from its start to the hit, world units; empty for slices
-  /// 1 if the field jumps across the offset at a face between two cells, else 0. For a 1, `value` is the
-  /// field's value on the far side of the face, so that f − offset is the part of the jump beyond the offset.
-  /// This buffer is empty for slices.
+  /// 1 if the pixel's ray meets a crack, which is a face between two cells at which f jumps across the offset, else 0.
+  /// At a crack, `value` is f on the far side of the face. This buffer is empty for slices.
   std::vector<std::uint8_t> crack;
-  /// The part of the scene that each pixel with a cell shows. This buffer is empty if the scene is a surface
-  /// alone.
+  /// The part of the scene that each pixel shows. This buffer is empty if the scene is a surface alone.
   std::vector<Shown> shown;
   /// The index of the body that each pixel shows, or kNoBody. This buffer is empty for a scene without
   /// bodies. For a pixel that shows a body, the buffers hold the normal and distance of the body; the other

@@ -8,13 +8,13 @@
 
 namespace hpsdf::physics {
 
-/// Statistics of the dispatch of one step. A pair of sleeping bodies contributes the numbers of the last
-/// step in which the bodies were awake.
+/// Statistics of the dispatch of one step. A pair of sleeping bodies contributes its contacts of the last step in
+/// which the bodies were awake.
 struct DispatchFigures {
-  double querySeconds = 0;      ///< time of the queries of samples in fields
-  std::size_t pairs = 0;        ///< pairs with a field whose bounding boxes overlap
+  double querySeconds = 0;      ///< time to find the contacts of fields
+  std::size_t pairs = 0;        ///< pairs whose contacts were searched: one body is a field, and the boxes overlap
   std::size_t penetrating = 0;  ///< samples, spheres and nodes of soft bodies that lie in a field
-  std::size_t contacts = 0;     ///< for the solver: at most 12 per pair of bodies, and nodes within the margin
+  std::size_t contacts = 0;     ///< passed to the solver: up to 12 per pair of bodies, and nodes within the margin
   double deepest = 0;           ///< greatest penetration, world units
 };
 

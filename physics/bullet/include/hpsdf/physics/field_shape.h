@@ -45,7 +45,7 @@ class FieldShape final : public btConcaveShape {
   const SurfaceSamples* samples_;
   Eigen::Isometry3d bodyFromMesh_;
   btVector3 center_, halfSize_;  ///< centre and half size of the mesh's bounding box, in the body's frame
-  btVector3 inertia_;            ///< principal moments for mass 1
+  btVector3 inertia_;            ///< principal moments of inertia for mass 1
   btVector3 scaling_{1, 1, 1};
 };
 
