@@ -481,8 +481,9 @@ TEST_F(LostLocks, fieldOfTheOtherProcessIsAccepted) {
 }
 
 TEST_F(LostLocks, removedFilesAreWrittenAgain) {
-  // The first 100 temporary file names are taken, so that the first attempt to write the field fails.
-  for (int n = 0; n <= 100; ++n)
+  // Temporary file 0 checks that the folder is writable. The next 100 names are taken, so that the first attempt to
+  // write the field fails.
+  for (int n = 1; n <= 100; ++n)
     writeFile(fmt::format("{}.part-{}-{}", fieldOf(kShape).string(), process_->id(), n), "");
   expectGoesOn("built");
 }

@@ -290,9 +290,9 @@ class Batch {
 
   Made built(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
+    const BuildMark mark(markOf(mesh));  // first, because the check writes a temporary file too
     checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
-    const BuildMark mark(markOf(mesh));
     // Hash the file before reading the mesh: if the file changes in between, the next run notices that the hash
     // differs.
     const std::string content = contentOf(console_, mesh.surface);
