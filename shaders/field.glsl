@@ -1,5 +1,5 @@
-// Lookup and evaluation of a field. Positions are in grid coordinates, in which the domain is [0, grid] and a base
-// cell, a root of the octree, is a unit cube.
+// Lookup and evaluation of a field. Positions are in grid coordinates: the domain is [0, grid], and each base cell
+// (root cell of the octree) is a unit cube.
 
 layout(binding = 0) uniform usamplerBuffer nodes;        // octree nodes, packed as described at class FieldUpload
 layout(binding = 1) uniform samplerBuffer coefficients;  // coefficients of the leaves' polynomials
@@ -38,13 +38,12 @@ Node fetchNode(uint index) {
 
 // Data about the blending of neighbouring leaves at a point of a leaf. All members are 0 in a field without blending.
 struct BlendZone {
-  bool inside;                                        // whether other leaves may have a weight at the point
+  bool inside;                                        // whether other leaves may have a blending weight at the point
   float valueDifference, gradientDifference, extent;  // bounds of the blending, as in BlendZoneBounds
   float width;                                        // width of the blend zones, as a share of the leaf's edge
 };
 
-// The value of the field at a point, and the least and the greatest value at this point of the leaf polynomials that
-// are blended there.
+// The value of the field at a point, and the range of the values that the blended leaf polynomials have at this point.
 struct FieldRange {
   float value, lowest, highest;
 };
@@ -61,8 +60,8 @@ void nextLegendre(inout float value, inout float previous, float x, float i) {
   value = next;
 }
 
-// The highest degree that is evaluated without loops and from texels of four coefficients, because loops and single
-// loads are slow on llvmpipe. Leaves up to this degree store terms up to degree 3 first, then terms of degree 4.
+// Polynomials up to this degree are evaluated without loops and load four coefficients at once, because loops and
+// single loads are slow on llvmpipe. Their terms up to degree 3 are stored first, then the terms of degree 4.
 const int kLowDegree = 4;
 
 struct LowDegree {

@@ -6,15 +6,15 @@ layout(location = 18) uniform float blend;         // width of the blend zones a
 
 const bool kBlended = true;
 
-const int kWall = 31;     // takes the place of a neighbour's depth at the boundary of the domain
+const int kWall = 31;     // stands for the depth of a neighbour where the leaf lies at the domain's boundary
 const int kDeepest = 20;  // greatest depth of a leaf
 
 // Returns true if a point of a leaf, in local coordinates, lies near a face, where several leaves are blended.
 bool isInBlendZone(vec3 local) { return any(greaterThan(abs(local), vec3(1.0 - 2.0 * blend))); }
 
-// Finds the cells of depth `level` whose distance from a point is at most `near` (up to 0.5) times their edge length:
-// one or two along each axis, from `first` to `first` + `more`. The point is given by its cell of depth `depth` and its
-// position `fraction` in that cell.
+// Finds the cells of depth `level` that are at most `near` (up to 0.5) times their edge length away from a point. Their
+// indices run from `first` to `first` + `more`, so that there are one or two along each axis. The point is given by its
+// cell of depth `depth` and its position `fraction` in that cell.
 void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float near, out ivec3 first,
                     out ivec3 more) {
   ivec3 cell;
@@ -35,15 +35,15 @@ void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float 
   more = clamp(cell + ivec3(greaterThan(inCell, vec3(1.0 - near))), ivec3(0), last) - first;
 }
 
-// For each axis, returns the depth of the smallest leaf at the leaf's face that is nearer to the point `local`, or
-// kWall if this face lies on the domain's boundary.
+// Takes, for each axis, the face of the leaf that is nearer to the point `local`. Returns the depth of the smallest
+// leaf at this face, or kWall if the face lies on the domain's boundary.
 ivec3 smallestNeighbour(uint extents, vec3 local) {
   uvec3 shift = uvec3(0u, 10u, 20u) + 5u * uvec3(greaterThan(local, vec3(0.0)));
   return ivec3(uvec3(extents) >> shift & kWall);
 }
 
-// For each axis, returns the distance of a point from the leaf's nearer face, positive inside. The unit is the distance
-// to which the leaf's blending weight reaches across this face.
+// Returns, for each axis, the distance of a point from the leaf's nearer face, positive inside the leaf. The unit is
+// the distance beyond this face at which the leaf's blending weight falls to zero.
 vec3 rampPosition(uint extents, int depth, vec3 local) {
   ivec3 neighbour = smallestNeighbour(extents, local);
   vec3 t = (1.0 - abs(local)) * ldexp(vec3(0.5), neighbour - depth) / blend;
@@ -56,8 +56,8 @@ vec3 rampSlopes(uint extents, int depth, vec3 local, vec3 t) {
   return -sign(local) * 0.75 * (1.0 - t * t) * ldexp(vec3(0.5), smallestNeighbour(extents, local) - depth) / blend;
 }
 
-// Converts a point's local coordinates to those in another leaf, which has the cell index other.xyz and depth
-// other.w.
+// Converts a point's local coordinates to the local coordinates of another leaf, whose cell index is other.xyz and
+// whose depth is other.w.
 vec3 localInOther(ivec4 other, ivec3 cellIndex, int depth, vec3 local) {
   vec3 fraction = 0.5 * local + 0.5;
   int down = other.w - depth;
@@ -66,7 +66,7 @@ vec3 localInOther(ivec4 other, ivec3 cellIndex, int depth, vec3 local) {
   return 2.0 * inOther - 1.0;
 }
 
-// candidateOffset returns the offset of the n-th candidate cell from the first one, along each axis 0 or 1.
+// candidateOffset returns the offset, 0 or 1 along each axis, of the n-th candidate cell from the first candidate cell.
 // candidateNumber turns such an offset into a number from 0 to 7.
 ivec3 candidateOffset(int n, ivec3 more) { return ivec3(n, n >> more.x, n >> (more.x + more.y)) & more; }
 int candidateNumber(ivec3 offset) { return offset.x + 2 * offset.y + 4 * offset.z; }
@@ -87,7 +87,7 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   uint extents = texelFetch(zones, int(leaf.index)).x;
   vec3 t = rampPosition(extents, other.w, inOther);
   if (any(lessThanEqual(t, vec3(-1.0 - margin)))) return;
-  float scale = ldexp(1.0, other.w - depth);  // derivative of this leaf's local coordinates by the own leaf's
+  float scale = ldexp(1.0, other.w - depth);  // derivative of `inOther` with respect to `local`
   vec4 polynomial;
   if (withGradient) {
     polynomial = evaluateWithGradient(leaf.offset, leaf.degree, inOther);
@@ -108,8 +108,9 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   total.sum += vec4(weight.xyz * difference.w + weight.w * difference.xyz, weight.w * difference.w);
 }
 
-// Finds the node at the candidate cell `cell` on the search's first level: a node of the cell's size, or a larger leaf
-// `up` levels above it. Returns false if an earlier candidate cell lies in the same larger leaf, which must count once.
+// Finds the node at the candidate cell `cell` on the first level of the search: the cell itself, or a larger leaf that
+// contains it, `up` levels above. Returns false if this larger leaf also contains an earlier candidate cell, because
+// each leaf must count only once.
 bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int up) {
   up = level;
   node = fetchNode(baseCellIndex(uvec3(cell >> level)));
@@ -132,9 +133,8 @@ bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell,
 }
 
 // Sums the polynomials of all leaves whose weights reach a point. Descends level by level through the nodes near the
-// point, which are found from integer cell indices, so that single precision is enough. Leaves are evaluated in one
-// place and are not collected in an array, because drivers would unroll loops over the array and take seconds to
-// compile.
+// point. Nodes are found by integer cell indices, so that single precision is enough. Leaves are not collected in an
+// array before they are evaluated, because drivers would unroll loops over the array and take seconds to compile.
 LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margin, bool withGradient) {
   LeafSum total = LeafSum(vec4(0.0), vec4(0.0), vec4(0.0), 1e30, -1e30);
   vec3 fraction = 0.5 * local + 0.5;
@@ -172,8 +172,8 @@ LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margi
   return total;
 }
 
-// Returns the value of the blended field at a point, and the range there of all leaf polynomials whose weights reach
-// the point if they extend farther by the share `margin`.
+// Returns the value of the blended field at a point, and the range of values that nearby leaf polynomials have at the
+// point. Nearby leaves are those whose weights would reach the point if they reached farther by the share `margin`.
 FieldRange blendedRange(Node leaf, uint depth, uvec3 cellIndex, vec3 local, float margin) {
   LeafSum total = leafSumAt(leaf, ivec3(cellIndex), int(depth), local, margin, false);
   return FieldRange(total.first.w + total.sum.w / total.weights.w, total.lowest, total.highest);

@@ -15,9 +15,9 @@ layout(location = 15) uniform dvec3 shownLo;   // lower corner of the domain's v
 layout(location = 16) uniform dvec3 shownHi;
 layout(location = 17) uniform bool parallel;  // whether the rays are parallel (orthographic camera)
 
-// The state of a pixel after a march pass. The integers are the kind (kMiss to kBracketed), the bits of the floats t
-// and side, and the last leaf. The floats are the ends a, b of the root's bracket and a first guess of the root; or,
-// for a march that has not ended, the last height and the longest step to try.
+// The state of each pixel after a march pass. The integers are the kind (kMiss to kBracketed), the bits of the floats
+// March::t and March::side, and the last leaf. If the march has found a bracket of the root, the floats are its ends a
+// and b and a first guess of the root. If the march has not ended, they are the last height and the longest next step.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 
@@ -76,11 +76,11 @@ struct CellPoint {
   uint depth;
   float scale;    // 2^depth
   vec3 base;      // lower corner of the base cell, grid coordinates
-  uvec3 path;     // lower corner of the node within its base cell, counted in nodes of its depth
+  uvec3 path;     // lower corner of the node within its base cell, in units of the node's edge length
   vec3 fraction;  // position of the point within the node, in [0, 1]^3
 };
 
-// The base cell that contains a point, with the position of the point in it.
+// The base cell that contains a point, with the point's position in this cell.
 CellPoint baseCellAt(vec3 p) {
   p = clamp(p, vec3(0.0), vec3(grid));
   uvec3 base = min(uvec3(p), grid - 1u);

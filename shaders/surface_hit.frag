@@ -7,7 +7,7 @@ layout(location = 11) uniform int mostRefinements;
 layout(location = 0) out uvec4 cellLevelsValueDistance;
 layout(location = 1) out vec4 normal;
 
-const float kTurned = 1e-4;     // greatest turn of the gradient in the last step, roughly in radians
+const float kTurned = 1e-4;     // greatest turn of the gradient in the last Newton step, roughly in radians
 const float kInfinity = 1e30;
 const float kConverged = 1e-8;  // refinement ends when the root changes by less, in domain diagonals; as in trace.cpp
 const float kCrack = 4e-6;      // least jump that counts as a crack at slope 1, in domain diagonals; as in trace.h
@@ -46,7 +46,7 @@ Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool brac
     change = -height / slope;
     bool newton = added + change >= a && added + change <= b;
     if (!newton) change = 0.5 * (a + b) - added;
-    // After a Newton step, the distance to the root is at most curve / slope * change^2 / 2.
+    // `turned` bounds the gradient's turn in the step. A Newton step ends at most turned * |change| / 2 from the root.
     float turned = newton ? abs(curve / slope * change) : kInfinity;
     bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
     if (close || abs(change) <= kConverged * diagonal) break;

@@ -141,8 +141,8 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
   return leaf;
 }
 
-// Moves t to the exit of a node in which the ray cannot cross the surface. Records a hit on the face where the ray
-// enters the node if the node lies behind the surface. Returns true in all other cases.
+// Returns true if the ray may cross the surface within the node. Otherwise moves t to the exit from the node or, if the
+// node lies behind the surface, records a hit on the face where the ray enters the node.
 bool passNode(MarchRay ray, LeafPoint leaf, inout March march) {
   bool above = (leaf.lowest > 0.0 && leaf.lowest + leaf.slope * leaf.toLeave > 0.0) ||
                (leaf.known && march.lastHeight - leaf.zone.valueDifference +
@@ -173,9 +173,10 @@ bool enterLeaf(LeafPoint leaf, float value, float lower, inout March march) {
   return undecided;
 }
 
-// Tries a step to a point with the height `ahead`: moves t there if the ray provably does not cross the surface before
-// it, brackets a single crossing, or shortens the next step. Over a step, the height sags below its chord by at most
-// curve * length^2 / 8, and it is monotone if it falls by more than curve * length^2 / 2.
+// Tries a step to a point with the height `ahead`. Sets the bracket if the ray provably crosses the surface once before
+// this point. Moves t to the point if the ray provably does not cross. Else shortens the next step. Over a step, the
+// height sags below its chord by at most curve * length^2 / 8, and it is monotone if it falls by more than
+// curve * length^2 / 2.
 void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float lower, float curve, bool certain,
              inout March march) {
   float clear = march.lastHeight - lower;
@@ -269,8 +270,8 @@ void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
     march.t += stepLength == leaf.toLeave ? stepLength + ray.nudge : stepLength;
     if (!(march.t <= ray.length)) march.kind = kMiss;
   }
-  // Choose the next step so short that no polynomial that may be blended on it falls to zero, but not shorter than
-  // kGrain blend extents.
+  // Choose the next step so short that all polynomials that may be blended along the step stay above zero. The step is
+  // at least kGrain blend extents long.
   float lowest = march.side > 0.0 ? ahead.lowest - offset : offset - ahead.highest;
   float extent = leaf.zone.extent / length(leaf.localDirection);
   march.zoneStep = max(kGrain * extent, min(extent, certainlyAbove(lowest, leaf.steepestOfAll))) + ray.nudge;

@@ -12,7 +12,7 @@ namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kMostCells = std::size_t{1} << 20;
-constexpr double kUnits = 32;        // units of stored bounds per shortest cell edge: 16 bits suffice for 2048 edges
+constexpr double kUnits = 32;        // stored bounds count 1/32 of the shortest cell edge; 16 bits reach 2048 edges
 constexpr double kTolerance = 0.05;  // accepted error of bounds of polynomials, in shortest cell edges
 constexpr double kRounding = 1e-12;  // upper bound of the relative rounding error of sums
 
@@ -192,10 +192,10 @@ std::vector<double> leastAround(std::vector<double> values, const std::array<std
   return values;
 }
 
-/// Returns a bound of the ratio between the length of the shortest path by steps to neighbouring cells and the
-/// straight distance between its ends. For each order a, b, c of the axes, the path takes steps along axis a,
-/// along both a and b, and along all three axes. Its length is then a linear function of the end point, and the
-/// gradient of this function bounds the ratio.
+/// Returns an upper bound of path length divided by straight distance, for the shortest path of steps between
+/// neighbouring cells. For each order a, b, c of the axes, a path takes steps along axis a, along both a and b, and
+/// along all three axes. The path's length is a linear function of its end point, and the gradient of this function
+/// bounds the ratio.
 double worstDetour(const Vector3& cell) {
   double worst = 1;
   std::array<int, 3> order = {0, 1, 2};
@@ -275,9 +275,9 @@ FieldCollider::FieldCollider(const Field& field) : field_(&field), depth_(0) {
   wall_ = leastAtSides(within, size_);
   for (double& bound : within) bound = std::max(bound, 0.0);
 
-  // Compute the bounds around each cell. Two points of two cells are at least as far apart as the centre of one
-  // cell and the nearest centre in the 3 × 3 × 3 neighbourhood of the other cell. Therefore the smallest value of
-  // each neighbourhood is taken first.
+  // Compute the bounds around each cell. A point of one cell and a point of another cell are at least as far apart as
+  // the centre of the one cell and the nearest centre in the 3 × 3 × 3 neighbourhood of the other. Therefore, first
+  // take the smallest value of each neighbourhood.
   std::vector<double> around = leastAround(within, size_);
   distanceTransform(around, size_, cell);
   if (wall_ > 0) wall_ = leastAtSides(around, size_);
@@ -310,11 +310,11 @@ double FieldCollider::lowerBound(const Vector3& x) const {
   return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-// Let q be the point of the domain closest to x. Two lower bounds hold at x. The first is `around` at q, because the
-// points of the domain closest to x and to y are at most |x − y| apart. The second is `wall_` + |x − q|. It holds for
-// points y outside the domain, because y is at most |x − y| nearer to the domain than x. It holds for points y inside
-// the domain, because the path from x to y crosses a side of the domain, around which a `wall_` of 0 or more is a
-// bound. If `wall_` is negative, the second bound is less than |x − q| and concerns no point inside the domain.
+// A bound b at x means that the field at every point y with |x − y| < b is at least b − |x − y|. Let q be the point of
+// the domain closest to x. The first bound is `around` at q: the points of the domain closest to x and to y are at most
+// |x − y| apart. The second bound is `wall_` + |x − q|. For y outside the domain, it holds because y is at most |x − y|
+// nearer to the domain than x. For y inside, the path from x to y crosses a side of the domain, and a `wall_` of 0 or
+// more is a bound there. If `wall_` is negative, the second bound is below |x − q| and concerns no y inside.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

@@ -5,11 +5,11 @@
 
 namespace hpsdf::physics {
 
-/// R counts as a rotation if RᵀR deviates from the identity by at most this value.
+/// A matrix R counts as a rotation if each entry of RᵀR deviates from the identity by at most this value.
 constexpr double kRotationTolerance = 1e-6;
 
-/// Describes why a transform is not a rotation followed by a translation. Returns nullptr if the transform
-/// is rigid. In messages the name of the transform's owner precedes the returned text. Allocates no memory.
+/// Returns a text that says why a transform is not a rotation followed by a translation, or nullptr if the transform is
+/// rigid. In messages, the name of the transform's owner precedes the returned text. Allocates no memory.
 inline const char* transformFault(const Eigen::Isometry3d& transform) {
   if (!transform.matrix().allFinite()) return "transform is not finite";
   const Eigen::Matrix3d rotation = transform.linear();

@@ -152,8 +152,8 @@ std::vector<Candidate> eliminate(std::vector<Candidate> candidates, const Surfac
     return fourth * fourth;
   };
   std::vector<double> weights(candidates.size(), 0.0);
-  // The weights of candidates only decrease. An outdated entry of the queue is therefore too high, so that it
-  // comes to the top of the queue, where it is corrected.
+  // The weights of candidates only decrease, so that outdated queue entries are too high. They therefore come to the
+  // top of the queue, where they are corrected.
   std::priority_queue<std::pair<double, std::uint32_t>> heaviest;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     neighbours.forEach(candidates, i,

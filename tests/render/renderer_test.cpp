@@ -238,7 +238,7 @@ TEST(CpuTrace, findsTheFirstCrossingOfTheField) {
     const Field& field = shape(name);
     const auto renderer = makeCpuRenderer(field);
     std::size_t seen = 0;
-    for (const Camera& camera : cameras(field, 11, 9))
+    for (const Camera& camera : cameras(field, 11, 5))
       for (const double offset : {0.0, 0.05}) {
         const SurfaceView view{camera, offset};
         const ViewBuffers buffers = renderer->surface(view, kWidth, kHeight);

@@ -42,7 +42,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kOwnFolder = ".batch";  // subfolder of the output for locks and records of finished fields
+constexpr const char* kOwnFolder = ".batch";  // subfolder of the output folder, for locks and build records
 constexpr auto kPollInterval = std::chrono::milliseconds(100);  // wait before locked meshes are tried again
 
 /// The outcome of the work on one mesh of the batch. After every outcome except `failed`, the mesh's field file exists.
@@ -58,8 +58,8 @@ std::string statusName(Status status) {
   return kNames[std::size_t(status)];
 }
 
-/// Identifies the contents of a mesh file by a hash of its bytes. A glTF file may refer to other files, so
-/// for glTF the imported mesh is hashed instead. Returns "" if the file cannot be read.
+/// Returns a text that identifies the contents of a mesh file: a hash of the file's bytes. For glTF, whose files may
+/// refer to other files, the imported mesh is hashed instead. Returns "" if the file cannot be read.
 std::string contentOf(const Console& console, const std::string& surface) {
   if (isShape(surface)) return "shape";
   std::error_code missing;
@@ -111,14 +111,14 @@ Error cannotWrite(const fs::path& file) {
                fmt::format("cannot be written ({}); check the folder's permissions", std::strerror(errno)));
 }
 
-/// Divides numbered pieces of work among processes that share a lock file. A process claims a piece by a record lock
-/// (fcntl) on one byte of the file, at an offset that follows from the number of the piece; the byte itself need not
-/// exist. When a process ends, for any reason, the system releases its locks. The lock file is empty and must never be
-/// removed: a process that opened a new file of the same name would not see the locks on the old one.
+/// Divides numbered tasks among processes that share a lock file. A process claims a task by locking one byte of the
+/// file (fcntl record lock). The task's number determines the byte's offset. The file is empty, because a locked byte
+/// need not exist. When a process ends, for any reason, the system releases its locks. The lock file must never be
+/// removed: a process that opened a new file of the same name would not see the locks on the old file.
 class FileLocks {
  public:
   /// Creates the lock file if it does not exist. Throws `Error` if the lock file cannot be written. A process must
-  /// create only one object for each lock file: when it closes a file, it loses all its record locks on this file.
+  /// create only one object for each lock file: closing the file releases all locks that the process holds on the file.
   explicit FileLocks(fs::path file)
       : file_(std::move(file)), descriptor_(open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
     if (descriptor_ < 0) throw cannotWrite(file_);
@@ -127,8 +127,8 @@ class FileLocks {
   FileLocks(const FileLocks&) = delete;
   FileLocks& operator=(const FileLocks&) = delete;
 
-  /// Locks the piece of work of this number. Returns false if another process holds its lock. Throws `Error` if
-  /// the file system does not support locks.
+  /// Locks the task of this number. Returns false if another process holds the task's lock. Throws `Error` if the file
+  /// system does not support locks.
   bool take(std::uint64_t number) const {
     if (change(number, F_WRLCK)) return true;
     if (errno == EACCES || errno == EAGAIN) return false;
@@ -277,9 +277,8 @@ class Batch {
     }
   }
 
-  /// Removes half-written files of this mesh. If a mark file of the mesh exists, the process that created it has died,
-  /// because this process now holds the mesh's lock. Without a mark file there are no half-written files, and the
-  /// folder need not be searched.
+  /// Removes the half-written files that a killed process left for this mesh. A killed process also leaves the mesh's
+  /// mark file: without the mark file, the folder need not be searched. The caller must hold the mesh's lock.
   void removeAbandoned(const BatchMesh& mesh) const {
     if (!fs::exists(markOf(mesh))) return;
     const fs::path output = outputOf(mesh);
@@ -290,7 +289,7 @@ class Batch {
 
   Made built(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
-    const BuildMark mark(markOf(mesh));  // first, because the check writes a temporary file too
+    const BuildMark mark(markOf(mesh));  // created first, because `checkWritable` writes a file
     checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
     // Hash the file before reading the mesh: if the file changes in between, the next run notices that the hash
@@ -300,9 +299,9 @@ class Batch {
     try {
       write(mesh, field, content);
     } catch (const Error&) {
-      // If the file system lost the locks, another process may have presumed this process dead and removed its
-      // unfinished files. If that process has finished the mesh, use its field. Otherwise write again: the files are
-      // not removed a second time.
+      // If the file system lost the locks, another process may have removed the unfinished files of this process,
+      // because it presumed this process dead. If the other process has finished the field, use that field. Otherwise
+      // write the field again: the files are not removed a second time.
       if (std::optional<CurrentField> other = finished(mesh)) return {Status::elsewhere, std::move(other)};
       write(mesh, field, content);
     }
@@ -316,7 +315,7 @@ class Batch {
   }
 
   /// Returns the record of how the mesh's field file was built: program version, mesh, options and checksum of the
-  /// file. An existing field is reused only if the record stored beside it is identical.
+  /// file. A later run reuses the field only if it computes the same record.
   std::string recordText(const BatchMesh& mesh, const std::string& content) const {
     return jsonText({{"program", versionText()},
                      {"mesh", mesh.surface},

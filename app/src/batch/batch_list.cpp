@@ -14,7 +14,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-constexpr std::size_t kLongestReadable = 100;  // bytes; a file name with all its suffixes may have 255
+constexpr std::size_t kLongestReadable = 100;  // bytes; file systems allow 255 with number and suffixes
 
 /// Turns the name of a mesh into a readable file name: "torus_major_0.7" for builtin:torus,major=0.7, and "bunny" for
 /// scans/bunny.obj.

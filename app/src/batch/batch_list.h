@@ -15,9 +15,9 @@ struct BatchMesh {
 };
 
 /// Parses a list that names one mesh per line. Blanks around a name, empty lines, lines that begin with # and
-/// repeated lines are ignored. The file name of a mesh depends only on the mesh's line, so it stays the same
-/// when the list grows, and different lines give different file names. Throws `Error` for a line with a zero
-/// byte, as in the output of `find -print0` and in UTF-16, because the names in such a line would be lost.
+/// repeated lines are ignored. Different lines give different output file names. The output file name of a mesh
+/// depends only on the mesh's line, so it stays the same when the list grows. Throws `Error` for a line with a zero
+/// byte: the list is then not text with one name per line, but for instance the output of `find -print0` or UTF-16.
 std::vector<BatchMesh> parseBatchList(std::string_view text);
 
 }  // namespace hpsdf::app

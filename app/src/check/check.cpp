@@ -33,8 +33,8 @@ void setVerdict(CheckedItem& item, Verdict verdict, const std::string& problem) 
   item.problem = problem;
 }
 
-/// Stores the results of a comparison in the item: the number of differing pixels or values and, if `problem` is not
-/// empty, the verdict.
+/// Stores the results of a comparison in the item: the number and size of the differences and, if `problem` is not
+/// empty, the verdict that the item failed.
 void takeComparison(CheckedItem& item, const auto& comparison, bool sameShape, const std::string& problem) {
   item.compared = comparison.compared;
   item.differing = comparison.differing;
@@ -95,10 +95,10 @@ void reverseVerdict(CheckedItem& item, Verdict stated) {
                fmt::format("it is meant to fail with '{}', but: {}", verdictText(stated), item.problem));
 }
 
-using NegativeControls = std::map<int, Verdict>;  ///< expected failures of commands that are wrong on purpose, by line
+using NegativeControls = std::map<int, Verdict>;  ///< expected verdicts on deliberately wrong pictures, by script line
 
-/// Enables the commands in a script's comments "# wrong REASON: COMMAND", which draw wrong pictures on purpose. Every
-/// command keeps its line and column, so that error messages stay correct.
+/// Uncomments the commands in a script's lines "# wrong REASON: COMMAND". These commands draw wrong pictures on
+/// purpose. Every command keeps its line and column, so that error messages stay correct.
 NegativeControls enableControls(const std::string& file, std::string& text) {
   NegativeControls controls;
   std::size_t begin = 0;
@@ -202,7 +202,7 @@ class ScriptCheck {
     }
   }
 
-  /// Compares the files that a command has just written wrongly on purpose with the baselines of the same names.
+  /// Compares the deliberately wrong files that a command has just written with the baselines of the same names.
   void judgeControl(const Session& session, const Call& call, Verdict stated) {
     const fs::path kept = wrong_ / std::to_string(call.line);
     const auto pictures = comparableFiles(wrong_);

@@ -49,7 +49,7 @@ struct CheckedItem {
   double budget = 0;   ///< share of pixels or values that may differ
   std::string renderer = {};
   std::string baselineRenderer = {};
-  std::string where = {};                 ///< "file:line:column" of the command that wrote it
+  std::string where = {};                 ///< "file:line:column" of the command that wrote the file
   std::filesystem::path baseline = {};    ///< path of the accepted file, which may be missing
   std::filesystem::path actual = {};      ///< path of the new file, which may be missing
   std::filesystem::path difference = {};  ///< path of a picture of the differences; "" for none

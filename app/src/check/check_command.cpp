@@ -21,8 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns a text that identifies a folder, so that `accept` finds the results of the last check of the same
-/// folder.
+/// Returns the canonical path of a folder. The command `accept` compares it with the folder of the last check.
 std::string folderId(const fs::path& folder) { return fs::weakly_canonical(folder).string(); }
 
 // The implementation of the command `check`.

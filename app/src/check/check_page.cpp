@@ -31,8 +31,8 @@ i.color { display: inline-block; width: 1em; height: 1em; margin-right: .4em; bo
           vertical-align: -.15em; }
 )";
 
-/// JavaScript that copies the baseline and the actual picture into the slider below them, so that the page embeds every
-/// picture only once.
+/// JavaScript that copies the baseline and the actual picture into the comparison slider below them. The page therefore
+/// needs to embed every picture only once.
 constexpr std::string_view kScript = R"(<script>
 for (const slider of document.querySelectorAll('.slider')) {
   const [under, over] = slider.querySelectorAll('img');

@@ -15,7 +15,7 @@ void addProbeCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, shapes, doctor, set, include, help and docs
 void addVerifyCommand(Registry& registry);
 
-/// Adds the command `mesh`. The command `render`, whose camera parameters it shares, must already be in the registry.
+/// Adds the command `mesh`. The registry must already hold `render`, because `mesh` takes over its camera parameters.
 void addMeshCommand(Registry& registry);
 
 }  // namespace hpsdf::app

@@ -42,7 +42,7 @@ void saveMade(Session& session, const Arguments& arguments) {
   if (arguments.has("output")) saveCurrent(session, arguments.text("output"));
 }
 
-/// Describes the current field and the file to which it was saved, as JSON.
+/// Returns facts about the current field, and the file to which it was saved, as JSON.
 Json madeJson(const Session& session, const Arguments& arguments) {
   Json json = fieldJson(session.current());
   json["output"] = arguments.has("output") ? Json(arguments.text("output")) : Json();

@@ -46,7 +46,7 @@ struct Row {
 };
 
 /// Returns a histogram of the jumps across cell faces, one row for each power of ten. If some faces have no jump at
-/// all, an additional first row counts them.
+/// all, an additional first row counts these faces.
 std::vector<Row> histogramRows(const Jumps& jumps, JumpKind kind) {
   Row exact{"0", 0, {jumps.interfaces.size(), jumps.area}};
   std::vector<Row> rows;

@@ -56,7 +56,7 @@ class Query {
       std::string_view text = line;
       if (number == 1 && text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark
       take(trimmed(text), number);
-      if (in.rdbuf()->in_avail() <= 0) flush();  // before a wait for input: the sender may need the answers first
+      if (in.rdbuf()->in_avail() <= 0) flush();  // the sender may wait for the answers before it sends more
     }
     if (in.bad()) throw Error(name_ + ": cannot be read");
     flush();

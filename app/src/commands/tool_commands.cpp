@@ -21,8 +21,8 @@ namespace {
 
 constexpr int kMostNestedScripts = 16;
 
-/// Increments the session's count of running scripts while the object lives. Also sets --json for the
-/// commands that the script runs.
+/// Counts one more running script in the session while this object lives. During this time, `json` decides whether
+/// commands report as JSON.
 class ScriptScope {
  public:
   ScriptScope(Session& session, bool json) : session_(session), jsonBefore_(session.setJson(json)) {
@@ -94,8 +94,8 @@ void runShapes(Session& session, const Arguments& arguments) {
   }
 }
 
-/// Returns whether this processor supports each of the optional x86 instruction sets. Returns an empty object on other
-/// architectures.
+/// Returns, for each of the optional x86 instruction sets, whether this processor supports it. Returns an empty object
+/// on other architectures.
 Json simdOfCpu() {
 #if defined(__x86_64__) || defined(__i386__)
   __builtin_cpu_init();

@@ -25,7 +25,7 @@ class Failed : public Error {
 class CancelledPartway : public Cancelled {
  public:
   explicit CancelledPartway(std::string kept) : kept_(std::move(kept)) {}
-  /// Describes which results were kept, and how to continue the work.
+  /// Returns a text that says which results were kept, and how to continue the work.
   const std::string& kept() const { return kept_; }
 
  private:

@@ -94,7 +94,7 @@ Parameter threadsParameter(const std::string& result) {
 }
 
 Parameter pointsParameter(std::string help, std::string count, double minimum) {
-  constexpr double kMost = 1e8;  // needs 10 GB of memory, 100 bytes per point
+  constexpr double kMost = 1e8;  // 100 million points need 10 GB of memory
   return {"points", wholeNumber().within(minimum, kMost).byDefault(std::move(count)), std::move(help)};
 }
 

@@ -16,27 +16,27 @@ namespace hpsdf::app {
 /// that are settings of `BuildOptions` come from the table `buildSettings`.
 std::vector<Parameter> buildParameters();
 
-/// Returns the parameters that choose whether and how often the state of a running construction is saved.
+/// Returns the parameters that choose whether and how often a running construction saves a checkpoint.
 std::vector<Parameter> checkpointParameters();
 
 /// Returns the names of the parameters that set a stopping criterion of one of the kinds `endings`.
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings);
 
-/// Returns the command parameter for the setting `name` of the table `buildSettings`. `settingKind` returns only the
-/// values that this parameter accepts.
+/// Returns the command parameter for the setting `name` of the table `buildSettings`. The function `settingKind`
+/// returns only the `ParameterKind` of this parameter, which holds the accepted values.
 Parameter settingParameter(const char* name);
 ParameterKind settingKind(const char* name);
 
-/// Returns the parameter for the number of threads. Its help text says that the result is the same for any number of
-/// threads, in a sentence that begins with `result`, such as "The field is".
+/// Returns the parameter for the number of threads. Its help text contains `result`, such as "The field is", followed
+/// by "the same whatever their number".
 Parameter threadsParameter(const std::string& result);
 
-/// Returns the parameter for the number of random points. `seedParameter` returns the one for the seed of their random
-/// number generator.
+/// Returns the parameter for the number of random points. The function `seedParameter` returns the parameter for the
+/// seed of the random number generator.
 Parameter pointsParameter(std::string help, std::string count, double minimum);
 Parameter seedParameter(std::string help = "Which points.");
 
-/// Returns the settings of a construction from the arguments of `buildParameters`. Explicitly given options override
+/// Converts the arguments of `buildParameters` into the options of a construction. Explicitly given arguments override
 /// the preset --paper.
 BuildOptions buildOptions(const Arguments& arguments);
 
@@ -46,14 +46,13 @@ DistanceOptions distanceOptions(const Arguments& arguments);
 /// Returns true if the arguments ask for the mesh to be scaled and centred.
 bool wantsNormalized(const Arguments& arguments);
 
-/// Returns the domain of the field that the arguments ask for. `surface` is the bounding box of the surface.
+/// Returns the field's domain, as the arguments specify it. `surface` is the bounding box of the surface.
 Box domainFrom(const Arguments& arguments, const Box& surface);
 
-/// Throws `Error` if the arguments of `buildParameters` are inconsistent, so that no field could be built
-/// from any surface.
+/// Throws `Error` if the arguments of `buildParameters` are invalid or contradict each other, whatever the surface.
 void requireConsistent(const Arguments& arguments);
 
-/// Throws `Error` if the option `name` is given without the option `owner`, without which it has no effect.
+/// Throws `Error` if the option `name` is given but the option `owner` is not. Without `owner`, `name` has no effect.
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven);
 
 /// Tells whether the resulting field depends on this parameter of `buildParameters`.

@@ -53,7 +53,7 @@ std::filesystem::path checkpointOf(const std::filesystem::path& output) { return
 
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   return namingSurface(surface, [&]() -> BuildInput {
-    // Convert the arguments to options first: this finds mistakes in the arguments before the long work starts.
+    // Convert the arguments to options first, to find mistakes in the arguments before the long work starts.
     BuildOptions options = buildOptions(arguments);
     const DistanceOptions insideOptions = distanceOptions(arguments);
     refuseInsideTestOfAnalytic(surface, arguments);

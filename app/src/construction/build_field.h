@@ -13,8 +13,7 @@
 
 namespace hpsdf::app {
 
-/// The distance function of a surface, together with the domain, the options and the other inputs of a
-/// construction.
+/// The inputs of a field's construction, such as the surface's distance function, the domain and the options.
 struct BuildInput {
   std::shared_ptr<const DistanceFunction> exact;
   std::optional<MeshReport> mesh;  ///< empty for an analytic shape
@@ -34,8 +33,9 @@ struct BuiltField {
 };
 
 /// Loads the surface and builds its field. Progress and warnings go to the console's `err`. If `checkpoint` names a
-/// file, the construction continues from the state in this file, and the arguments must contain those of
-/// `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled` after Ctrl-C.
+/// file, the construction saves its state in this file and continues from the state of an earlier call. In this case
+/// the arguments must include those of `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled` after
+/// Ctrl-C.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 

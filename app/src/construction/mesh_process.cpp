@@ -41,7 +41,7 @@ constexpr const char* kCommand = "__read-mesh";  // hidden command, followed by 
 constexpr const char* kSecondsVariable = "HPSDF_IMPORT_SECONDS";
 constexpr const char* kBytesVariable = "HPSDF_IMPORT_BYTES";
 constexpr auto kInterruptInterval = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
-constexpr double kSilentSeconds = 2;  // time before progress is shown: processes may start slowly
+constexpr double kSilentSeconds = 2;  // progress is shown only after this time: processes may start slowly
 
 // Limits of time and memory for reading a mesh file. They are generous: an idle machine reads 20 MB/s and needs 4 to 9
 // bytes of memory for each byte of the file (docs/meshes.md).
@@ -140,8 +140,8 @@ class Reading {
     }
   }
 
-  /// Reads the length of the other process's reply from its header and reserves memory for it. The memory limit applies
-  /// here too: a reply may be long although the other process needed little memory.
+  /// Reads the length of the reply from the reply's header and reserves memory for the reply. Throws if the length
+  /// exceeds the memory limit: a reply may be long although the process that sends it needed little memory.
   void expectWhole() {
     expected_ = replyBytes(bytes_);
     if (expected_ > limits_.bytes) throw tooLarge();
@@ -187,8 +187,8 @@ void toStandardOutput(std::span<const std::byte> bytes) {
   }
 }
 
-/// Ends the process that reads a mesh file at once when it runs out of memory. If bad_alloc were thrown instead, the
-/// importer assimp would catch it and report a damaged file, or continue.
+/// Ends the process that reads a mesh file as soon as it runs out of memory. If bad_alloc were thrown instead, the
+/// importer assimp would catch the exception and report a damaged file, or continue.
 void onMemoryOut() {
   writeOutOfMemory(toStandardOutput);
   _exit(0);

@@ -26,19 +26,18 @@ ReadingLimits readingLimits(const std::filesystem::path& file);
 /// Returns the path of the running program's executable file, or an empty path if it cannot be found out.
 std::filesystem::path ownProgram();
 
-/// Calls `importMesh` in a separate process of `program`, which must come from the same build as this
-/// program. Throws `Error` naming the file if the file cannot be read, and if that process dies, sends a
-/// damaged reply or exceeds a limit. Throws `Cancelled` on cancellation. The separate process has always
-/// ended when the function returns or throws.
+/// Reads a mesh file in a separate process. The process runs `program`, which must come from the same build as this
+/// program. Throws `Error` naming the file if the file cannot be read, or if the process dies, sends a damaged reply
+/// or exceeds a limit. Throws `Cancelled` on cancellation. When the function returns or throws, the process has ended.
 ImportedMesh importInSubprocess(const std::filesystem::path& program, const std::filesystem::path& file,
                                 const ReadingLimits& limits, const Progress& progress);
 
-/// True if these command-line words are the hidden command with which `importInSubprocess` starts the process that
-/// reads a mesh file.
+/// True if the command-line words are the hidden command that reads a mesh file. `importInSubprocess` starts a process
+/// with this command.
 bool asksForReading(std::span<const std::string> words);
 
-/// Runs in the separate process. Reads the mesh file that `words` name, within the limits that they give, and writes
-/// the reply to standard output (mesh_reply.h). Returns the exit status.
+/// Reads the mesh file that `words` name and writes it as a reply (mesh_reply.h) to standard output. `words` also give
+/// the limits of time and memory. Runs in the separate process. Returns the exit status.
 int readForOtherProcess(std::span<const std::string> words);
 
 }  // namespace hpsdf::app

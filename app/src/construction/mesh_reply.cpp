@@ -38,7 +38,7 @@ struct Header {
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
   std::uint64_t textBytes = 0;
-  // The remaining members transfer members of the `MeshReport`.
+  // The following members are copies of members of the `MeshReport`.
   std::array<std::uint64_t, std::size(kCounts)> counts = {};
   std::array<double, 3> degeneratePosition = {};
   std::array<double, 3> duplicatePosition = {};

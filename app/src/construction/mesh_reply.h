@@ -1,6 +1,6 @@
 #pragma once
-// The reply of the process that reads a mesh file, as bytes. docs/meshes.md explains why a separate process
-// reads the file. The code that parses a reply trusts none of its bytes, since the mesh file may have
+// Converts the reply of the process that reads a mesh file to bytes and back. docs/meshes.md explains why a separate
+// process reads the file. The code that parses a reply trusts none of its bytes, since the mesh file may have
 // corrupted the process that wrote them.
 
 #include <cstddef>
@@ -43,7 +43,7 @@ MeshReply parseReply(std::span<const std::byte> bytes);
 /// A function that receives the bytes of a reply in pieces.
 using ReplySink = std::function<void(std::span<const std::byte>)>;
 
-/// The functions from here on write a reply. They allocate no memory, so that they work even when no memory is left.
+/// Writes a mesh as a reply. This function and the next two allocate no memory: they work even when none is left.
 void writeMesh(const ImportedMesh& imported, const ReplySink& sink);
 void writeRefusal(std::string_view reason, const ReplySink& sink);  ///< a very long reason is cut off
 void writeOutOfMemory(const ReplySink& sink);

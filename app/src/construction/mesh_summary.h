@@ -18,12 +18,12 @@ std::string faultyEdges(const MeshReport& report);
 
 std::string closednessText(const MeshReport& report);
 
-/// Returns the name of an inside test, a method that tells inside from outside, as the option --sign spells it. Returns
-/// "unknown" for `automatic`.
+/// Returns the name of an inside test as the option --sign spells it. An inside test is a method that tells inside from
+/// outside. Returns "unknown" for `automatic`.
 std::string insideTestName(InsideTest sign);
 
-/// Explains why an inside test was chosen, with a position: "the mesh meets itself, as at (0, 1, 2)". `mesh` is the
-/// bounding box of the mesh.
+/// Returns the reason why an inside test was chosen, with a position if one is known: "the mesh meets itself, as at
+/// (0, 1, 2)". `mesh` is the bounding box of the mesh.
 std::string reasonText(const InsideTestChoice& choice, const Box& mesh);
 
 }  // namespace hpsdf::app

@@ -17,8 +17,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Memory in bytes per mesh face for setting up an exact distance function. The outer hull needs kBytesPerHullFace, and
-/// additional memory for at most 250,000 pieces of intersected faces.
+/// Memory for setting up an exact distance function, in bytes per mesh face. With the outer hull as inside test it is
+/// kBytesPerHullFace, and at most 250,000 pieces of intersected faces need additional memory.
 constexpr double kBytesPerFace = 520, kBytesPerHullFace = 800;
 
 DistanceFunction normalizedFunction(const DistanceFunction& distance) {
@@ -36,7 +36,7 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
 }
 
 void warnOfSpacing(const Console& console, const std::string& surface, const TriangleMesh& mesh) {
-  constexpr double kNegligible = 1e-6;  // fraction of the mesh's size; scans and fields are less exact
+  constexpr double kNegligible = 1e-6;  // relative to the mesh's size; scans and fields have larger errors
   const Box box = boundingBox(mesh);
   const double spacing = coordinateSpacing(surface, mesh), size = box.sizes().maxCoeff();
   if (!(spacing > kNegligible * size)) return;
@@ -61,7 +61,7 @@ struct SharedDistance {
 };
 
 /// Reports which inside test (method to tell inside from outside) was chosen. A closed mesh without self-intersections
-/// needs no report. The position in `choice` is in units of the normalized mesh, the position in `report` in units of
+/// needs no report. The position in `choice` is in units of the normalized mesh. Positions in `report` are in units of
 /// the file.
 void tellInsideTest(const Console& console, const std::string& surface, const MeshReport& report,
                     InsideTestChoice choice, const Normalization& normalization) {

@@ -52,7 +52,7 @@ std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const Tr
 std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<const ExactDistance>& exact,
                                                           const Normalization& normalization);
 
-/// Sets up the distance function of a prepared surface. Reports which inside test is used if the choice is not evident.
+/// Sets up the distance function of a prepared surface. If the choice of the inside test is not evident, reports it.
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options);
 

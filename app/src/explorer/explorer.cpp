@@ -23,9 +23,9 @@ double rounded(double value, double step) { return std::round(value / step) * st
 
 std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
 
-/// Returns the command and parameter names of a script line, without values. If two successive lines have the same
-/// names, the second line alone has the effect of both. Returns "" for a line whose effect depends on the explorer's
-/// previous state.
+/// Returns the names of the command and the parameters in a script line, without values. If two successive lines have
+/// the same names, the second line alone has the effect of both lines. Returns "" for a command whose effect depends on
+/// the explorer's previous state.
 std::string kindOf(const std::string& line) {
   constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
                                    "arrows", "color",  "panel",   "worst", "settings"};
@@ -87,8 +87,8 @@ Explorer::Explorer(Session& session) : session_(session) {
 }
 
 void Explorer::change(ViewState next) {
-  // During a gesture, such as the drag of a slider, a command can replace the previous one. It then starts from the
-  // history before the gesture.
+  // During a gesture, such as the drag of a slider, a command can replace the previous command. The new command then
+  // starts from the history before the gesture.
   if (!replaces_) before_ = {view_, undone_.size(), redone_};
   undone_.resize(before_.undone);
   redone_ = before_.redone;
@@ -110,7 +110,7 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   const Field& field = current.field;
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
   BuildOptions built = settingsOf(field.data());
-  // A field without a target error was ended by another limit. The error that it reached then serves as the target.
+  // If the construction had no target error, use the error that the field reached as the target.
   if (built.targetError.isNone() && !(built.maxError > 0)) built.targetError = field.metadata().totalError;
   std::map<std::string, std::string> settings;
   for (const BuildSetting& setting : buildSettings()) {
@@ -184,8 +184,8 @@ void Explorer::run(const std::string& line) {
 }
 
 void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
-  // Jumps are measured before the frame is drawn. Long work must not start while the panels are being drawn,
-  // because the listener of long work draws the panels too.
+  // Measure the jumps before the panels are drawn. The measurement is long work: its progress display draws the panels
+  // too, so it must not start while they are being drawn.
   const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
   if (!work && showsJumps) session_.jumps();
   if (!work && view_.isOpen(Panel::readout) && beside_ && !isStale()) session_.otherJumps(view_.beside);
@@ -267,8 +267,8 @@ std::string Explorer::dragCommand(double dx, double dy) const {
   if (*dragged_ == 0)
     return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesPerPixel * dx, 0.1),
                        std::clamp(rounded(c.elevationDegrees + kDegreesPerPixel * dy, 0.1), -90.0, 90.0), c.distance);
-  // A drag with any button except the left one moves the camera's target together with the mouse. `scale` is
-  // half the extent of the picture in the plane of the target, in world units.
+  // A drag with any button except the left one moves the camera's target together with the mouse. In the plane of the
+  // target, the vectors scale · right and scale · up are half the picture's width and height.
   const auto camera = render::cameraOf(c, field.domain(), int(width), int(height));
   const double scale =
       c.projection == render::Projection::perspective ? c.distance * field.domain().diagonal().norm() : 1;
@@ -319,7 +319,7 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
     picture.scale = scale;
     return picture;
   };
-  // Place the plane and the camera relative to the current field, even if `field` is the second field drawn beside it.
+  // Place the plane and the camera relative to the current field, even if `field` is the other field, drawn beside it.
   // Both pictures then show the same part of space.
   const Field& current = session_.current().field;
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), reference)

@@ -52,12 +52,12 @@ class Explorer final : public SessionExtension {
   /// std::nullopt if unknown.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
-  /// Handles one mouse or keyboard event: draws the panels, then runs the commands that their widgets ask for.
+  /// Handles one mouse or keyboard event: draws the panels, then runs the commands that the widgets request.
   /// Exceptions of these commands are passed on to the caller. While long work runs, an event can only cancel
   /// the work.
   void input(const Input& event);
   /// Ends all input that a recorded script cannot reproduce: releases the mouse buttons, closes open lists and discards
-  /// a text that is being typed. The pointer keeps its position. Errors of commands that this triggers are ignored.
+  /// a text that is being typed. The pointer keeps its position. Ignores errors of commands that run as a result.
   void releaseInput();
 
   /// Returns the widgets of the present frame by their paths, such as "bar/undo".
@@ -129,8 +129,8 @@ class Explorer final : public SessionExtension {
   Ui ui_;
   ViewState view_;
   std::vector<ViewState> undone_, redone_;
-  /// The explorer's state and undo history before a mouse gesture. If a command of the gesture replaces the previous
-  /// one, it starts from this state and history.
+  /// The explorer's state and undo history before a mouse gesture. A command of the gesture that replaces the previous
+  /// command first restores this history. One undo therefore reverts the whole gesture.
   struct History {
     ViewState view;
     std::size_t undone = 0;  ///< number of states in `undone_`
@@ -138,7 +138,7 @@ class Explorer final : public SessionExtension {
   };
   History before_;
   std::map<std::string, std::string> settings_;
-  std::string lastKind_;  ///< names in the gesture's last command, see `kindOf`
+  std::string lastKind_;  ///< command and parameter names in the gesture's last line of script
   bool running_ = false;
   bool replaces_ = false;  ///< true if the running command replaces the previous one
 
@@ -148,7 +148,7 @@ class Explorer final : public SessionExtension {
 
   std::optional<FieldStatistics> figures_;
   std::vector<std::size_t> worst_;
-  std::optional<JumpKind> worstBy_;  ///< measure by which worst_ is sorted
+  std::optional<JumpKind> worstBy_;  ///< kind of jump by which `worst_` is sorted
 
   std::optional<render::Drawn> picture_;
   std::optional<render::Drawn> beside_;  ///< picture of the second field, beside the current one
@@ -158,7 +158,7 @@ class Explorer final : public SessionExtension {
   std::size_t fields_ = 0;  ///< number of fields so far, which identifies the current field
 
   std::optional<int> dragged_;           ///< mouse button that was pressed over the picture and is held
-  std::array<double, 2> dragFrom_ = {};  ///< pointer when the button was pressed, pixels
+  std::array<double, 2> dragFrom_ = {};  ///< pointer position when the button was pressed, pixels
   ViewState viewAtPress_;
 };
 

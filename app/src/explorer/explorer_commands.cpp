@@ -79,7 +79,7 @@ void runFly(Session& session, const Arguments& arguments) {
     view.camera.target = to.point;
     view.camera.distance = 10 * to.cellSize / field.domain().diagonal().norm();
     // The surface may hide a point that does not lie on it. In that case a clip plane through the point removes
-    // the part in front of the point.
+    // the part of the surface in front of the point.
     view.clip.reset();
     if (std::abs(field.value(to.point) - view.surfaceOffset) > to.cellSize) {
       const Vector3 forward = render::cameraOf(view.camera, field.domain(), 16, 16).forward;

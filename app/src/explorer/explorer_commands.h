@@ -14,9 +14,9 @@ void addExplorerCommands(Registry& registry);
 /// Adds the command `ui`, with which a script sends mouse and keyboard events to the explorer.
 void addUiCommand(Registry& registry);
 
-/// Returns the action of a command that changes the explorer's state. The action applies `change` to a copy, which then
-/// replaces the state, so that an exception leaves the state as it was. `undo` reverts all changes of one action
-/// together.
+/// Returns the action of a command that changes the explorer's state. The action applies `change` to a copy of the
+/// state and then replaces the state by the copy. If `change` throws, the state remains as it was. One `undo` reverts
+/// all changes of one action.
 std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&));
 
 /// Adds the commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows and beside.

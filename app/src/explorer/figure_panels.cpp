@@ -72,8 +72,8 @@ void drawHistogramColumn(float x, float width, float bottom, float bar, ImU32 co
   centered(std::to_string(level), bottom + 2, kInk);
 }
 
-/// Draws a histogram of the shares of the volume that each level (a degree or depth) takes. If `legend` is given, its
-/// colours are used for the columns.
+/// Draws a histogram with one column for each level (a degree or depth). The column shows the level's share of the
+/// volume. If `legend` is given, the columns have the colours of the legend.
 void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& shares, const render::Legend* legend) {
   ui.text(title);
   const ImVec2 from = ImGui::GetCursorScreenPos();

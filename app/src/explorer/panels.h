@@ -32,9 +32,9 @@ inline void textAt(float x, float y, const std::string& text, ImU32 color) {
   ImGui::GetWindowDrawList()->AddText({std::round(x), std::round(y)}, color, text.c_str());
 }
 
-/// The controls of the explorer's panels. Each control shows a part of the state. When a person uses a
-/// control, it appends a command to `commands` and does not change the state itself. The parameter `command`
-/// of a control is the beginning of a line of script, to which the control appends the chosen value.
+/// The controls of the explorer's panels. Each control shows a part of the explorer's state. When a person uses a
+/// control, the control does not change the state but appends a line of script to `commands`. The line consists of the
+/// control's parameter `command` and the chosen value.
 struct Controls {
   Ui& ui;
   std::vector<std::string>& commands;

@@ -69,7 +69,7 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Bo
   controls.field("view/depths", "of depths", levelText(view.cells.depths), "cells depths=");
 }
 
-/// Draws the controls for the limits of the colour scale. `automatic` holds the limits in the present picture.
+/// Draws the controls for the limits of the colour scale. `automatic` holds the limits that the present picture uses.
 void drawColorRange(const Controls& controls, const Coloring& colors,
                     const std::optional<std::array<double, 2>>& automatic) {
   const auto pin = [&](const std::string& range) {
@@ -103,8 +103,8 @@ void drawColors(const Controls& controls, const ViewState& view, const std::opti
   drawColorRange(controls, colors, picture ? picture->scale.limits : std::nullopt);
 }
 
-/// The controls of the parameters of `build`. Each control shows the value in `settings`, or the value of the
-/// current field if `settings` has none.
+/// The controls for the parameters of `build`. Each control shows its parameter's value in `settings`, or the value of
+/// the current field if `settings` does not contain the parameter.
 struct BuildControls {
   const Controls& controls;
   const std::map<std::string, std::string>& settings;

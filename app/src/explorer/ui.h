@@ -82,8 +82,8 @@ class Ui {
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
 
-  // The function `widgets` that is passed to `frame` calls the following functions, which draw widgets. A path has the
-  // form panel/name. A label may be empty. The functions return the change that the user made in this frame.
+  // The following functions draw widgets. The argument `widgets` of `frame` calls them. They return the change that
+  // the user made in this frame. A path has the form panel/name. A label may be empty.
 
   /// Draws the background of a panel and calls `content` to fill the panel. `scroll` is the scroll position in
   /// pixels, or std::nullopt for a panel that never scrolls. Returns the new scroll position.

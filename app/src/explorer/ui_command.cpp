@@ -54,8 +54,8 @@ void runUi(Session& session, const Arguments& arguments) {
   try {
     explorer.frame();  // the readout and the colour panel need the picture
   } catch (const Error&) {
-    // An error of the picture is ignored here, because the widgets work without a picture and may be needed to
-    // correct its settings. The command `shot` reports the error.
+    // Ignore an error in drawing the picture: the widgets work without a picture, and may be needed to correct the
+    // picture's settings. The command `shot` reports the error.
   }
   if (action == "list") {
     for (const auto& [path, widget] : explorer.widgets())

@@ -22,7 +22,7 @@ struct Coloring {
   render::ColorBy by;
   render::ScaleOptions scale = {};
   std::string other = {};  ///< file of the field to compare with, for `ColorBy::difference`
-  std::string mesh = {};   ///< surface that the field was made from, for `ColorBy::error`; empty if the field names it
+  std::string mesh = {};   ///< surface of the field, for `ColorBy::error`; if empty, the surface that the field names
 };
 
 struct ViewState {

@@ -61,7 +61,7 @@ DataTable readPfm(const std::string& file, const std::string& text) {
   double scale = 0;
   stream >> kind >> table.columns >> table.rows >> scale;
   const auto begin = static_cast<std::size_t>(std::max<std::streamoff>(stream.tellg(), 0)) + 1;
-  // A number of rows or columns above the file's size in bytes is wrong, and the product computed below might overflow.
+  // Reject a file that states more rows or columns than it has bytes: their product might overflow.
   const bool isWithin = table.columns <= text.size() && table.rows <= text.size();
   const std::size_t count = table.columns * table.rows;
   if (!stream || !isWithin || kind != "Pf" || scale >= 0 || begin > text.size() ||

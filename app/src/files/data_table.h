@@ -17,8 +17,8 @@ struct DataTable {
 
 bool isDataFile(const std::filesystem::path& file);
 
-/// Reads a .csv file of numbers, whose first line may hold the names of the columns, or a .pfm file with one
-/// channel. Throws `Error` naming the file.
+/// Reads a .pfm file with one channel or a .csv file of numbers. The first line of a .csv file may hold column names.
+/// Throws `Error` naming the file.
 DataTable loadData(const std::filesystem::path& file);
 
 struct DataDifference {
@@ -43,7 +43,7 @@ constexpr std::size_t kWorstData = 10;
 
 DataComparison compare(const DataTable& baseline, const DataTable& actual, double bound);
 
-/// Describes a failed comparison in one line. Returns "" if the two tables have the same shape and at most
+/// Returns one line that says why a comparison failed. Returns "" if the two tables have the same shape and at most
 /// the share `budget` of the values differs.
 std::string problem(const DataComparison& comparison, double bound, double budget);
 

@@ -58,8 +58,8 @@ void Film::add(const render::Image& image, Json figures) {
 void Film::encode(double framesPerSecond, const Progress& progress) {
   if (folder_) return;
   if (progress.report) progress.report("encoding", 0);
-  // Encode with 4:2:0 chroma subsampling, which every player supports. It requires an even width and height, so
-  // pictures of odd size are padded.
+  // Encode with 4:2:0 chroma subsampling, which every player supports. This format requires an even width and height,
+  // so pictures of odd size are padded.
   const std::string problem =
       runOtherProgram(ffmpeg_,
                       {"-hide_banner", "-loglevel", "error", "-y", "-framerate", fmt::format("{}", framesPerSecond),

@@ -26,15 +26,15 @@ class Film {
   void add(const render::Image& image, Json figures);
   std::size_t frames() const { return rows_.size(); }
 
-  /// Encodes the MP4 file. Call it after the last frame. Does nothing if the output is a folder. Throws `Error`
-  /// with the last line that ffmpeg wrote if ffmpeg fails.
+  /// Encodes the MP4 file. Call it after the last frame. Does nothing if the output is a folder. If ffmpeg
+  /// fails, throws `Error` with the last line that ffmpeg wrote.
   void encode(double framesPerSecond, const Progress& progress);
 
   /// Moves the finished film to its output. Returns a description of the film, which is also written as
   /// frames.json if the output is a folder.
   Json publish(const std::string& renderer);
 
-  /// Describes the film in one line. `about` is the result of `publish`.
+  /// Returns a description of the film in one line. `about` is the object that `publish` returned.
   static std::string line(const Json& about);
 
  private:

@@ -35,7 +35,7 @@ std::string reportHtml(const ReportPage& page);
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle);
 std::string htmlFoot(const std::string& footer);
 
-/// Returns a row of an HTML table with a name and its value. Both texts are escaped here.
+/// Returns a row of an HTML table with a name and its value. The function escapes both texts.
 std::string htmlFact(const std::string& name, const std::string& value);
 
 /// Encodes the bytes of a PNG file as the source of an <img> element, so that the HTML page contains the

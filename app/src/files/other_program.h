@@ -42,7 +42,7 @@ class OtherProcess {
 };
 
 /// Runs the program in `folder`. The program must write the file `result` there. Returns "" on success, and
-/// otherwise what went wrong: "gnuplot failed with status 1 (the last line that it wrote)". Throws `Error` if
+/// otherwise a message such as "gnuplot failed with status 1 (the last line that it wrote)". Throws `Error` if
 /// the program cannot be started. If `cancelled` returns true, ends the program and throws `Cancelled`.
 std::string runOtherProgram(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                             const std::filesystem::path& folder, const std::string& result,

@@ -13,7 +13,7 @@ namespace hpsdf::app {
 
 /// A folder for results. If the folder or its parents do not exist, the constructor creates them. Unless
 /// `keep` was called, the destructor removes those folders that the constructor created and that are empty.
-/// Other folders and files are never removed by the destructor.
+/// The destructor never removes other folders or files.
 class OutputFolder {
  public:
   /// Creates the folder if it does not exist. Throws `Error` naming the folder if it cannot be created.
@@ -24,16 +24,15 @@ class OutputFolder {
 
   void keep() { created_.clear(); }
 
-  /// Writes a file under a temporary name. `commit` renames all files written in this way to their final names
-  /// and keeps the folder. Without `commit` the files are removed, and older files of the same names stay.
-  /// `write` and `commit` throw `Error` as `OutputFile` does.
+  /// Writes a file under a temporary name. `commit` renames all written files to their final names and keeps the
+  /// folder. Without `commit` the written files are removed, and older files with the final names stay. `write` and
+  /// `commit` throw `Error` as `OutputFile` does.
   void write(const std::string& name, std::string_view bytes);
   void commit();
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// Throws `Error` if the folder holds files but not the file `marker`, which identifies a folder of earlier
-  /// results.
+  /// Throws `Error` if the folder holds files but not the file `marker`. This file marks a folder of earlier results.
   void requireOwn(const std::string& marker) const;
 
   /// Writes the file `marker`, so that the folder is recognized even if the run ends without results. Then removes the

@@ -12,8 +12,8 @@ namespace hpsdf::app {
 /// The length in bytes of the largest text that is accepted. Scripts and lists of meshes are never this long.
 constexpr std::size_t kMostTextBytes = std::size_t{1} << 26;
 
-/// Opens a file for reading. Throws `Error` if it cannot be read or is a folder; the message then asks for
-/// `wanted`.
+/// Opens a file for reading. Throws `Error` if the file cannot be read or is a folder. For a folder, the error message
+/// asks for `wanted` instead.
 std::ifstream openFile(const std::filesystem::path& file, const std::string& wanted = "a file");
 
 /// Reads a stream to its end. Messages refer to the stream by `name`. Throws `Error` if the stream is longer
@@ -28,8 +28,8 @@ std::string readTextFile(const std::string& file);
 /// accepts files longer than `kMostTextBytes`.
 std::string readWholeFile(const std::string& file);
 
-/// Writes a file under a temporary name and then renames it to `file`. If this fails, throws `Error` naming
-/// the file and leaves no temporary file behind.
+/// Writes a file under a temporary name and then renames it to `file`. If the file cannot be written, throws `Error`
+/// naming the file and leaves no temporary file behind.
 void writeTextFile(const std::filesystem::path& file, std::string_view text);
 
 }  // namespace hpsdf::app

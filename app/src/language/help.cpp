@@ -166,8 +166,8 @@ std::string markdownNames(const std::vector<const Parameter*>& parameters) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// Describes the parameters that only this command has, by group, and refers to the descriptions of parameters that it
-/// shares with other commands.
+/// Returns descriptions of the parameters that only this command has, by group, and references to the descriptions of
+/// the parameters that the command shares with other commands.
 std::string markdownParameters(const Registry& registry, const Command& command) {
   std::string text;
   std::vector<const Parameter*> shared;

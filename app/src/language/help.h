@@ -17,7 +17,7 @@ enum class HelpDetail : std::uint8_t {
 /// Returns a description of the program, with a first session and a list of all commands.
 std::string overviewHelp(const Registry& registry);
 
-/// Describes one command: usage, purpose, examples, and its parameters by group.
+/// Returns the help text of one command: usage, purpose, examples, and its parameters by group.
 std::string commandHelp(const Command& command, HelpDetail detail);
 
 /// Returns the text of the page docs/commands.md. An option that several commands share is described only
@@ -25,7 +25,7 @@ std::string commandHelp(const Command& command, HelpDetail detail);
 /// "Shared options".
 std::string commandsMarkdown(const Registry& registry);
 
-/// Describes all commands and their parameters as JSON.
+/// Returns descriptions of all commands and their parameters as JSON.
 nlohmann::ordered_json commandsJson(const Registry& registry);
 
 }  // namespace hpsdf::app

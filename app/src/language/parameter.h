@@ -25,8 +25,8 @@ enum class ParameterType : std::uint8_t {
   size,  ///< WIDTHxHEIGHT
 };
 
-/// Tells when a parameter is required. `onCommandLine` is for a field: a script can use the current field
-/// instead, but a command line starts without a current field.
+/// Tells when a parameter is required. `onCommandLine` is for the parameter that names a field file: scripts may omit
+/// it and use the current field, but a command line starts without a current field.
 enum class Need : std::uint8_t { optional, onCommandLine, always };
 
 /// Headings for parameters that several commands have. In help texts the heading `kGeneral` comes last.
@@ -51,7 +51,7 @@ struct ParameterKind {
   Need need = Need::optional;
   std::string synonym = {};  ///< second accepted name, which help texts prefer; "" without one
   std::string group = {};    ///< heading above the parameter in help texts; "" for "Options"
-  bool isAdvanced = false;   ///< help texts show it only where all options are asked for: --help-all, docs/commands.md
+  bool isAdvanced = false;   ///< shown only in complete lists of options: --help-all, docs/commands.md
 
   ParameterKind& byDefault(std::string text) { return set(defaultText, std::move(text)); }
   ParameterKind& in(std::string nameOfUnit) { return set(unit, std::move(nameOfUnit)); }

@@ -66,8 +66,8 @@ std::optional<bool> parseFlag(std::string_view text) {
   return std::nullopt;
 }
 
-/// Describes how many values a parameter accepts: "a number", "3 numbers with commas between them". Consecutive counts
-/// share one description, such as "2 to 4 numbers with commas between them".
+/// Returns texts that say how many values a parameter accepts: "a number", "3 numbers with commas between them".
+/// Consecutive counts share one text, such as "2 to 4 numbers with commas between them".
 std::vector<std::string> countForms(const Parameter& parameter) {
   const char* kind = parameter.whole ? "whole number" : "number";
   std::vector<std::string> forms;
@@ -268,8 +268,8 @@ class ArgumentReader {
   }
 
   void refuseUnknown(const std::vector<std::string>& extras) const {
-    // Find the word that is the unknown option. The value of this option is left over as a positional word too,
-    // but the error must name the option itself.
+    // Find the unknown option among the words that the parser left over. The option's value may be left over too, but
+    // the error must name the option.
     const auto option = std::ranges::find_if(extras, [](const std::string& word) { return word.starts_with('-'); });
     if (option != extras.end()) {
       const std::string written = option->substr(0, option->find('='));

@@ -107,7 +107,7 @@ enum class Origin : std::uint8_t { commandLine, script };
 class ArgumentError : public Error {
  public:
   ArgumentError(const std::string& message, std::size_t word) : Error(message), word_(word) {}
-  /// Index of the word that is not accepted, or the number of words if one is missing.
+  /// Index of the word that is not accepted, or the number of words if a word is missing.
   std::size_t word() const { return word_; }
 
  private:
@@ -122,7 +122,7 @@ Arguments parseArguments(const Command& command, std::span<const Word> words, Or
 /// Runs the command. Throws `Error` before any work starts if an output file is also one of the input files.
 void perform(const Command& command, Session& session, const Arguments& arguments);
 
-/// Describes the accepted values of a parameter, e.g. "a whole number from 1 to 30".
+/// Returns a description of the values that a parameter accepts, e.g. "a whole number from 1 to 30".
 std::string expectedValue(const Parameter& parameter);
 
 /// Parses the whole `text` as one finite number. Returns std::nullopt if `text` is anything else.

@@ -26,9 +26,9 @@ struct Call {
 };
 
 /// Reads and checks a whole script, so that a mistake in the last line is found before the first line runs.
-/// `name` is the file name of the script: messages begin with it, and included files are searched in its
-/// folder. Words of the form $name are replaced by the values in `variables`. The calls refer to commands of
-/// the registry, which must outlive them. Throws `Error` "file:line:column: …".
+/// `name` is the file name of the script: error messages begin with this name, and included files are searched in the
+/// script's folder. Words of the form $name are replaced by the values in `variables`. The registry must outlive the
+/// calls, which refer to its commands. Throws `Error` "file:line:column: …".
 std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
                               Variables variables);
 

@@ -25,9 +25,9 @@ Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int
           {"slope", gradient.norm()}};
 }
 
-/// Returns the value, gradient and cell of the field at a pixel of the last picture, or null if the pixel shows no part
-/// of the field. If `withAll` is true, adds figures that take long to compute: the exact distance, if it is known, and
-/// the jumps at the nearest face of the cell.
+/// Returns the value, gradient and cell of the field at the point that a pixel of the last picture shows. Returns null
+/// if the pixel shows no part of the field. If `withAll` is true, adds figures that take long to compute: the exact
+/// distance, if it is known, and the jumps of the field at the nearest face of the cell.
 Json pickJson(Session& session, int x, int y, bool withAll) {
   const Field& field = session.current().field;
   const auto pick = render::pickAt(field, session.picture(), x, y);

@@ -56,7 +56,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
       progress.update("drawing frames", double(frame) / frames);
       picture.camera.azimuthDegrees = first + 360.0 * frame / frames;
       const render::Drawn drawn = render::drawSurface(renderer, field, picture, reference);
-      picture.scale = drawn.scale;  // all frames use the colour scale of the first
+      picture.scale = drawn.scale;  // all frames use the first frame's colour scale
       any |= drawn.seen;
       film.add(drawn.image, {{"azimuth", picture.camera.azimuthDegrees}});
     }
@@ -112,8 +112,8 @@ render::Drawn drawFrame(Session& session, const Call& call, const std::optional<
   return drawn(slicePicture(arguments, domain), render::drawSlice);
 }
 
-/// Returns the numbers of refinement steps after which a frame is drawn, strictly ascending: 0, then a
-/// geometric sequence from 1 to `all`. The result has `frames` elements, or all + 1 elements if that is less.
+/// Returns the numbers of refinement steps after which a frame is drawn: 0, then a geometric sequence from 1 to `all`.
+/// The numbers ascend strictly. There are `frames` numbers, or all + 1 numbers if all + 1 is less than `frames`.
 std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   frames = std::min<std::uint64_t>(frames, all + 1);
   std::vector<std::uint64_t> steps = {0};
@@ -125,8 +125,8 @@ std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   return steps;
 }
 
-/// Extends the colour scale to all degrees or depths that can occur in a frame: from the lowest in the base cells to
-/// the highest in the finished field.
+/// Extends the colour scale to all degrees or depths that can occur in a frame: from the lowest in `base`, the field
+/// before refinement, to the highest in the finished field.
 void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy color) {
   if (scale.levels.empty()) return;
   const FieldStatistics figures = statistics(base);

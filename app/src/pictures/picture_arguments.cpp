@@ -17,7 +17,7 @@ namespace {
 
 using render::ColorBy;
 
-/// A colour mode of pictures and its name in commands. `explanation` is its part of a sentence in the help of `color`.
+/// A colour mode of pictures and its name in commands. `explanation` is a clause of the help text of `color`.
 struct NamedColor {
   std::string_view name;
   ColorBy color;
@@ -35,7 +35,7 @@ constexpr NamedColor kColors[] = {
     {"difference", ColorBy::difference, "difference the difference from another field"},
     {"cell-error", ColorBy::cellError, "cell-error the estimated RMS error of a cell"}};
 
-/// Returns the names of the colour modes that show a quantity, as in "slope, error and difference".
+/// Returns a list of the colour modes that show a quantity, in words such as "slope, error and difference".
 std::string quantityNames() {
   std::vector<std::string_view> names;
   for (const NamedColor& named : kColors)

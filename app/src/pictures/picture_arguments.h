@@ -19,7 +19,7 @@ namespace hpsdf::app {
 std::string_view colorName(render::ColorBy color);
 std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
 
-/// Returns the sentence of help texts that explains the colour modes that show a quantity, such as the error.
+/// Returns a sentence for help texts. It explains the colour modes that show a quantity, such as the error.
 std::string quantityHelp();
 
 /// Returns the colour mode of this name, which must be one of `colorNames()`.
@@ -27,7 +27,7 @@ render::ColorBy colorNamed(std::string_view name);
 
 /// Returns the names of the camera directions: front, back, ….
 std::vector<std::string> viewNames();
-/// Turns the camera to the direction of the name `view`, which must be one of `viewNames`.
+/// Turns the camera to the direction named `view`, which must be one of `viewNames`.
 void turnTo(render::OrbitCamera& camera, std::string_view view);
 /// Returns the name of the camera's direction, or "" if the direction has no name.
 std::string viewName(const render::OrbitCamera& camera);
@@ -55,7 +55,7 @@ inline constexpr std::array kCameraParameters = {"camera", "view",    "target", 
                                                  "size",   "samples", "cpu",    "gl"};
 std::vector<Parameter> cameraParameters(const Registry& registry);
 
-/// Makes a renderer for these meshes, which draws with OpenGL or on the CPU as `backend` says.
+/// Makes a renderer for the meshes. `backend` chooses between OpenGL and the CPU.
 std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh> meshes, const Backend& backend);
 
 /// Returns the settings of a picture from the arguments named in `kCameraParameters`. Throws `Error` if the
@@ -63,14 +63,14 @@ std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh>
 render::SurfacePicture cameraPicture(const Arguments& arguments);
 
 /// Returns the settings of a picture from the arguments of `render`. If no offset is given, the plane is at
-/// `defaultOffset`. Throws `Error` for a camera out of range, and for parameters that exclude or require each
-/// other.
+/// `defaultOffset`. Throws `Error` if the camera is out of range, if two given parameters exclude each other, or if a
+/// given parameter needs another one.
 render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
 
 /// Writes a note to the console if the picture is empty, or if the walls of the domain cut off the surface.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
 
-/// Returns the data besides the field that a picture of the current field needs, such as the exact distance for error
+/// Returns the data that a picture needs in addition to the current field, such as the exact distance for error
 /// colours. The data comes from the files that the arguments name.
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SlicePicture& picture);

@@ -8,7 +8,7 @@ namespace hpsdf::app {
 void addPictureCommands(Registry& registry);
 
 /// Adds the commands `turntable` and `frames`. They take over parameters of `slice` and `render`, so the
-/// registry must already hold these two commands.
+/// registry must already hold `slice` and `render`.
 void addMotionCommands(Registry& registry);
 
 /// Adds the commands `pick` and `expect`, which read and check numbers of the current field and of the last picture.

@@ -12,7 +12,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// Returns the distance from the point x to an interface between two cells, which is an axis-aligned rectangle.
+/// Returns the distance from the point x to `face`, the axis-aligned rectangle that two cells share.
 double distanceTo(const Interface& face, const Vector3& domainSizes, const Field& field, const Vector3& x) {
   const int depth = std::max(face.depths[0], face.depths[1]);
   double sum = 0;

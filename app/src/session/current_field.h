@@ -11,11 +11,11 @@ namespace hpsdf::app {
 /// The current field of a session. Commands read and change it.
 struct CurrentField {
   Field field;
-  std::string name;                              ///< name of the file or mesh that it came from
-  std::optional<std::uintmax_t> fileBytes = {};  ///< size of its file, if it was loaded or saved
-  std::string surface = {};                      ///< mesh file or shape, if it was built in this session
+  std::string name;                              ///< name of the file or mesh that the field came from
+  std::optional<std::uintmax_t> fileBytes = {};  ///< size of the field's file, if it was loaded or saved
+  std::string surface = {};                      ///< mesh file or shape, if the field was built in this session
 
-  /// Returns the mesh file or shape from which the field can be built again. Returns "" if it is unknown.
+  /// Returns the mesh file or shape from which the field can be built again, or "" if the surface is unknown.
   const std::string& madeFrom() const { return surface.empty() ? field.metadata().source.name : surface; }
 };
 

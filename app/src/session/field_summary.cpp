@@ -122,8 +122,8 @@ std::string fieldLine(const Field& field) {
                      field.singlePrecision() ? "float" : "double", bytesText(double(figures.bytes)));
 }
 
-/// Returns the build settings that a field file stores, except the target error, as text: settings with words as values
-/// if `ofWords` is true, otherwise settings with numbers.
+/// Returns as text the build settings that a field file stores, except the target error. If `ofWords` is true, includes
+/// only settings whose values are words, otherwise only settings whose values are numbers.
 std::string settingsText(const BuildOptions& settings, bool ofWords) {
   std::vector<std::string> parts;
   for (const BuildSetting& setting : buildSettings()) {

@@ -27,7 +27,7 @@ std::string fieldText(const CurrentField& current);
 /// Returns the unit of the estimated RMS error in parentheses: mesh units or normalized units.
 std::string unitText(const Field& field);
 
-/// Describes the size of a field: "54,935 leaves, 460,210 coefficients (float), 2.3 MB".
+/// Returns the size of a field as text: "54,935 leaves, 460,210 coefficients (float), 2.3 MB".
 std::string fieldLine(const Field& field);
 
 std::string strategyName(Strategy strategy);

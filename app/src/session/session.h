@@ -46,8 +46,8 @@ class Session {
   /// Sets whether all commands write their reports as JSON. Returns the previous setting.
   bool setJson(bool json) { return std::exchange(json_, json); }
 
-  /// Number of nested scripts that are running now. The command `run` limits this number, so that a script that
-  /// runs itself ends.
+  /// Number of nested scripts that are running now. The command `run` limits this number, to stop scripts that run
+  /// themselves.
   int scriptDepth = 0;
 
   void setField(CurrentField field);
@@ -63,9 +63,9 @@ class Session {
   const Jumps& jumps();
   bool knowsJumps() const { return jumps_.has_value(); }
 
-  /// Returns the exact distance to `surface` and keeps it for later calls. An empty `surface` stands for the surface
-  /// from which the field was made, if that is a shape or if the field was built in this session, and otherwise for the
-  /// surface of the previous call. Throws `Error` if no surface is known or if the surface cannot be read.
+  /// Returns the exact distance to `surface` and keeps it for later calls. If `surface` is empty, takes the surface
+  /// from which the field was made, provided that it is a shape or that the field was built in this session. Otherwise
+  /// takes the surface of the previous call. Throws `Error` if no surface is known or if it cannot be read.
   const DistanceFunction& exact(const std::string& surface);
   /// True if `exact` can be called with an empty `surface`.
   bool knowsExact() const;
@@ -86,7 +86,7 @@ class Session {
   }
 
   /// A second field, with which the current field is compared. It is read from its file at first use. The two most
-  /// recently used second fields are kept: one may be drawn beside the current field, the other be subtracted from it.
+  /// recently used second fields are kept: one may be drawn beside the current field, one subtracted from it.
   struct Other {
     std::string file;
     Field field;
@@ -102,7 +102,7 @@ class Session {
   const Jumps& otherJumps(const std::string& file);
   render::Renderer& otherRenderer(const std::string& file, const Backend& backend);
 
-  /// Returns the data besides the field that a colour mode needs: the jumps, the exact distance to `surface` for
+  /// Returns the data that a colour mode needs in addition to the field: the jumps, the exact distance to `surface` for
   /// errors, or the field of the file `other` for differences. The returned data is valid until the next call of
   /// `reference`.
   render::ReferenceData reference(render::ColorBy color, const std::string& surface, const std::string& other = "");

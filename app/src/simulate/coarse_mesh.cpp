@@ -9,7 +9,7 @@ namespace hpsdf::app {
 TriangleMesh coarse(const TriangleMesh& mesh, double size) {
   if (!(size > 0)) return mesh;
   TriangleMesh result{.vertices = {}, .triangles = {}, .name = mesh.name};
-  std::map<std::array<double, 3>, std::uint32_t> known;  // cubes, numbered in the order of their first vertices
+  std::map<std::array<double, 3>, std::uint32_t> known;  // cubes that contain vertices, and their numbers
   std::vector<std::uint32_t> cubes;                      // number of the cube of each vertex
   std::vector<double> members;                           // number of vertices in each cube
   for (const Vector3& x : mesh.vertices) {

@@ -32,8 +32,8 @@ const std::filesystem::path& cacheFolder(const std::filesystem::path& folder) {
   return folder;
 }
 
-/// Loads a field from a file of the cache. Throws `Error` unless the field was made from the mesh with the fingerprint
-/// `print` and with this target error.
+/// Loads a field from a file of the cache. Throws `Error` unless the field has this target error and was made from the
+/// mesh whose fingerprint is `print`.
 Field cachedField(const std::filesystem::path& file, std::uint64_t print, double targetError) {
   try {
     Field field = load(file);

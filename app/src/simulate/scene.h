@@ -52,7 +52,7 @@ class Scene {
   };
   const std::deque<Drop>& drops() const { return drops_; }  ///< bodies not added yet, in the order of their times
   const std::deque<BodyKind>& kinds() const { return kinds_; }
-  std::size_t lost() const;    ///< number of rigid bodies with the centre and soft bodies with a node below `floor_`
+  std::size_t lost() const;    ///< number of bodies below `floor_` (centre of a rigid, lowest node of a soft body)
   std::size_t moving() const;  ///< number of rigid bodies in the world that are not static
   std::size_t waiting() const { return drops_.size(); }  ///< number of bodies not added yet
   /// The length with which penetration depths are compared: the radius of a marble, the size of a body or the collision
@@ -64,10 +64,10 @@ class Scene {
   /// scaled so that its longest side is `size`. Warns if the mesh is not closed. Throws `Error` naming the mesh
   /// if it cannot be read or has no volume.
   TriangleMesh meshOf(const std::string& name, double size) const;
-  /// Adds a kind of body for the mesh. Its field is loaded from the cache folder if it is there. Otherwise the threads
-  /// of the caller's TBB arena build the field, and it is saved in the folder. `samples` is the number of surface
-  /// samples. `margin` is the collision margin in world units. Throws `Error` if the folder cannot be used, or if the
-  /// file in it holds another field.
+  /// Adds a kind of body for the mesh. Loads the mesh's field from the cache folder. If the folder does not hold the
+  /// field, builds it with the threads of the caller's TBB arena and saves it in the folder. `samples` is the number of
+  /// surface samples. `margin` is the collision margin in world units. Throws `Error` if the folder cannot be used, or
+  /// if the mesh's file in the folder holds another field.
   BodyKind& addKind(TriangleMesh mesh, std::size_t samples, double margin);
   /// Adds a static body of this kind to the world.
   void addStatic(BodyKind& kind, const Eigen::Isometry3d& worldFromMesh, const physics::Material& material = {});

@@ -1,5 +1,5 @@
 #pragma once
-// The settings of the paper's simulations (sec. 4, Figs. 1, 7, 8, 9), which do not depend on Bullet.
+// The settings of the paper's simulations (sec. 4, Figs. 1, 7, 8, 9). This header does not depend on Bullet.
 
 #include <array>
 #include <cstdint>

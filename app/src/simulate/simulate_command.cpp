@@ -162,8 +162,8 @@ SimulationCamera cameraOf(const Arguments& arguments, std::function<void(Simulat
 /// The results of a simulation and a description of the pictures that were drawn.
 struct Outcome {
   SimulationFigures figures;
-  Json pictures = {};     ///< description as JSON; null if no pictures were drawn
-  std::string line = {};  ///< description in one line; empty if no pictures were drawn
+  Json pictures = {};     ///< description of the pictures as JSON; null if no pictures were drawn
+  std::string line = {};  ///< description of the pictures in one line; empty if no pictures were drawn
 };
 
 /// Runs a simulation and draws its final state. The field that the picture shows becomes the session's current

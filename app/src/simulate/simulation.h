@@ -34,8 +34,8 @@ struct SimulationFigures {
   std::size_t lost = 0;               ///< number of bodies below the floor at the end
   std::uint64_t steps = 0;
   double simulated = 0;  ///< simulated time, seconds
-  /// Wall-clock times in seconds: of setting up the simulation, of all steps, of all field queries, of the
-  /// physics solver, and of the field queries in the step that has the slowest queries.
+  /// Wall-clock times in seconds: setting up the simulation, all steps, all field queries, the physics solver, and the
+  /// greatest time that the field queries of one step took.
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
   CountPerStep penetrating, touching;  ///< contacts found, and contacts passed to the solver
   double size = 0;  ///< length to compare depths with: a marble's radius, a body's size or a cloth's margin

@@ -19,7 +19,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr render::Color kLevelGround = {224, 226, 230};
-constexpr double kLevelGroundSide = 8;  // in diagonals of the box around the scene's other bodies
+constexpr double kLevelGroundSide = 8;  // length of its sides, in diagonals of the box around the scene's other bodies
 
 const physics::FieldShape* fieldShape(const btCollisionShape& shape) {
   return dynamic_cast<const physics::FieldShape*>(&shape);
@@ -93,8 +93,8 @@ std::vector<Vector3> outlineOf(const Scene& scene, const btCollisionShape& shape
   return points;
 }
 
-/// Adds the corners of the enlarged box, projected onto the plane, to `points`. The box is enlarged because
-/// bodies spread when they land on the plane.
+/// Enlarges the box, projects its corners onto the plane, and adds them to `points`. The box is enlarged because the
+/// bodies in it spread when they land on the plane.
 void addFootprint(const btStaticPlaneShape& plane, const Box& box, std::vector<Vector3>& points) {
   constexpr double kSpread = 1.25;
   for (int corner = 0; corner < 8; ++corner) {
@@ -126,19 +126,19 @@ render::Camera cameraOf(const render::SurfacePicture& look, const Box& domain) {
   return render::cameraOf(look.camera, domain, size.width, size.height);
 }
 
-/// Aims the camera of `look`, which has a direction and perhaps a target, at the points. The camera's distance
-/// is given as a multiple of the distance from which all points are just in view. It is converted to diagonals
-/// of the domain. A camera without a target looks at the middle of the points.
+/// Aims the camera of `look` at the points. A camera without a target gets a target at the middle of the points. The
+/// camera's distance comes in as a multiple of the distance from which all points are just in view. The function
+/// converts it to diagonals of the domain.
 ///
-/// Let s be a point's coordinate along the picture's width or height, in units of half the view's extent at
-/// distance 1, and z the point's coordinate towards the eye. A point is in view if |s - s_eye| ≤ z_eye - z, or,
-/// with parallel rays, if |s - s_eye| ≤ distance.
+/// Let s be a point's coordinate along the picture's width or height, divided by half the view's extent at distance 1.
+/// Let z be the point's coordinate towards the eye. Let s_eye and z_eye be the coordinates of the eye. The point is in
+/// view if |s - s_eye| ≤ z_eye - z. With parallel rays it is in view if |s - s_eye| ≤ distance.
 void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Box& domain) {
   constexpr double kBorder = 1.04;
   const bool parallel = look.camera.projection == render::Projection::orthographic;
   render::SurfacePicture wide = look;
   wide.camera.distance = 1;
-  wide.camera.projection = render::Projection::perspective;  // the unit of s below is this view's extent at distance 1
+  wide.camera.projection = render::Projection::perspective;  // this view's extent at distance 1 defines the unit of s
   const render::Camera camera = cameraOf(wide, domain);
   const Vector3 middle = look.camera.target.value_or(boxAround(points).center());
   Vector3 target = middle;
@@ -158,8 +158,8 @@ void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Bo
   look.camera.distance *= kBorder * distance / domain.diagonal().norm();
 }
 
-/// Returns the extent of a pixel, in world units, at the point of `box` that is nearest to the eye. It is 0 if
-/// the eye is in the box.
+/// Returns the extent of a pixel, in world units, at the point of `box` that is nearest to the eye. Returns 0
+/// if the eye is in the box.
 double finestDetail(const render::SurfacePicture& look, const Box& box, const Box& domain) {
   const render::Camera camera = cameraOf(look, domain);
   double nearest = std::numeric_limits<double>::infinity();

@@ -16,7 +16,7 @@
 namespace hpsdf::app {
 
 /// Draws the present state of a scene. One body is drawn by tracing rays to its field's surface: the first
-/// static body whose field is only translated, not rotated. The pictures are in the coordinates of its field.
+/// static body whose field is only translated, not rotated. The pictures are in the coordinates of that field.
 /// All other bodies are drawn as meshes, without detail below the size of a pixel.
 class Studio {
  public:
@@ -52,7 +52,7 @@ class Studio {
   Ground ground_;
   std::map<const btCollisionShape*, Model> models_;  ///< meshes of the rigid bodies' shapes
   std::uint32_t firstSoft_ = 0;                      ///< index of the first soft body's mesh; the others follow
-  std::size_t rigid_;  ///< number of rigid bodies that will move; soft bodies take the colours after theirs
+  std::size_t rigid_;  ///< number of rigid bodies that will move; the colours of soft bodies begin at this index
   std::unique_ptr<render::Renderer> renderer_;
   std::unique_ptr<render::BodyRenderer> bodyRenderer_;
   std::string description_;

@@ -43,7 +43,7 @@ const Study& studyOf(const Arguments& arguments) {
 }
 
 /// Returns the parameters of all kinds of studies, each parameter once. A parameter whose default differs
-/// between the kinds has no default here: see `buildArguments`.
+/// between the kinds has no default here; `buildArguments` sets the default of the study that is run.
 std::vector<Parameter> kindParameters() {
   std::vector<Parameter> all;
   for (const Study& study : studies())

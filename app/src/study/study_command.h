@@ -35,8 +35,8 @@ std::vector<Parameter> buildParametersWithout(const std::vector<std::string>& na
 /// Returns the parameters for the random points at which errors are measured: their number and the seed.
 std::vector<Parameter> samplingParameters();
 
-/// Returns random points with their exact distances. If `near` is not 0, all points lie within `near` of the
-/// surface.
+/// Returns random points with their exact distances. If `near` is not 0, all points lie within the distance `near` of
+/// the surface.
 ExactSamples exactSamples(const Console& console, const Arguments& arguments, const DistanceFunction& exact,
                           const Box& domain, int threads, double near = 0);
 

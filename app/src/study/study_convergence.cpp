@@ -36,8 +36,8 @@ constexpr std::array kCurveColors = {"#1683ab", "#d1721b", "#6b7280"};
 struct LargeEnough {};
 
 /// Returns the numbers of construction steps after which the field is inspected: 0, then a geometric sequence
-/// with the ratio `growth`. Different steps add different numbers of coefficients. Therefore more fields are
-/// inspected than are recorded as stages of the curve.
+/// with the ratio `growth`. The field is inspected more often than stages of the curve are recorded, because the
+/// number of coefficients that a step adds varies.
 std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficients) {
   const double most =
       double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // fewest coefficients a step adds
@@ -264,8 +264,8 @@ void runConvergence(Session& session, const Arguments& arguments) {
   for (const Json& file : files) session.console().out << file.get<std::string>() << "\n";
 }
 
-/// Returns the parameters of `build` with the default 0 for nearness, because the paper's curves show
-/// unweighted errors.
+/// Returns the parameters of `build` that apply to convergence studies. The default of `nearness` is 0, because the
+/// paper's curves show unweighted errors.
 std::vector<Parameter> unweightedBuildParameters() {
   using Ending = BuildSetting::Ending;
   std::vector<std::string> left =

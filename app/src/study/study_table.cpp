@@ -35,8 +35,7 @@ constexpr int kDegreeBarHeight = 18;
 using Shares = std::map<int, double>;
 using Colors = std::map<int, render::Color>;
 
-/// A property of the cells, such as their degree, that pictures show by colours. Each of its values is called a
-/// level.
+/// A property of the cells that pictures show by colours: the degree or the depth.
 struct Level {
   render::ColorBy color;
   const char *name, *title;
@@ -45,12 +44,12 @@ struct Level {
 constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree", &FieldStatistics::degreeVolume},
                                 Level{render::ColorBy::depth, "depth", "Depth", &FieldStatistics::depthVolume}};
 
-/// A picture of a slice through the middle of the domain, and a bar that shows, in the same colours, the share
-/// of the volume that each level takes.
+/// A picture of a slice through the middle of the domain, coloured by degree or depth, and a bar. The bar shows in the
+/// same colours the share of the volume that each degree or depth takes.
 struct LevelPicture {
   std::string png = {};  ///< bytes of the slice's PNG file
   std::string svg = {};  ///< the bar as SVG text
-  Colors colors = {};    ///< colours of the levels that occur in any row
+  Colors colors = {};    ///< colours of the degrees or depths that occur in any row
 };
 
 /// A mesh and its field, which make one row of the table.
@@ -78,9 +77,9 @@ TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, c
   return {surface, name, std::move(built.field), std::move(figures), built.seconds, std::move(error)};
 }
 
-/// Returns an SVG bar: one rectangle for each level, in the level's colour and as wide as its share. A
-/// rectangle contains the number of its level if there is room. Its tooltip shows the number and, if
-/// `tellsShares`, the share.
+/// Returns an SVG bar with one rectangle for each level (a degree or a depth), in the level's colour and as wide as its
+/// share. A rectangle contains its degree or depth if there is room. Its tooltip shows the degree or depth and, if
+/// `tellsShares` is true, the share.
 std::string sharesSvg(int width, const Shares& shares, const Colors& colors, bool tellsShares) {
   std::string parts;
   double from = 0;
@@ -102,7 +101,7 @@ std::string sharesSvg(int width, const Shares& shares, const Colors& colors, boo
       width, kDegreeBarHeight, parts);
 }
 
-/// Returns an SVG legend of the colours of all levels.
+/// Returns an SVG legend of the colours of all levels (degrees or depths).
 std::string legendSvg(const Colors& colors) {
   constexpr int kWidth = 26;
   Shares equal;
@@ -129,7 +128,7 @@ LevelPicture pictureOf(render::Renderer& renderer, const TableRow& row, const Le
 }
 
 void drawPictures(Session& session, const Backend& backend, std::vector<TableRow>& rows) {
-  std::array<std::set<int>, kLevels.size()> levels;  // levels of all rows, so that a colour has one meaning
+  std::array<std::set<int>, kLevels.size()> levels;  // degrees and depths in all rows, which share their colours
   for (const TableRow& row : rows)
     for (std::size_t k = 0; k < kLevels.size(); ++k)
       for (const auto& [level, share] : row.figures.*kLevels[k].volume) levels[k].insert(level);

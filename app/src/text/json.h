@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 std::string jsonText(const Json& json);
 void printJson(std::ostream& out, const Json& json);
 
-/// Returns the number that an object holds under this name.
+/// Returns the number in `object` with the key `name`.
 inline double numberIn(const Json& object, const char* name) { return object.at(name).get<double>(); }
 
 Json vectorJson(const Vector3& v);

@@ -17,26 +17,26 @@ namespace hpsdf::app {
 constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 constexpr bool isLetter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 
-/// Writes a colour as "#rrggbb".
+/// Returns a colour as the text "#rrggbb".
 std::string colorText(const std::array<std::uint8_t, 3>& color);
 
-/// Separates thousands by commas: 1234567 becomes "1,234,567".
+/// Returns a number as text with commas between thousands: 1234567 becomes "1,234,567".
 std::string grouped(std::uint64_t number);
 
-/// Writes a count with its noun, in the singular or the plural: "1 face", "1,234 faces".
+/// Returns a count with its noun, in the singular or the plural: "1 face", "1,234 faces".
 std::string countOf(std::size_t count, std::string_view one, std::string_view many);
 
-/// Writes a number with three significant digits, with an exponent if that is shorter: 1e-6, 3.06e-4, 0.125.
+/// Returns a number as text with three significant digits, with an exponent if that is shorter: 1e-6, 3.06e-4, 0.125.
 std::string shortNumber(double number);
 
-/// Writes a point as "(0.1, 0.2, 0.3)".
+/// Returns a point as the text "(0.1, 0.2, 0.3)".
 std::string vectorText(const Vector3& v);
 
-/// Writes a point of `box` as "(0.1, 0.2, 0.3)". Uses extra digits if the box is small compared with its
+/// Returns a point of `box` as the text "(0.1, 0.2, 0.3)". Uses extra digits if the box is small compared with its
 /// distance from the origin.
 std::string vectorText(const Vector3& v, const Box& box);
 
-/// Writes a box as "(0, 0, 0) to (1, 2, 3)", with as many digits as `vectorText` uses for points of this box.
+/// Returns a box as the text "(0, 0, 0) to (1, 2, 3)", with as many digits as `vectorText` uses for points of this box.
 std::string boxText(const Box& box);
 
 /// Derives a name for files and commands from the name of a mesh file or a shape: "bunny" from bunny.obj,

@@ -47,7 +47,7 @@ void LiveWork::refreshWhenDue() {
     explorer_.work = reported_;
   }
   // Let users cancel the work only while a command runs. If they cancelled a measurement that the frame itself needs,
-  // the next frame would start it again.
+  // the next frame would start the measurement again.
   explorer_.work->cancellable = explorer_.running();
   refreshing_ = true;
   refresh_();

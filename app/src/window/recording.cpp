@@ -12,7 +12,7 @@ Recording::Recording(Explorer& explorer, std::vector<std::string> lines)
 Recording::~Recording() { explorer_.onCommand = nullptr; }
 
 void Recording::add(const std::string& line, bool replaces) {
-  // A window takes many sizes while a user resizes it. Of successive lines that set the size, only the last is
+  // A window takes many sizes while a user resizes it. If successive lines set the size, only the last one is
   // recorded.
   const auto isSize = [](const std::string& any) { return any.starts_with("show size=") && any.rfind(' ') == 4; };
   if (replaces || (isSize(line) && !lines_.empty() && isSize(lines_.back())))

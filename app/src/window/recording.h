@@ -9,7 +9,7 @@
 namespace hpsdf::app {
 
 /// Records the command lines that the explorer runs during the lifetime of this object. It sets the explorer's
-/// `onCommand`.
+/// callback `onCommand`.
 class Recording {
  public:
   /// `lines` are command lines that have run already. They begin the recorded script.

@@ -134,8 +134,8 @@ std::optional<Key> keyOf(int key, int scancode) {
   return letter == nullptr ? std::nullopt : keyNamed(letter);
 }
 
-/// Removes the position in the explorer's internal script, which users do not know, from the beginning of an error
-/// message.
+/// Removes the script position from the beginning of an error message, because users do not know the explorer's
+/// internal scripts.
 std::string withoutPosition(std::string message) {
   for (const std::string_view script : {"panel:1:", "rebuild:1:"})
     if (message.starts_with(script)) message.erase(0, message.find(": ") + 2);
@@ -223,7 +223,7 @@ class Window {
     move({x * view.width / width, y * view.height / height});
   }
 
-  /// Adds a movement of the pointer to the waiting events. It replaces an earlier movement that still waits.
+  /// Adds a movement of the pointer to the waiting events. If the last waiting event is also a movement, replaces it.
   void move(const std::array<double, 2>& at) {
     if (!events_.empty() && events_.back() && events_.back()->kind == Input::Kind::move) events_.pop_back();
     events_.push_back(Input{.kind = Input::Kind::move, .at = at});
@@ -344,7 +344,7 @@ class Window {
   /// frame.
   void endGestures() {
     attempt([&] { explorer_.releaseInput(); });  // a released slider may start long work
-    frame(1);                                    // if drawing fails, undoes the view, in the recording too
+    frame(1);                                    // if drawing fails, undoes changes of the view, also in the recording
     explorer_.message.clear();
     recording_.notePointer();
   }
@@ -363,7 +363,7 @@ class Window {
   Screen screen_;
   Recording recording_;
   LiveWork work_;
-  std::deque<std::optional<Input>> events_;  ///< waiting events; an empty one asks for a screenshot
+  std::deque<std::optional<Input>> events_;  ///< waiting events; std::nullopt asks for a screenshot
   bool damaged_ = false;                     ///< true if the desktop has lost the window's content
   double fullSeconds_ = 0;                   ///< time that the last picture in full resolution took
 };

@@ -27,16 +27,16 @@ Field build(const DistanceFunction& distance, const Box& domain, const BuildOpti
 
 /// Builds several fields in one construction: one for each number in `steps`, which must be in non-descending order.
 /// For each number, `visit` receives the field that `build` returns with this number as `maxSteps`. The construction
-/// continues only after `visit` has returned. Throws as `build` does, `Error` if `steps` descend, and whatever `visit`
-/// throws.
+/// continues only after `visit` has returned. Throws as `build` does. Also throws `Error` if `steps` descend, and
+/// rethrows exceptions of `visit`.
 void buildStages(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                  std::span<const std::uint64_t> steps, const std::function<void(Field)>& visit,
                  const Progress& progress = {});
 
-/// Builds the same field as `build`, bit for bit, but continues from the state in `checkpoint.file` if this file
-/// exists. The result does not depend on when earlier processes were stopped or on their numbers of threads. The file
-/// holds the octree while it is refined; the stages after refinement, such as pruning, are repeated. The caller should
-/// remove the file once the field is saved.
+/// Builds the same field as `build`, bit for bit, but resumes an interrupted construction from `checkpoint.file` if
+/// this file exists. The result does not depend on when earlier processes were stopped or on how many threads they
+/// used. The file holds the octree while it is refined; the stages after refinement, such as pruning, are repeated. The
+/// caller should remove the file once the field is saved.
 ///
 /// Throws as `build` does. Also throws `Error`, before anything is built, if the file cannot be written, is damaged, or
 /// was begun by another version of the program or with another Φ, domain or options (`threads` and `memoryLimit` may

@@ -1,5 +1,5 @@
 #pragma once
-// The settings of a field's construction, and of the file that keeps the state of the construction.
+// The settings of a field's construction, and of the checkpoint file from which an interrupted construction resumes.
 
 #include <array>
 #include <cstdint>
@@ -32,11 +32,11 @@ enum class Criterion : std::uint8_t {
   optimal,  ///< refines by the paper's criterion beyond the target error, then undoes the least useful refinements
 };
 
-/// The form of the weight κ(s) by which the error of a cell counts, where s is the cell's mean distance from the
-/// surface and d the length of the domain's diagonal.
+/// The formula of the weight κ(s) that multiplies the error of a cell, where s is the cell's mean distance from the
+/// surface, d the length of the domain's diagonal, and θ the exponent `BuildOptions::nearness`.
 enum class NearnessKind : std::uint8_t {
-  polynomial,   ///< (1 − s/d)^θ (paper, eq. 10)
-  exponential,  ///< exp(−θ s/d) (Koschier et al. 2017)
+  polynomial,   ///< (1 − s/d)^θ with the distance s and the domain's diagonal d (paper, eq. 10)
+  exponential,  ///< exp(−θ s/d) with the distance s and the domain's diagonal d (Koschier et al. 2017)
 };
 
 /// Precision of the stored coefficients. `automatic` chooses float32 if rounding changes the field by less than
@@ -54,7 +54,7 @@ enum class TrialSamples : std::uint8_t {
 
 /// The kind of quadrature rule that selects the sample points in a cell.
 enum class CubatureKind : std::uint8_t {
-  compact,  ///< symmetric rules with about half as many points as `product` up to order 13; above, as `product`
+  compact,  ///< up to order 13, symmetric rules with about half as many points as `product`; then `product`
   product,  ///< the tensor product of Gauss rules (the paper)
 };
 
@@ -75,7 +75,7 @@ struct WeakContinuity {
   /// λ, above 0 and at most `kMaxContinuityWeight`. A small λ reduces the jumps more, a large λ changes the field
   /// less. See docs/accuracy-continuity.md.
   double weight = 2.5;
-  /// The conjugate gradient method ends when its residual, relative to the initial residual, is this small, 0 to 1.
+  /// The conjugate gradient method ends when its residual has fallen to this fraction of the initial residual, 0 to 1.
   /// With the default, the jumps and the change of the field agree with those of the exact solution to three digits.
   double tolerance = 1e-3;
   int maxIterations = 5000;  ///< greatest number of iterations, 1 or more
@@ -90,8 +90,8 @@ struct NearFarError {
 };
 
 /// The error at which a construction ends: a single weighted error τ, separate errors near and far from the surface
-/// (`NearFarError`), or no target. τ cannot be combined with `NearFarError`, from which the construction derives τ and
-/// the weight exponent θ.
+/// (`NearFarError`), or no target. From `NearFarError`, the construction derives τ and the weight exponent θ; therefore
+/// τ cannot be given in addition.
 class ErrorTarget {
  public:
   /// Takes the target error τ, or 0 for no target. Without a target, the construction needs a maximum error, a
@@ -113,10 +113,10 @@ class ErrorTarget {
 /// Settings of a field's construction (paper, Algorithm 1). The defaults differ from the settings of the paper, which
 /// `paperOptions` returns.
 struct BuildOptions {
-  /// The target error: τ, or errors near and far from the surface. τ is an integral of the weighted squared error at
-  /// the scale of the paper, at which the longest side of the mesh's box is 2. If this side has the length L, the
-  /// construction uses τ·(L/2)^5, so that the same τ gives the same cells in any unit. If the box of the surface is
-  /// unknown, L is the domain's longest edge divided by 1.1.
+  /// The target error: τ, or errors near and far from the surface. The target τ is reached when the estimated integral
+  /// of the weighted squared error falls to τ·(L/2)^5, where L is the longest side of the mesh's box. Thus the same τ
+  /// gives the same cells in any unit; in the paper, L is 2. If the box of the surface is unknown, L is the domain's
+  /// longest edge divided by 1.1.
   ErrorTarget targetError = 1e-6;
   std::array<std::uint32_t, 3> grid = {6, 6, 6};  ///< number of base cells, the roots of the octree, along x, y, z
   double nearness = 4;                            ///< exponent θ in `NearnessKind`, up to 1000; 0: no weighting
@@ -153,11 +153,11 @@ struct BuildOptions {
   double blend = 0;     ///< width of the zones in which neighbouring leaves are blended (`FieldData::blend`); 0: none
   bool bounds = false;  ///< stores proven bounds of each leaf's error and gradient, see `safe_distance.h`
   CoefficientType coefficients = CoefficientType::automatic;
-  /// Limit of the memory, in bytes, that the growing octree and Φ (`DistanceFunction::bytes`) take by a generous
-  /// estimate. With std::nullopt the limit is `allowedMemory`, which is also the greatest possible limit. `build`
-  /// throws when the estimate exceeds the limit, or earlier, when the decay of the error shows that the estimate
-  /// will exceed the limit by half. The solver of weak continuity takes about 50 bytes per coefficient in
-  /// addition.
+  /// Limit, in bytes, of the memory for the octree and for Φ (`DistanceFunction::bytes`). With std::nullopt the limit
+  /// is `allowedMemory`, which is also the greatest possible limit. During the construction, a generous estimate of
+  /// this memory is compared with the limit. `build` throws when the estimate exceeds the limit, or earlier, when the
+  /// decay of the error predicts that it will exceed 1.5 times the limit. The estimate leaves out the solver of weak
+  /// continuity, which takes about 50 bytes per coefficient.
   std::optional<std::uint64_t> memoryLimit = {};
   int threads = 0;  ///< greatest number of threads, up to 1024; 0: all of the machine. It does not affect the result.
 };
@@ -173,11 +173,11 @@ enum class DomainShape : std::uint8_t { cube, box };
 Box domainAround(const Box& surface, DomainShape shape = DomainShape::cube, double margin = 0.1);
 Box domainAround(const TriangleMesh& mesh, DomainShape shape = DomainShape::cube, double margin = 0.1);
 
-/// The file in which a construction keeps its state, and how often it does so. If the process is killed,
+/// The settings of a checkpoint file, in which a construction saves its state at intervals. If the process is killed,
 /// another process can continue the construction from this file.
 struct Checkpoint {
-  /// The file of the state. It is written under a temporary name and then renamed, so that the file is complete
-  /// at any moment. If the file exists, the construction continues from its state.
+  /// The checkpoint file. It is written under a temporary name and then renamed, so that the file is complete at any
+  /// moment. If the file exists, the construction continues from its state.
   std::filesystem::path file;
   double seconds = 5;  ///< least time in seconds between two writes of the state, 0 to 1e9
   /// Greatest fraction of the construction time that may be spent on writing the state, above 0 up to 1. If

@@ -12,14 +12,16 @@ struct WeaklyContinuous {
   Field field;
   int iterations = 0;
   double residual = 0;  ///< final residual of the conjugate gradient method divided by its initial residual
-  double change = 0;  ///< RMS change √(‖f − f₀‖²/|Ω|) over the domain Ω; f₀ is a projection: error² = error₀² + change²
+  /// RMS of f − f₀ over the domain, where f is the new field and f₀ the original field. The RMS errors of both fields
+  /// satisfy error(f)² = error(f₀)² + change², because f₀ is an L2 projection.
+  double change = 0;
 };
 
 /// Returns the field that minimises a weighted sum of its squared jumps between leaves and its squared change from
 /// `field` (Koschier et al. 2017). The result has the same leaves, degrees and bytes as `field`, and does not depend on
 /// `threads` (0: all that the machine offers). Float coefficients are converted to double and rounded again at the end.
-/// The metadata of the result stores the weight λ, and its error estimates grow by the change and by the second
-/// rounding. The proven bounds of `field` are dropped because they do not hold for the new polynomials.
+/// In the metadata of the result, the weight λ is stored, and the error estimates grow by the change of the field and
+/// by the second rounding. The proven bounds of `field` are dropped because they do not hold for the new polynomials.
 ///
 /// Throws `Error` for options out of range; for a field that is weakly continuous already, because its original
 /// polynomials f₀ are lost; and if the tolerance is not reached within `maxIterations`. Throws `Cancelled` when

@@ -47,13 +47,13 @@ struct Source {
 
 /// A signed distance Φ of any kind, negative inside, evaluated in batches of points.
 ///
-/// A `DistanceFunction` converts from any callable for single points (`double(const Vector3&)`) or for batches
-/// (`void(std::span<const Vector3>, std::span<double>)`). The callable must be thread-safe. The points of a
+/// Any callable for single points (`double(const Vector3&)`) or for batches (`void(std::span<const Vector3>,
+/// std::span<double>)`) converts to a `DistanceFunction`. The callable must be thread-safe. The points of a
 /// batch lie close to each other, in a deterministic order. If the callable has a member function `Source
 /// source() const`, this function provides the source, unless the constructor gets another source.
 ///
-/// A callable that is an lvalue is referenced, not copied, because an `ExactDistance` is large. It must outlive
-/// this object. A temporary callable is moved into this object.
+/// A callable that is passed as an lvalue is not copied, because it may be large. This object refers to the callable,
+/// which must outlive this object. A temporary callable is moved into this object.
 class DistanceFunction {
  public:
   template <typename F>

@@ -50,8 +50,8 @@ class Cancelled : public std::runtime_error {
 
 /// The link between a long operation and its caller: progress reports and cancellation. Both functions may be empty.
 struct Progress {
-  /// Receives what the operation is doing and the estimated fraction that is done, 0 to 1. Calls never overlap,
-  /// even if they come from several threads.
+  /// Receives the name of the current task and the estimated fraction of it that is done, 0 to 1. Calls never
+  /// overlap, even if they come from several threads.
   std::function<void(std::string_view task, double fraction)> report;
 
   /// The operation calls this function often and from any thread. Once the function returns true, the operation

@@ -40,30 +40,30 @@ struct DistanceOptions {
 ///   with the angle-weighted pseudonormal of the closest face, edge or vertex (Bærentzen & Aanæs 2005). It is right
 ///   for closed meshes without self-intersections.
 /// - `InsideTest::winding`: a point is inside if the generalised winding number w is above ½ (Jacobson et al. 2013).
-///   The decision is the same as by the exact sum over all triangles. The surface w = ½ closes holes and counts as
-///   surface; the distance to this surface is |w − ½|/|∇w|, to first order. A closed mesh that is oriented inward has
-///   its inside all around it.
+///   The result is the same as with the exact sum over all triangles. The set of points with w = ½ closes holes and
+///   counts as surface; the distance to this set is |w − ½|/|∇w|, to first order. If a closed mesh is oriented inward,
+///   the space around the mesh counts as inside.
 /// - `InsideTest::outerHull`: the sign and the distances of outside points are those of `winding`. For points inside,
 ///   triangles with the inside on both sides, such as inner walls of overlapping bodies, do not count as surface.
-///   Along intersections this is decided for pieces of 1/512 of the mesh's size.
-/// - `InsideTest::shell`: half of the thickness is subtracted from the unsigned distance. This test suits sheets.
+///   Triangles that intersect each other are first divided into pieces, down to 1/512 of the mesh's size.
+/// - `InsideTest::shell`: half of the thickness is subtracted from the unsigned distance. This test suits open sheets.
 /// - `InsideTest::automatic`: `pseudonormal` if this test is certain to be right, else `winding`.
 ///
 /// Among equally near triangles, the one with the lowest index counts. Therefore results depend neither on the order
 /// nor on the grouping of queries, and single and batched queries agree bit for bit.
 ///
 /// A triangle is degenerate if its height is within the rounding errors of its coordinates. The distance to a
-/// degenerate triangle is the distance to its edges; it does not contribute to pseudonormals. A point that is not
-/// finite gets a value that is not finite. Signs are lost at distances of about 10¹⁵ times the mesh's size, where all
-/// triangles are equally near.
+/// degenerate triangle is the distance to its edges. Degenerate triangles do not contribute to pseudonormals. A point
+/// that is not finite gets a value that is not finite. Signs are lost at distances of about 10¹⁵ times the mesh's size,
+/// where all triangles are equally near.
 ///
 /// Objects are const and thread-safe after construction. They keep no reference to the mesh.
 class ExactDistance {
  public:
   /// Throws `Error` for a mesh without triangles, with indices out of range or with coordinates that are not
   /// finite. Throws `Error` for a thickness that does not fit the inside test. For the outer hull, throws `Error`
-  /// if the mesh has more than two million pairs of intersecting triangles, or if the hull would consist of more
-  /// than 250,000 pieces of 1/32 of the mesh's size. Throws `Cancelled` when `progress` says so.
+  /// if the mesh has more than two million pairs of intersecting triangles, or if their subdivision into pieces of 1/32
+  /// of the mesh's size would add more than 250,000 triangles. Throws `Cancelled` when `progress` says so.
   explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {}, const Progress& progress = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;

@@ -20,8 +20,8 @@ namespace hpsdf {
 /// point lies in exactly one leaf. The field jumps slightly from leaf to leaf unless it is blended
 /// (`FieldData::blend`). A blended field is f = Σ wₙ fₙ / Σ wₙ over the leaves n that have a weight at the point. Here
 /// fₙ is the polynomial of leaf n, continued beyond the box of the leaf, and wₙ is a product of smooth steps across the
-/// leaf's faces. Value and gradient of a blended field are continuous throughout the domain. Away from the faces it
-/// equals the field without blending to the bit.
+/// leaf's faces. Value and gradient of a blended field are continuous throughout the domain. Outside the blended zones
+/// along the faces, its values are identical to those without blending.
 ///
 /// Outside the domain the value at x is f(q) + |x − q|, where q is the domain's closest point to x, and the gradient
 /// is the gradient of this expression. The value is continuous across the domain's boundary; jumps between leaves at
@@ -35,8 +35,8 @@ class Field {
   double value(const Vector3& x) const;
   ValueAndGradient valueAndGradient(const Vector3& x) const;
 
-  /// Evaluates the field at many points, several times faster than one by one, with the same results. Both spans
-  /// must have the same length.
+  /// Evaluates the field at many points, with the results of single queries but several times faster. Both spans must
+  /// have the same length.
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
 

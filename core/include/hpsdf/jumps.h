@@ -13,9 +13,8 @@
 
 namespace hpsdf {
 
-/// The size of a jump on one interface between two leaves. The jump is the difference of the limits from the
-/// two leaves. The limits are those of the leaves' polynomials or, in a blended field, those of the blended
-/// field.
+/// The size of a field's jump on an interface between two leaves. At a point of the interface, the jump is the
+/// difference between the field's limits from the two leaves.
 struct Jump {
   double rms = 0;  ///< √(∫ jump² dA / area) by a quadrature that is exact for polynomials
   double max = 0;  ///< greatest jump at the quadrature points, including points on the face's edges and corners
@@ -40,7 +39,7 @@ struct Interface {
 
 /// All interfaces of a field, with their jumps.
 struct Jumps {
-  std::vector<Interface> interfaces;  ///< in octree order of the smaller leaf; for equal leaves, of the lower leaf
+  std::vector<Interface> interfaces;  ///< in octree order of the smaller leaf, or of the lower leaf if equal in size
   std::size_t hanging = 0;            ///< number of interfaces between leaves of different size
   double area = 0;                    ///< total area of the interfaces in units²
   Jump value;                         ///< jumps of f over all interfaces

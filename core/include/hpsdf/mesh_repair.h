@@ -24,16 +24,16 @@ struct RepairedMesh {
 ///    its volume exceeds a hundredth of its box's volume; otherwise it stays unchanged. If there is only one body,
 ///    or none is oriented inward, the volumes decide and the algorithm ends here.
 /// 4. Cavities. A cavity is oriented inward on purpose. Therefore the winding number of the imported mesh is
-///    probed close to both sides of each body, at points spread over its area. Two patterns decide if at least
-///    three quarters of the points show them:
-///    - Winding number at most 0 in front of the body and at least 1 behind: the body is oriented correctly,
-///      such as a cavity. It stays unchanged.
-///    - Winding number at most −1 in front and at least 0 behind: the body would be correct if the whole mesh
-///      were reversed, such as both surfaces of a hollow body that is inside out. The body is reversed, unless
-///      it is open with a positive volume.
-///    A point with equal winding numbers on both sides does not count: at this point another body cancels this
-///    body. A point that fits both patterns, because a body of opposite orientation touches this body, counts
-///    for the pattern that agrees with the body's volume.
+///    probed close to both sides of each body's surface, at points spread over its area. A body is decided if at
+///    least three quarters of its points show one of two patterns:
+///    - Winding number at most 0 in front of the surface and at least 1 behind: the body is oriented correctly
+///      and stays unchanged. A cavity is an example.
+///    - Winding number at most −1 in front of the surface and at least 0 behind: the body would be correct if the
+///      whole mesh were reversed. Both surfaces of a hollow body that is inside out are an example. The body is
+///      reversed, unless it is open with a positive volume.
+///    A point with equal winding numbers on both sides does not count, because a coincident surface of another
+///    body cancels the step there. A point can fit both patterns if a body of opposite orientation touches this
+///    body. Such a point counts for the pattern that agrees with the sign of this body's volume.
 /// 5. Nesting. If step 4 does not decide, a body that is oriented inward is reversed, unless three quarters of
 ///    its points lie within an odd number of other bodies, so that it is a cavity.
 ///

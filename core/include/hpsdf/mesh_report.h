@@ -1,6 +1,5 @@
 #pragma once
-// The state of a mesh: counts, measures, and the defects because of which the mesh is not the surface of a
-// solid.
+// Counts and measures of a mesh, and the defects that keep the mesh from being the surface of a solid.
 
 #include <array>
 #include <cstddef>
@@ -13,27 +12,27 @@
 
 namespace hpsdf {
 
-/// Counts and measures of a mesh after import. An edge is counted once, whatever its directions in the
-/// triangles.
+/// Counts and measures of a mesh after import. Edges are undirected: an edge counts once, no matter how many triangles
+/// share it.
 struct MeshReport {
   std::size_t vertices = 0;    ///< vertices after welding that at least one triangle uses
   std::size_t faces = 0;       ///< number of triangles in the mesh
   std::size_t components = 0;  ///< sets of triangles that are connected by shared edges
 
-  std::size_t boundaryEdges = 0;      ///< edges of one triangle
-  std::size_t nonManifoldEdges = 0;   ///< edges of more than two triangles
+  std::size_t boundaryEdges = 0;      ///< edges that belong to only one triangle
+  std::size_t nonManifoldEdges = 0;   ///< edges that belong to more than two triangles
   std::size_t inconsistentEdges = 0;  ///< edges that two triangles traverse in the same direction
 
-  /// Number of edges that more triangles traverse in one direction than in the other: the boundary of holes, and
-  /// edges with a wrong orientation. If there are no such edges, winding numbers are whole numbers, so that
-  /// inside and outside are defined even if other edges are non-manifold.
+  /// Number of edges that more triangles traverse in one direction than in the other: edges at holes, and edges at
+  /// which neighbouring triangles have opposite orientations. If there are none, winding numbers are whole numbers.
+  /// Inside and outside are then defined even if some edges are non-manifold.
   std::size_t unbalancedEdges = 0;
 
-  std::size_t weldedVertices = 0;                ///< vertices removed because another has the same position
+  std::size_t weldedVertices = 0;                ///< vertices removed because another vertex has the same position
   std::size_t unreferencedVertices = 0;          ///< vertices removed because no triangle uses them
-  std::size_t degenerateFaces = 0;               ///< triangles dropped for two equal corners or no area
+  std::size_t degenerateFaces = 0;               ///< triangles dropped because two corners are equal or the area is 0
   std::size_t flippedFaces = 0;                  ///< degenerate triangles replaced by an edge flip
-  std::size_t duplicateFaces = 0;                ///< triangles dropped for having the same three corners as another
+  std::size_t duplicateFaces = 0;                ///< triangles dropped because another triangle has the same corners
   Vector3 degeneratePosition = Vector3::Zero();  ///< centroid of the first degenerate triangle dropped, if any
   Vector3 duplicatePosition = Vector3::Zero();   ///< centroid of the first duplicate triangle dropped, if any
   bool reversed = false;                         ///< the whole mesh was reversed: its signed volume was negative
@@ -46,8 +45,8 @@ struct MeshReport {
   bool closed() const { return faces > 0 && boundaryEdges == 0 && nonManifoldEdges == 0 && inconsistentEdges == 0; }
 };
 
-/// Returns the counts and measures of a mesh without changing it. The counts of items that cleaning removes are
-/// 0. Throws `Error` (mesh) for indices out of range.
+/// Returns the counts and measures of a mesh without changing it. The counts of items that cleaning removes are 0.
+/// Throws `Error` (of the kind `mesh`) for indices out of range.
 MeshReport inspect(const TriangleMesh& mesh);
 
 /// A mesh after import, together with the report on this mesh.
@@ -92,17 +91,17 @@ struct MeshDefects {
   /// Number of crossings between two triangles of the same component, at which the surface passes through itself. Walls
   /// that two bodies share are not counted.
   std::size_t crossingsWithinComponents = 0;
-  /// True if reversing triangles can make the orientation consistent at every edge of exactly two triangles;
-  /// false for a Möbius strip.
+  /// True if the triangles can be oriented consistently at every edge that exactly two triangles share; false for a
+  /// Möbius strip.
   bool orientable = true;
 
   std::size_t count(DefectKind kind) const { return counts[static_cast<std::size_t>(kind)]; }
   std::span<const Defect> ofKind(DefectKind kind) const;
 };
 
-/// Finds every defect, with its position, because of which a mesh is not the surface of a solid. The mesh must
-/// be welded, because triangles share a corner only if they use the same vertex index. `crossings` are the
-/// self-intersections of this mesh. Throws `Error` (mesh) for indices out of range.
+/// Finds all defects that keep a mesh from being the surface of a solid, with their positions. The mesh must be welded,
+/// because triangles share a corner only if they use the same vertex index. `crossings` are the self-intersections of
+/// this mesh. Throws `Error` (of the kind `mesh`) for indices out of range.
 MeshDefects findDefects(const TriangleMesh& mesh, const Crossings& crossings);
 
 }  // namespace hpsdf

@@ -2,8 +2,8 @@
 // Proven bounds of a field's error, and safe distances from the surface that follow from these bounds.
 //
 // A signed distance Φ is 1-Lipschitz, |Φ(x) − Φ(y)| ≤ |x − y|. Therefore each exact value of Φ bounds Φ at all other
-// points from above and from below. Together with bounds of a leaf's polynomial f, these bounds of Φ give a bound of |f
-// − Φ| over the whole leaf (`CellBound`).
+// points from above and from below. Together with bounds of a leaf's polynomial f, these bounds of Φ give a bound of
+// |f − Φ| over the whole leaf (`CellBound`).
 //
 // The bounds hold if Φ is the signed distance of a closed surface without self-intersections. Near the holes of an open
 // mesh, and wherever else the sign of Φ is wrong, Φ jumps and no bound holds.
@@ -18,22 +18,23 @@
 namespace hpsdf {
 
 /// Returns a copy of `field` with a proven error bound (`CellBound`) for each leaf. The function evaluates Φ at 24
-/// points per leaf, which `exactEvaluations` in the metadata counts. The result does not depend on `threads` (0: all
-/// that the machine offers). Throws `Error` if Φ is not finite. Throws `Cancelled` when `progress` says so.
+/// points per leaf; `exactEvaluations` in the metadata includes these evaluations. The result does not depend on
+/// `threads` (0: all that the machine offers). Throws `Error` if Φ is not finite. Throws `Cancelled` when `progress`
+/// says so.
 Field withBounds(const Field& field, const DistanceFunction& distance, int threads = 0, const Progress& progress = {});
 
 /// Returns the error bound of the leaf that holds x or, for x outside the domain, of the leaf that holds the domain's
 /// closest point to x. Returns std::nullopt if the field has no bounds.
 std::optional<CellBound> boundAt(const Field& field, const Vector3& x);
 
-/// Returns the radius of a ball around x in which the surface certainly does not lie: |f(x)| minus its error bound, and
-/// at least 0. For x outside the domain, it is the safe distance of the domain's closest point minus the distance from
-/// x to this point. Throws `Error` if the field has no bounds.
+/// Returns the radius of a ball around x that the surface certainly does not enter: |f(x)| minus the error bound at x,
+/// and at least 0. For x outside the domain, the radius is the safe distance at the domain's closest point minus the
+/// distance from x to this point. Throws `Error` if the field has no bounds.
 double safeDistance(const Field& field, const Vector3& x);
 
 /// The result of `safeTrace`.
 struct SafeTrace {
-  double length = 0;  ///< length of the ray, in the field's units, that certainly does not touch the surface
+  double length = 0;  ///< length, in the field's units, that the ray certainly goes without touching the surface
   /// True if the surface may lie within `slack` of the ray's point at `length`; far from the domain, rounding may
   /// enlarge the slack. False if the ray left the domain.
   bool mayTouch = false;

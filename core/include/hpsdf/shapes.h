@@ -37,8 +37,8 @@ std::span<const Shape> catalogue();
 /// @param spec `NAME` or `NAME,parameter=value,…`, with or without a leading `builtin:`, such as
 ///   "torus,major=0.7,minor=0.3".
 ///
-/// Throws `Error` (option, the subject is `spec`) for an unknown name or parameter, naming the nearest known one, or
-/// for a value out of range.
+/// Throws `Error` (of the kind `option`, with the subject `spec`) for a value out of range and for an unknown name or
+/// parameter; in this case the message suggests the most similar known name.
 TriangleMesh mesh(std::string_view spec);
 
 /// Returns the signed distance of a built-in shape in closed form, with the shape's name and box as its

@@ -29,8 +29,8 @@ inline std::array<Vector3, 3> cornersOf(const TriangleMesh& mesh, const Triangle
   return {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]};
 }
 
-/// Throws `Error` (mesh) if a triangle refers to a vertex that does not exist. The error is about the first
-/// such triangle.
+/// Throws `Error` (of the kind `mesh`) if a triangle refers to a vertex that does not exist. The message names the
+/// first such triangle.
 void requireValidIndices(const TriangleMesh& mesh);
 
 /// Returns the smallest box around the vertices that triangles use. The box is empty for a mesh without
@@ -48,12 +48,12 @@ double surfaceArea(const TriangleMesh& mesh);
 /// name of the mesh does not influence the hash.
 std::uint64_t fingerprint(const TriangleMesh& mesh);
 
-/// Returns the normalization that maps a surface with this bounding box into [-1, 1]³. Throws `Error` (mesh)
-/// for a box without finite extent.
+/// Returns the normalization that maps a surface with this bounding box into [-1, 1]³. Throws `Error` (of the kind
+/// `mesh`) for a box without finite extent.
 Normalization normalizationOf(const Box& surface);
 
-/// Returns a copy of the mesh, scaled uniformly and centred so that the longest side of its bounding box spans
-/// exactly [-1, 1] (Koschier et al. 2016, sec. 4). Throws `Error` (mesh) for a mesh without finite extent.
+/// Returns a copy of the mesh, scaled uniformly and centred so that the longest side of its bounding box spans exactly
+/// [-1, 1] (Koschier et al. 2016, sec. 4). Throws `Error` (of the kind `mesh`) for a mesh without finite extent.
 TriangleMesh normalized(const TriangleMesh& mesh);
 
 }  // namespace hpsdf

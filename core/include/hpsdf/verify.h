@@ -22,11 +22,11 @@ struct ErrorFigures {
   double rms = 0;
   double mean = 0;
   double max = 0;
-  std::map<double, double> percentiles = {};  ///< percentiles of the error, by 50, 90, 99 and 99.9
+  std::map<double, double> percentiles = {};  ///< percentiles of the error; the keys are 50, 90, 99 and 99.9
 };
 
-/// Counts samples at which f and Φ have different signs. They are inevitable between the zero sets of f and Φ, and are
-/// defects only if |Φ| exceeds the field's error.
+/// Counts sign mismatches: samples at which the field f and the exact distance Φ have different signs. Mismatches are
+/// inevitable between the zero sets of f and Φ. They are defects only if |Φ| exceeds the field's error.
 struct SignFigures {
   std::size_t mismatches = 0;
   double farthest = 0;      ///< largest |Φ| of a mismatch
@@ -43,7 +43,7 @@ struct GradientFigures {
   double meanAngleDegrees = 0;
   double angle99Degrees = 0;  ///< 99th percentile of the angles
   double maxAngleDegrees = 0;
-  double maxPairSlope = 0;  ///< greatest |f(x) − f(y)|/|x − y| of consecutive samples, which includes jumps
+  double maxPairSlope = 0;  ///< greatest |f(x) − f(y)|/|x − y| of consecutive samples x, y; includes jumps
 };
 
 struct SampleFigures {
@@ -76,7 +76,7 @@ struct WorstPoint {
 struct VerifyOptions {
   std::size_t points = 1'000'000;     ///< number of samples, half uniform, half near the surface; at least 2
   std::uint64_t seed = 1;             ///< seed of the random points
-  double near = 0;                    ///< greatest distance of near samples; 0: 1 % of the longest side of the surface
+  double near = 0;                    ///< greatest distance of samples near the surface; 0: 1 % of its longest side
   double band = 0;                    ///< greatest |Φ| of samples; 0: samples of the whole domain
   double signBound = 0;               ///< `SignFigures::threshold`; 0: ten times the RMS error of the near samples
   std::size_t worst = 10;             ///< number of points with the largest errors, each in a different cell

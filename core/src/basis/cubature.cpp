@@ -16,9 +16,9 @@ struct Orbit {
 };
 
 // The rules below were found by solving the moment equations with the Levenberg-Marquardt method from random starts,
-// for all combinations of kinds of orbits. Up to order 11 they have as few points as the rules in F. Witherden, P.
-// Vincent, "On the identification of symmetric quadrature rules for finite element methods", 2015. The tests check the
-// moments of the rules.
+// for all combinations of orbit types, such as (x, 0, 0) and (x, x, x). Up to order 11 they have as few points as the
+// rules in F. Witherden, P. Vincent, "On the identification of symmetric quadrature rules for finite element methods",
+// 2015. The tests check the moments of the rules.
 constexpr Orbit kOrder5[] = {
     {0.88642659279778391, 0.79582242575422146, 0, 0},
     {0.33518005540166201, 0.75878691063932813, 0.75878691063932813, 0.75878691063932813},
@@ -69,7 +69,7 @@ void addImages(const Orbit& orbit, Cubature& rule) {
   std::ranges::sort(point);
   do {
     for (int signs = 0; signs < 8; ++signs) {
-      std::array<double, 3> image;  // Adding 0 turns -0 into 0, so that equal points compare equal.
+      std::array<double, 3> image;  // Adding 0 turns -0 into 0.
       for (int axis = 0; axis < 3; ++axis) image[axis] = ((signs >> axis & 1) ? -point[axis] : point[axis]) + 0.0;
       images.insert(image);
     }

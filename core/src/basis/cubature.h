@@ -14,10 +14,10 @@ struct Cubature {
   std::vector<double> weights;
 };
 
-/// Returns a cubature that is exact for polynomials of total degree `order` and needs about half as many points
-/// as a tensor product of Gauss rules: 14, 34, 58, 90, 148 points for orders up to 5, 7, 9, 11, 13. The
-/// cubature is invariant under the symmetries of the cube, all its points lie inside the cube and all its
-/// weights are positive. Returns std::nullopt for orders above 13.
+/// Returns a quadrature rule that is exact for polynomials up to total degree `order`. It needs about half as many
+/// points as a tensor product of Gauss rules: 14, 34, 58, 90, 148 points for orders up to 5, 7, 9, 11, 13. The rule is
+/// invariant under the symmetries of the cube, all its points lie inside the cube and all its weights are positive.
+/// Returns std::nullopt for orders above 13.
 std::optional<Cubature> compactCubature(int order);
 
 }  // namespace hpsdf::basis

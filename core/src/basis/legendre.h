@@ -9,8 +9,8 @@
 
 namespace hpsdf::basis {
 
-/// Number of tabulated ratios i/(i+1) of the three-term recurrence. It suffices for the highest degree of a
-/// Legendre polynomial that a quadrature rule needs.
+/// Number of tabulated ratios i/(i+1) of the three-term recurrence: one for each degree i from 0 to 255. No quadrature
+/// rule needs Legendre polynomials of a higher degree.
 constexpr int kMostLegendre = 256;
 constexpr auto kLegendreRatio = [] {
   std::array<double, kMostLegendre> ratio{};

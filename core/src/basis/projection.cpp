@@ -189,8 +189,8 @@ std::vector<double> truncated(std::span<const double> coefficients, int degree, 
 }
 
 std::array<detail::LegendreRows, 2> halfShares() {
-  // On the upper half of the interval, L_i((t+1)/2) = Σ_a r_ia L_a(t). Therefore the contribution of the half's
-  // coefficient a to coefficient i of the whole interval is r_ia ‖L_a‖² / ‖L_i‖² / 2.
+  // On the upper half of the interval, L_i((t+1)/2) = Σ_a r_ia L_a(t). Therefore coefficient a of the half contributes
+  // to coefficient i of the whole interval with the factor r_ia ‖L_a‖² / (2 ‖L_i‖²).
   const detail::LegendreRows r = detail::legendreOfPart(0.5, 0.5, kMaxDegree + 1);
   std::array<detail::LegendreRows, 2> shares;
   for (int i = 0; i <= kMaxDegree + 1; ++i)

@@ -1,8 +1,8 @@
 #pragma once
 // L2 projection of samples within a cell onto the polynomials of total degree at most p.
 //
-// The coefficients belong to the products L_i L_j L_k with i+j+k ≤ p. Their order is that of FieldData:
-// lexicographic in (i, j, k), k fastest.
+// The coefficients belong to the products L_i L_j L_k with i+j+k ≤ p. They are stored as in FieldData: in lexicographic
+// order of (i, j, k), k fastest.
 
 #include <array>
 #include <memory>
@@ -59,7 +59,7 @@ class Projection {
   /// Returns the n(p) coefficients of the projection, given one sample at each point.
   virtual std::vector<double> operator()(std::span<const double> samples) const = 0;
 
-  /// Returns the mean of the squared samples, ∫Φ² / V, integrated by the cubature of this projection.
+  /// Returns the mean square of a function over the cell, computed from samples of the function by the cubature.
   double meanSquare(std::span<const double> samples) const;
 
  protected:
@@ -76,8 +76,8 @@ std::unique_ptr<const Projection> productProjection(const QuadratureRule& axis, 
 /// Returns an L2 projection from samples at the points of any cubature. It multiplies the samples by one matrix.
 std::unique_ptr<const Projection> matrixProjection(const Cubature& cubature, int degree);
 
-/// Returns coefficients of degree p+1: the terms up to total degree p come from `lower`, the terms of total
-/// degree p+1 from `raised`. This is possible because a projection of higher degree has the same lower
+/// Returns coefficients of degree p+1: the terms up to total degree p come from `lower`, the terms of total degree p+1
+/// from `raised`. The two fit together because raising the degree of an L2 projection does not change the lower
 /// coefficients (Koschier et al. 2016, sec. 3.3).
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree);
 

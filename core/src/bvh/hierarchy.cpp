@@ -17,8 +17,8 @@ namespace {
 
 using Corners = std::array<std::uint32_t, 3>;
 
-/// The branches and blocks of a tree in depth-first order. The position of a branch in `nodes` is the index of
-/// its node; the position of a block in `blocks` is the index of the block.
+/// Lists of a tree's branches (inner nodes) and of its blocks of triangles, in depth-first order. `nodes[i]` is the
+/// branch that becomes node i; `blocks[i]` becomes block i.
 struct Numbered {
   std::vector<const Branch*> nodes;
   std::vector<std::array<std::uint32_t, kWidth>> children;  ///< `Node::child` of each node
@@ -31,7 +31,7 @@ struct Numbered {
     for (int i = 0; i < branch.count; ++i) {
       const Branch::Child& child = branch.children[i];
       const std::uint32_t index = child.branch ? add(*child.branch) : addBlock(child);
-      children[self][i] = index;  // `add` may reallocate `children`, so that it is indexed afterwards
+      children[self][i] = index;  // index `children` only now, because `add` may reallocate it
     }
     return self;
   }

@@ -20,7 +20,7 @@ void requireSurface(const TriangleMesh& mesh);
 
 /// The triangle of a mesh that is nearest to a query point.
 struct Nearest {
-  std::uint32_t triangleRef = 0;  ///< block and position of the triangle, see `Hierarchy::frameAt`
+  std::uint32_t triangleRef = 0;  ///< refers to the triangle, see `Hierarchy::frameAt`
   FramePoint point;               ///< the query point's position relative to the triangle
 };
 
@@ -38,12 +38,12 @@ struct alignas(64) Node {
 constexpr std::uint32_t kBlockBit = 0x80000000;
 constexpr std::uint32_t kEmpty = 0x7fffffff;
 
-/// An upper bound of all squared distances from points to the mesh that the search computes in single precision. The
-/// boxes of unused children are even farther away.
+/// A number greater than every squared distance to the mesh that a search computes in single precision. The squared
+/// distances to the boxes of unused children are even greater than this number.
 constexpr float kOutOfReach = 1e33f;
 
-/// Up to four triangles in single precision and local coordinates, with the fields of `TriangleFrame` except
-/// the normal. Unused lanes repeat the last triangle.
+/// Up to four triangles in single precision and local coordinates, with the fields of `TriangleFrame` except the
+/// normal. Unused places repeat the last triangle.
 struct alignas(32) Block {
   enum Field {
     origin = 0,
@@ -81,10 +81,11 @@ class Array {
 
 /// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children per node.
 ///
-/// Nodes and blocks are in single precision and only decide which triangles a search skips. Every bound allows for
-/// rounding, so that no triangle that may be the nearest is skipped. Among the remaining triangles, a search returns
-/// the one with the least squared distance in double precision or, among equal distances, the least index in the mesh.
-/// The result depends neither on the tree nor on the triangles from which a search starts nor on the instruction set.
+/// The boxes and triangles in nodes and blocks are in single precision. A search uses them only to skip triangles. Its
+/// bounds allow for rounding: it never skips a triangle that may be the nearest. It computes the squared distances of
+/// the other triangles in double precision and returns the nearest one; among equal distances, the least index in the
+/// mesh wins. The result does not depend on the tree, on the triangles from which the search starts, or on the
+/// instruction set.
 class Hierarchy {
  public:
   Hierarchy() = default;
@@ -110,7 +111,7 @@ class Hierarchy {
   // The arrays of frames and triangles are in the order of the hierarchy, so that most triangles that are close
   // to each other on the surface are close in memory.
   std::span<const TriangleFrame> frames() const { return frames_; }
-  std::span<const Triangle> triangles() const { return triangles_; }  ///< as indices into `vertices()`
+  std::span<const Triangle> triangles() const { return triangles_; }  ///< three indices into `vertices()` each
   std::span<const Vector3> vertices() const { return vertices_; }     ///< vertices in use, in the order of first use
 
   std::size_t bytes() const;

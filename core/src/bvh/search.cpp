@@ -22,8 +22,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// The tree has at most 64 levels (see `makeTriangleTree`). Each level leaves at most three children on the
-/// stack, and four more entries are written above its top.
+/// Capacity of the traversal's stack. The tree has at most 64 levels (see `makeTriangleTree`). Each level leaves at
+/// most three children on the stack, and four more entries are written above the top of the stack.
 constexpr std::size_t kStackSize = 3 * 64 + 8;
 
 template <class V>
@@ -84,8 +84,8 @@ HWY_INLINE SquaredBounds<D> triangleDistance(D d, const Point<hn::Vec<D>>& point
   return {squared - rounding, squared + rounding};
 }
 
-/// Returns (√upper + δ)², where `upper` is an upper bound of the squared distance to a triangle, and δ = `delta`
-/// allows for rounding. A triangle or box with a greater lower bound cannot be the nearest.
+/// Returns the squared distance above which a triangle or box cannot be the nearest: (√upper + delta)². Here `upper` is
+/// an upper bound of the squared distance to any one triangle, and `delta` allows for rounding.
 template <class D>
 HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   const auto distance = hn::Sqrt(upper) + hn::Set(d, delta);
@@ -221,9 +221,9 @@ class Stack {
   std::size_t top_ = 0;
 };
 
-/// Returns the ranks of a node's four children by descending distance. Children too far away to matter have a
-/// negative key and come last. All pairs of keys are compared without branches, because the processor would
-/// mispredict most branches.
+/// Returns the ranks of a node's four children by descending distance. `key` holds the distances; it is negative for
+/// children too far away to matter, which thus come last. All pairs of keys are compared without branches, because the
+/// processor would mispredict most branches.
 HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   static_assert(kWidth == 4);
   const bool over10 = key[1] > key[0], over20 = key[2] > key[0], over30 = key[3] > key[0], over21 = key[2] > key[1],
@@ -231,8 +231,8 @@ HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32, !over30 + !over31 + !over32};
 }
 
-/// Traverses the hierarchy: visits the seed blocks first, and then each node or block that may still contain the
-/// nearest triangle of a point when it is popped from the stack. At the end, measures the remaining candidates.
+/// Traverses the hierarchy. Visits the seed blocks first. Then pops nodes and blocks from the stack, and visits each
+/// one that may still contain the nearest triangle of a point. At the end, measures the remaining candidates.
 template <int Lanes, class Entry, class VisitNode, class VisitBlock, class InReach>
 HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& visitNode,
                          const VisitBlock& visitBlock, const InReach& inReach) {
@@ -429,7 +429,7 @@ void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPac
 }
 
 std::string_view instructionSet() {
-  // Highway gives better instruction sets lower bits: the lowest set bit is the best supported set.
+  // In Highway's bit masks, lower bits stand for better instruction sets: the lowest bit that is set is the best one.
   return hwy::TargetName(static_cast<std::int64_t>(
       std::uint64_t{1} << std::countr_zero(static_cast<std::uint64_t>(hwy::SupportedTargets() & HWY_TARGETS))));
 }

@@ -11,8 +11,8 @@
 
 namespace hpsdf::bvh {
 
-/// State of a search for the nearest triangles of `Lanes` points, one per SIMD lane. Its numbers of type `float`
-/// are in the local coordinates of the hierarchy.
+/// State of a search that finds the nearest triangle of each of `Lanes` points, one point per SIMD lane. All members of
+/// type `float` are in the local coordinates of the hierarchy.
 template <int Lanes>
 struct Search {
   static constexpr int kCapacity = 96;  ///< capacity of the list of candidates, which `settle` empties
@@ -36,7 +36,7 @@ struct Search {
   std::array<std::uint32_t, Lanes> seed;  ///< blocks of triangles to visit first, without repetition
 
   int count = 0;                                    ///< number of candidates
-  std::array<std::uint32_t, kCapacity> candidates;  ///< block and position, see `Hierarchy::frameAt`
+  std::array<std::uint32_t, kCapacity> candidates;  ///< triangles, encoded as in `Hierarchy::frameAt`
   alignas(64) float lower[kCapacity][Lanes];        ///< lower bounds of the candidates' squared distances
 
   // The query points, and for each point the nearest triangle found so far, in double precision and mesh units.
@@ -59,9 +59,9 @@ void run(Search<kPacket>& search);
 /// Returns the triangle nearest to x.
 Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x);
 
-/// Finds the nearest triangle of each point of a packet in one search. The points should be close to each
-/// other. On entry `nearest` holds triangles to start from, such as the results of nearby points; on return it
-/// holds the results.
+/// Finds the nearest triangle of each point of a packet in one search. The points should be close to each other. On
+/// entry, `nearest` holds triangles from which the search starts, such as those found for nearby points. On return, it
+/// holds the nearest triangles.
 void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
                       std::array<Nearest, kPacket>& nearest);
 

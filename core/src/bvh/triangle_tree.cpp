@@ -11,13 +11,13 @@ namespace {
 
 constexpr std::uint32_t kLeafSize = kWidth;
 constexpr int kBins = 16;
-constexpr float kNarrowest = 1e-30f;  ///< smallest range of triangle centers that is divided into bins
+constexpr float kNarrowest = 1e-30f;  ///< least extent of the triangle centers along an axis for a division into bins
 
 /// From this level of the tree on, a range of triangles is split into two halves of equal count. As a range has
 /// at most 2^32 triangles, no input makes the tree deeper than kMaxLevel + 32 levels.
 constexpr int kMaxLevel = 32;
 
-constexpr std::uint32_t kSamples = 1024;                              ///< number of triangles that determine a split
+constexpr std::uint32_t kSamples = 1024;                              ///< upper limit of triangles sampled per split
 constexpr float kEmptyCost = std::numeric_limits<float>::infinity();  ///< cost of a part without triangles
 constexpr std::uint32_t kParallel = 4096;  ///< number of triangles above which the children are built in parallel
 
@@ -29,7 +29,8 @@ struct Item {
   Eigen::Array4f doubledCenter() const { return box.lower + box.upper; }
 };
 
-/// A range of triangles, their bounding box, and the bounding box of the doubled centers of their boxes.
+/// A range of triangles with two boxes: the bounding box of the triangles, and the bounding box of the doubled centers
+/// of the triangles' own boxes.
 struct Range {
   std::uint32_t begin = 0, end = 0;
   FloatBox box = {};

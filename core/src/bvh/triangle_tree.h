@@ -14,7 +14,7 @@ namespace hpsdf::bvh {
 
 constexpr int kWidth = 4;  ///< maximum number of children of a node and of triangles in a block
 
-/// Axis-aligned box whose corners are vectors of four floats, of which the fourth is unused. A new box is empty.
+/// Axis-aligned box. Each corner is a vector of four floats; the fourth float is unused. A new box is empty.
 struct FloatBox {
   Eigen::Array4f lower = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array4f upper = Eigen::Array4f::Constant(-std::numeric_limits<float>::infinity());

@@ -45,11 +45,11 @@ using sign::WindingSign;
 
 constexpr int kLattice = 16;  // number of lattice points along each axis
 /// If two triangles are closer to each other than this, their distances from a point may round to the same number. The
-/// length applies to a mesh that is scaled to coordinates of about 1.
+/// constant holds for a mesh that is scaled to coordinates of about 1.
 constexpr double kTooNear = 0x1p-44;
-/// Least length of the pseudonormal of an edge or vertex that may decide a sign. At a sharp edge the length is about
-/// the angle between the edge's two faces. The dot product that decides the sign near the edge is half the square of
-/// the angle and must be far above rounding errors.
+/// Least length that the pseudonormal of an edge or vertex must have to decide a sign. At a sharp edge, the length is
+/// about the angle between the edge's two faces. The sign near the edge is the sign of a dot product that is half the
+/// square of this angle; the dot product must be far above rounding errors.
 constexpr double kSharp = 1e-6;
 
 /// Returns true if any point of a lattice around an open mesh is inside by the winding number. The lattice extends
@@ -239,7 +239,7 @@ struct ExactDistance::Data {
   /// Computes the distances of points to the nearest triangles of a hierarchy. `resolve` determines the signs.
   void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out) const {
     using bvh::kPacket;
-    std::array<bvh::Nearest, kPacket> nearest{};  // the previous points' results, which bound the next search
+    std::array<bvh::Nearest, kPacket> nearest{};  // nearest triangles of the previous points; they bound the search
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
       const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
       std::array<Vector3, kPacket> packet;
@@ -254,8 +254,8 @@ struct ExactDistance::Data {
     if (inside.choice.insideTest == InsideTest::pseudonormal) return;
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
     if (inside.choice.insideTest == InsideTest::outerHull) {
-      // For points outside, find the distance to the whole mesh. A triangle nearer than the hull belongs to the true
-      // hull; it is missing only because the hull has a limited resolution.
+      // Compute the distances to the whole mesh, which count for points outside. A triangle that is nearer than the
+      // computed hull belongs to the true hull, and is missing only because the computed hull has a limited resolution.
       std::vector<double> clearances(points.size());
       toTriangles(wholeMesh, points, clearances);
       for (double& clearance : clearances) clearance = std::abs(clearance);

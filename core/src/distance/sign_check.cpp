@@ -14,7 +14,8 @@ namespace {
 
 constexpr std::size_t kSignsPerTask = 16;
 
-/// Returns the random point with this number. Even-numbered points lie in the box, odd-numbered points near a triangle.
+/// Returns the random point with the index `number`. Even-numbered points lie in the box, odd-numbered points near a
+/// triangle.
 Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random random, std::size_t number) {
   if (number % 2 == 0) return random.inBox(box);
   const auto count = static_cast<double>(mesh.triangles.size());
@@ -29,8 +30,8 @@ Vector3 randomPoint(const TriangleMesh& mesh, const Box& box, detail::Random ran
 struct Tally {
   std::size_t tooNear = 0;
   std::size_t wrong = 0;
-  double worstDistance = 0;  ///< greatest distance of a wrong point
-  std::size_t worst = 0;     ///< lowest number of a wrong point at the distance `worstDistance`
+  double worstDistance = 0;  ///< greatest distance of a point with a wrong sign
+  std::size_t worst = 0;     ///< lowest index of a wrong point at the distance `worstDistance`
 
   void add(const Tally& other) {
     tooNear += other.tooNear;

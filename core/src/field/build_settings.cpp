@@ -53,8 +53,8 @@ struct Member<std::array<std::uint32_t, 3>> {
   }
 };
 
-/// The type, range and unit of a setting, and how it takes part in a construction. The table row of the setting
-/// adds its name, its help text and access to its value.
+/// The type, the range, the unit and other properties of a setting. The setting's row in the table of settings adds the
+/// name, the help text and the access to the value.
 struct Kind : BuildSetting {
   Kind& atLeast(double limit) { return with(minimum, limit); }
   Kind& above(double limit) { return atLeast(limit).with(minimumExcluded, true); }
@@ -123,8 +123,8 @@ constexpr Access kWeightedError = {
     true, [](const BuildOptions& options) { return unlessZero(options.targetError.weighted()); },
     [](BuildOptions& options, Values numbers) { options.targetError = numbers.empty() ? 0 : numbers[0]; }};
 
-/// The setting that chooses weak and exact continuity. Its number is the index of its word (none, weak, exact,
-/// both), of which bit 0 means weak and bit 1 exact continuity.
+/// The setting that chooses weak and exact continuity. Its value is an index into the list of words none, weak, exact,
+/// both. In this index, bit 0 stands for weak and bit 1 for exact continuity.
 constexpr Access kContinuity = {
     false,
     [](const BuildOptions& options) {

@@ -51,7 +51,7 @@ struct ErrorTotals {
 
 /// The errors at which the construction ends. Lengths are in the units of the field.
 struct ErrorGoal {
-  double weighted = 0;  ///< τ: bound of `ErrorTotals::weighted`; 0 if errors by distance are asked for
+  double weighted = 0;  ///< τ: bound of `ErrorTotals::weighted`; 0 if near and far errors are the goal
   double nearSquare = 0, farSquare = 0;  ///< mean squared errors to reach near the surface and far from it; 0: none
 
   bool byDistance() const { return nearSquare > 0; }

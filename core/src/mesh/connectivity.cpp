@@ -11,7 +11,7 @@ namespace {
 /// The neighbours of a triangle across edges that no third triangle shares.
 struct Neighbours {
   std::array<std::uint32_t, 3> face;
-  std::array<char, 3> sameDirection;  ///< 1 if both triangles run along the edge in the same direction, inconsistently
+  std::array<char, 3> sameDirection;  ///< 1 if both triangles traverse the edge in the same direction (inconsistent)
   std::uint8_t count = 0;
 
   void add(std::uint32_t other, bool same) {
@@ -33,8 +33,8 @@ std::vector<Neighbours> neighboursOf(std::size_t faces, std::span<const Directed
 
 constexpr std::uint32_t kNone = 0xffffffff;
 
-/// Adds to `patches` the patch of the triangle `lowest`, that is, all triangles that a search across shared edges
-/// reaches from it. `pending` is scratch memory.
+/// Adds to `patches` the patch of the triangle `lowest`: all triangles that can be reached from `lowest` across edges
+/// of exactly two triangles. `pending` is scratch memory.
 void addPatch(std::uint32_t lowest, std::span<const Neighbours> neighbours, Patches& patches,
               std::vector<std::uint32_t>& pending) {
   const auto patch = static_cast<std::uint32_t>(patches.count++);

@@ -67,9 +67,9 @@ Groups groupsOf(std::span<const Triangle> triangles) {
   return groups;
 }
 
-/// Calls visit(set, directed edges) for each undirected edge at which there is a chosen group, that is, a group g
-/// with chosen[g] = 1. `set` is the index of the set that contains the first chosen group, and the second
-/// argument lists all directed edges along the undirected edge.
+/// Calls visit(set, directed edges) for each undirected edge of a chosen group of duplicates, that is, a group g with
+/// chosen[g] = 1. `set` is the index of the set that contains the first chosen group at the edge. The second argument
+/// lists all directed edges along the undirected edge.
 template <typename Visit>
 void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, DisjointSets& sets, const Visit& visit) {
   forEachEdge(groups.edges, [&](std::span<const DirectedEdge> edge) {
@@ -78,7 +78,8 @@ void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, Disjoi
   });
 }
 
-/// Returns the disjoint sets of groups that are connected by edges. Only groups g with chosen[g] = 1 are connected.
+/// Returns the disjoint sets of groups of duplicates that are connected by edges. Only groups g with chosen[g] = 1 are
+/// connected.
 DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen) {
   DisjointSets sets(groups.all.size());
   forEachEdgeOf(groups, chosen, sets, [&](std::uint32_t set, std::span<const DirectedEdge> edge) {
@@ -92,10 +93,10 @@ DisjointSets connectedSets(const Groups& groups, const std::vector<char>& chosen
 /// numbers; it is 0 if equally many triangles run along the edge in both directions.
 int direction(const DirectedEdge& edge) { return edge.rising ? 1 : -1; }
 
-/// Returns 1 for each group in a shared wall of two bodies, else 0. A connected set of groups with both
-/// orientations is such a wall if other triangles adjoin it and, without the triangles of the set, equally many
-/// run along each edge of the set in both directions. Duplicates among the adjoining triangles may be counted
-/// once or all; it suffices that one of these counts balances all edges.
+/// Returns 1 for each group in a wall that two bodies share, else 0. A shared wall is a connected set of groups that
+/// have both orientations. Other triangles must adjoin the set, and equally many of them must run along each edge of
+/// the set in both directions. Duplicates among these other triangles are counted once or all; one of these two ways of
+/// counting must balance all edges.
 std::vector<char> wallsOf(const Groups& groups) {
   std::vector<char> both(groups.all.size());
   for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].hasBothOrientations();
@@ -173,9 +174,9 @@ void dropUnbalancingDuplicates(const Groups& groups, const std::vector<char>& se
   }
 }
 
-/// Returns how many triangles of each group are kept: at least one, or one of each orientation in a shared wall.
-/// In a connected set of groups more are kept if this minimum would leave more edges unbalanced, because several
-/// bodies share the triangles. In that case only duplicates that unbalance edges are dropped.
+/// Returns how many triangles of each group are kept: at least one, or one of each orientation in a shared wall. If
+/// this minimum would leave more edges unbalanced in a connected set of groups, for instance because several bodies
+/// share the triangles, only duplicates that unbalance edges are dropped from the set.
 std::vector<Kept> keptOf(const Groups& groups, const std::vector<char>& walls) {
   // Mark in `several` the groups with more triangles than the minimum, and drop from these groups the duplicates
   // that unbalance edges.

@@ -14,14 +14,14 @@ bool haveSameCorners(const Triangle& one, const Triangle& other);
 /// that share their three corners with another triangle. An edge is balanced if equally many triangles run along
 /// it in both directions.
 ///
-/// If all triangles with the same corners have the same orientation, one is kept. More are kept if several bodies
-/// share the triangles, so that dropping them would leave more edges unbalanced. In this case only duplicates
-/// that unbalance edges are dropped.
+/// If all triangles with the same corners have the same orientation, one of them is kept. If several bodies share the
+/// triangles, dropping all but one could leave more edges unbalanced. In this case only duplicates that unbalance edges
+/// are dropped.
 ///
 /// Triangles with the same corners and both orientations form sets that are connected by edges. Each set is one
 /// of two things:
-/// - a shared wall of two bodies, if the surrounding triangles balance the edges of the set without it. One
-///   triangle of each orientation is kept, so that each body is closed;
+/// - a shared wall of two bodies, if the surrounding triangles alone balance the edges of the set. One triangle
+///   of each orientation is kept, so that each body is closed;
 /// - otherwise a surface that is modelled with both sides, as drawing programs do. One triangle is kept: the
 ///   first one with the more frequent orientation.
 std::vector<char> redundantFaces(std::span<const Triangle> triangles);

@@ -38,8 +38,8 @@ void addEdges(const TriangleMesh& mesh, std::span<const DirectedEdge> edges, std
   });
 }
 
-/// Returns the index of the corner of triangle `face` at the vertex `vertex`. The corners of triangle n are numbered
-/// from 3n on.
+/// Returns the index of the corner of triangle `face` at the vertex `vertex`. The corners of triangle n have the
+/// indices 3n to 3n + 2.
 std::uint32_t cornerOf(const TriangleMesh& mesh, std::uint32_t face, std::uint32_t vertex) {
   const auto& triangle = mesh.triangles[face];
   return 3 * face + static_cast<std::uint32_t>(std::ranges::find(triangle, vertex) - triangle.begin());

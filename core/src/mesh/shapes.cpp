@@ -19,8 +19,8 @@ namespace hpsdf::shapes {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// Limits of all lengths that a caller may give. Their ratio is small enough for all parts of a shape to be
-// accurate in double precision.
+// The smallest and the greatest length that a caller may give. The ratio of these two limits is small enough for all
+// parts of a shape to be accurate in double precision.
 constexpr double kShortest = 1e-3, kLongest = 1e3;
 
 Parameter length(std::string name, double defaultValue, std::string help) {
@@ -234,8 +234,8 @@ TriangleMesh icosahedron() {
   TriangleMesh mesh;
   mesh.vertices = {{-1, phi, 0},  {1, phi, 0},  {-1, -phi, 0}, {1, -phi, 0}, {0, -1, phi},  {0, 1, phi},
                    {0, -1, -phi}, {0, 1, -phi}, {phi, 0, -1},  {phi, 0, 1},  {-phi, 0, -1}, {-phi, 0, 1}};
-  // Two vertices are joined by an edge if their distance is 2, the edge length. Three vertices are a face if
-  // each two of them are joined.
+  // Two vertices are joined by an edge if their distance is 2, the edge length. Three vertices form a face if every two
+  // of them are joined.
   const auto joined = [&](std::uint32_t a, std::uint32_t b) {
     return (mesh.vertices[a] - mesh.vertices[b]).norm() < 2.1;
   };
@@ -399,8 +399,8 @@ TriangleMesh wallMesh(std::uint32_t cells, const Sheet& inside, const Sheet& out
   for (std::uint32_t j = 0; j < n; ++j)
     for (std::uint32_t i = 0; i < n; ++i) {
       const std::array<std::uint32_t, 4> at = {j * row + i, j * row + i + 1, (j + 1) * row + i + 1, (j + 1) * row + i};
-      // The diagonal of each cell points towards the nearest corner of the square. In a corner cell, the other
-      // diagonal would cut off a triangle with two sides on the boundary, which would be a sliver on the disc.
+      // The diagonal of each cell points towards the nearest corner of the square. In a corner cell, the other diagonal
+      // would cut off a triangle with two sides on the boundary. This triangle would become a sliver on the disc.
       const std::uint32_t first = (i < cells) == (j < cells) ? 0 : 1;
       const auto corner = [&](std::uint32_t k) { return at[(first + k) % 4]; };
       addQuad(mesh, corner(0), corner(1), corner(2), corner(3));
@@ -458,7 +458,7 @@ TriangleMesh marbleRunMesh(const Request& request) {
   const double outer = request["width"] / 2, inner = outer - request["thickness"];
   const std::uint32_t sides = request.whole("sides"), loop = 2 * (sides + 1);
   const std::uint32_t steps = request.whole("turns") * request.whole("steps");
-  // Make the cross-section of the channel as points (distance outwards, height). They run along the outside of
+  // Make the points (distance outwards, height) of the channel's cross-section. The points run along the outside of
   // the channel from lip to lip, and back along its inside.
   std::vector<Eigen::Vector2d> section;
   for (std::uint32_t i = 0; i <= sides; ++i) section.push_back(outer * onCircle(sides + i, 2.0 * sides));

@@ -13,7 +13,7 @@
 namespace hpsdf::sign {
 namespace {
 
-constexpr std::uint32_t kFew = 512;      // fewer boundary edges than this are always summed one by one
+constexpr std::uint32_t kFew = 512;      // if there are fewer edges than this, all are summed one by one
 constexpr std::uint32_t kSmallest = 8;   // clusters of at most this many edges are not divided
 constexpr double kCoarsestRatio = 0.25;  // greatest ratio of a cluster's radius to its distance
 
@@ -76,7 +76,7 @@ void BoundaryEdges::Cluster::add(const Edge& edge) {
   const double edgeLength = along.norm();
   radius = std::max({radius, a.norm(), b.norm()});
   length += edgeLength;
-  cubes += edgeLength * (cube(a.norm()) + cube(b.norm())) / 2;  // bound: |d|³ is convex along the edge
+  cubes += edgeLength * (cube(a.norm()) + cube(b.norm())) / 2;  // upper bound: the integrand |d|³ is convex
   first += along;
   second += sum / 2 * along.transpose();
   const Eigen::Matrix3d spread = (a * a.transpose() + b * b.transpose() + sum * sum.transpose()) / 6;
@@ -98,8 +98,9 @@ inline void BoundaryEdges::Edge::addTo(Gradient& sum, const Vector3& local) cons
   const double below = product * (product + a.dot(b));
   if (below > 0) sum.value += multiplicity * (la + lb) / below * a.cross(b);
   const double nearest = (a + bvh::closestParameter(Vector3::Zero(), a, b) * along).norm();
-  // The derivative of this edge's contribution is at most the integral of 2/r³ along the edge. This integral is at most
-  // the edge's length times 2/nearest³, and at most the integral along an infinite line at the distance `nearest`.
+  // The derivative of this edge's contribution is at most the integral of 2/r³ along the edge, where r is the distance
+  // from the point. This integral is at most the edge's length times 2/nearest³. It is also at most 4/nearest², which
+  // is the integral along an infinite line at the distance `nearest`.
   sum.derivative += 2 * std::abs(multiplicity) * std::min(along.norm() / nearest, 2.0) / (nearest * nearest);
   sum.edgeDistance = std::min(sum.edgeDistance, nearest);
   ++sum.terms;

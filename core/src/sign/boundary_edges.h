@@ -14,18 +14,17 @@ namespace hpsdf::sign {
 /// The unbalanced edges of a mesh: boundary edges, and edges along which more triangles run in one direction than in
 /// the other. The unbalanced edges determine the gradient of the mesh's winding number.
 ///
-/// The gradient is the magnetic field of a current along the unbalanced edges, 1/4π ∫ r/|r|³ × dl, where r runs from
-/// the point to the edge (Biot and Savart), because a solid angle depends only on the outline of a surface. A closed
-/// mesh has no unbalanced edges, and its winding number is constant up to the surface.
+/// A solid angle depends only on the outline of a surface. Therefore the gradient at a point is the magnetic field of a
+/// current along the unbalanced edges (Biot and Savart): (1/4π) ∫ s/|s|³ × dl, where s runs from the point to the edge.
+/// A closed mesh has no unbalanced edges, and its winding number is constant up to the surface.
 ///
-/// A cluster of edges that is far enough away is replaced by the Taylor series of r/|r|³ about the cluster's center, up
-/// to second order. If all edges of the cluster lie within r of its center, and the center is at the distance R from
-/// the point, the truncation error is at most
+/// A cluster of edges that is far enough away is replaced by the Taylor series of s/|s|³ about the cluster's center, up
+/// to second order. Let R be the distance from the point to the center, r the greatest distance of the cluster's edges
+/// from the center, and d the vector from the center to an edge. The truncation error is at most
 ///
-///   B/4πR⁵ (4 − 3t)/(1 − t)²,  t = r/R,  B = ∫ |d|³ dl,  d from the center.
+///   B/(4πR⁵) · (4 − 3t)/(1 − t)²  with t = r/R and B = ∫ |d|³ dl.
 ///
-/// The bound is the sum of l |d|^(l−1)/R^(l+1) over l ≥ 4. It follows from the solid harmonics in the comment of
-/// `WindingNumber`.
+/// This bound is the sum over l ≥ 4 of the bounds l |d|^(l−1)/R^(l+1) that the comment of `WindingNumber` derives.
 class BoundaryEdges {
  public:
   BoundaryEdges() = default;
@@ -55,20 +54,20 @@ class BoundaryEdges {
  private:
   struct Edge {
     Vector3 from, to;
-    double multiplicity;  ///< number of triangles that run from `from` to `to`, less those that run back
+    double multiplicity;  ///< triangles that run from `from` to `to`, minus triangles that run back
 
     /// Adds 4π times the contribution of this edge to the gradient, and to its bounds, at the point `local`.
     void addTo(Gradient& sum, const Vector3& local) const;
   };
 
-  /// A cluster of the edges [begin, end) with its moments ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl. Here d
-  /// runs from the cluster's center to the edge, and dl contains the edge's multiplicity.
+  /// A cluster of the edges [begin, end) with its moments ∫dl, ∫d⊗dl and, for each component of dl, ∫d⊗d dl. The vector
+  /// d runs from the cluster's center to the edge. The line element dl is multiplied by the edge's multiplicity.
   struct Cluster {
     std::uint32_t begin = 0, end = 0;
     std::uint32_t next = 0;  ///< index of the next cluster that is not a part of this cluster
     Vector3 center = Vector3::Zero();
-    double radius = HUGE_VAL;  ///< r of the error bound; infinite until it is computed, so that the series is not used
-    double cubes = 0;          ///< upper bound of B = ∫ |d|³ dl in the error bound
+    double radius = HUGE_VAL;  ///< radius r in the error bound; infinite if the series must not be used
+    double cubes = 0;          ///< upper bound of ∫ |d|³ dl, which is B in the error bound
     double length = 0;         ///< sum of the edges' lengths times their absolute multiplicities
     Vector3 first = Vector3::Zero();
     Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
@@ -82,8 +81,8 @@ class BoundaryEdges {
 
   void addCluster(std::uint32_t begin, std::uint32_t end);
   void measure(Cluster& cluster) const;
-  /// Returns the gradient of the winding number: by the Taylor series for all clusters whose t = r/R is below
-  /// `ratio`, and edge by edge for all other edges.
+  /// Returns the gradient of the winding number. Uses the Taylor series for clusters whose ratio of radius to distance
+  /// is below `ratio`, and sums all other edges one by one.
   Gradient sum(const Vector3& local, double ratio) const;
 
   std::vector<Edge> edges_;

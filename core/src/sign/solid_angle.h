@@ -22,7 +22,7 @@ class AngleSum {
     if (y < 0 && imaginary_ < 0 && imaginary >= 0) --turns_;
     const bool addsHalfTurn = y == 0 && x < 0;
     if (addsHalfTurn && (imaginary_ > 0 || (imaginary_ == 0 && real_ < 0))) ++turns_;
-    // The product is rescaled, because long products would overflow or underflow; only the angle is of interest.
+    // Rescale the product, which would overflow or underflow after many factors. Its angle does not change.
     const double size = std::abs(real) + std::abs(imaginary);
     const double scale = size < 1e-100 ? 1e100 : size > 1e100 ? 1e-100 : 1;
     real_ = scale * real;

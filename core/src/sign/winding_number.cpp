@@ -12,14 +12,14 @@
 namespace hpsdf::sign {
 namespace {
 
-/// The greatest truncation error of one cluster at each accuracy level. A winding number is a sum over about a hundred
-/// clusters.
+/// The greatest truncation error that one cluster may have, by accuracy level. A winding number is a sum over about a
+/// hundred clusters.
 constexpr std::array<double, WindingNumber::kLevels> kErrors = {1e-2, 5e-4, 2e-5, 5e-7};
 
 double square(double x) { return x * x; }
 
-/// Returns the bound of the Taylor series' truncation error, A/4πR² (1/(1−t)² − 1 − 2t − 3t²), where A is `area` and t
-/// is `ratio`. Returns infinity if t is 1 or more, because the series need not converge.
+/// Returns the bound of the Taylor series' truncation error, A/(4πR²) · (1/(1−t)² − 1 − 2t − 3t²), where A is `area`,
+/// R² is `squaredDistance` and t is `ratio`. Returns infinity if t is 1 or more, because the series may diverge.
 double truncationError(double area, double squaredDistance, double ratio) {
   if (!(ratio < 1)) return HUGE_VAL;
   return area / (4 * std::numbers::pi * squaredDistance) * (1 / square(1 - ratio) - 1 - ratio * (2 + 3 * ratio));
@@ -91,7 +91,7 @@ void WindingNumber::Moments::add(const std::array<Vector3, 3>& v) {
     radius = std::max(radius, distance);
     cubes += distance * distance * distance;
   }
-  area += normal.norm() * cubes / 3;  // a convex function's mean is at most the mean of its corner values
+  area += normal.norm() * cubes / 3;  // the mean of the convex |v|³ is at most the mean of its corner values
   const Eigen::Matrix3d spread =
       (v[0] * v[0].transpose() + v[1] * v[1].transpose() + v[2] * v[2].transpose() + sum * sum.transpose()) / 12;
   first += normal;

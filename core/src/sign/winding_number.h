@@ -13,15 +13,15 @@ namespace hpsdf::sign {
 /// Sorkine-Hornung 2013). It is a whole number if the mesh is closed, and any real number if the mesh has
 /// holes.
 ///
-/// w(x) = 1/4π ∫ n·(q − x)/|q − x|³ dA over the surface. A cluster of triangles that is far enough from x
-/// is replaced by the Taylor series of the integrand about the cluster's center, up to second order (Barill
-/// et al. 2018). If all triangles of the cluster lie within r of its center, and the center is at the
-/// distance R from x, the truncation error is at most
+/// The winding number at x is (1/4π) ∫ n·(q − x)/|q − x|³ dS over the points q of the surface with normal n. A cluster
+/// of triangles that is far enough from x is replaced by the Taylor series of the integrand about the cluster's
+/// center, up to second order (Barill et al. 2018). Let R be the distance from x to the center, r the greatest
+/// distance of the cluster's triangles from the center, and d = q − center. The truncation error is at most
 ///
-///   A/4πR² (1/(1−t)² − 1 − 2t − 3t²),  t = r/R,  A = ∫ (|d|/r)³ dA,  d from the center.
+///   A/(4πR²) · (1/(1−t)² − 1 − 2t − 3t²)  with t = r/R and A = ∫ (|d|/r)³ dS.
 ///
-/// The reason is that the term of degree l of 1/|R + d| is a solid harmonic, whose gradient is at most l
-/// |d|^(l−1)/R^(l+1). The series contains the terms up to l = 3.
+/// This bound holds because the integrand is a derivative of 1/|q − x|, whose term of degree l in d is a solid
+/// harmonic with a gradient of at most l |d|^(l−1)/R^(l+1). The series contains the terms up to l = 3.
 class WindingNumber {
  public:
   WindingNumber() = default;
@@ -72,14 +72,14 @@ class WindingNumber {
     std::uint32_t begin = 0, end = 0;                     ///< range of triangle slots
   };
 
-  /// The moments of a cluster: ∫n dA, and the symmetric parts of ∫n⊗d dA (xx, yy, zz, xy, xz, yz) and ∫n⊗d⊗d dA (xxx,
-  /// yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz), where n is the normal and d runs from the cluster's center to the
-  /// surface. The remaining parts of the tensors cancel in the Taylor series.
+  /// The moments of a cluster, where n is the normal of the surface and d runs from the cluster's center to the
+  /// surface: ∫n dS, and the symmetric parts of ∫n⊗d dS (xx, yy, zz, xy, xz, yz) and ∫n⊗d⊗d dS (xxx, yyy, zzz, xxy,
+  /// xxz, xyy, yyz, xzz, yzz, xyz). The other parts of these tensors cancel in the Taylor series.
   struct Moments {
     Vector3 first = Vector3::Zero();
     std::array<double, 6> second = {};
     std::array<double, 10> third = {};
-    double area = 0, radius = 0;  ///< A and r in the bound of the truncation error
+    double area = 0, radius = 0;  ///< A and r in the error bound of `WindingNumber`
 
     /// Adds the moments of a triangle whose corners `v` are relative to the cluster's center.
     void add(const std::array<Vector3, 3>& v);

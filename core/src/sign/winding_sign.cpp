@@ -11,9 +11,9 @@
 namespace hpsdf::sign {
 namespace {
 
-constexpr std::size_t kBatch = 512;  // number of points whose signs may be derived from each other
-/// Tolerated error of the winding number from which the distance to a closing surface (which closes a hole) is
-/// computed. A greater error would add noise to the distance, which the refinement of the field would try to resolve.
+constexpr std::size_t kBatch = 512;  // number of points in a batch; their signs may be derived from each other
+/// Tolerated error of a winding number that serves to compute the distance to a surface that closes a hole. A greater
+/// error would add noise to the distance, and the refinement of the field would try to resolve the noise.
 constexpr double kExact = 2e-3;
 /// Tolerated errors of the winding number's gradient, multiplied by the distance to the triangles. `kRoughChange`
 /// usually suffices to show that the surface which closes a hole is farther away than the triangles. `kExactChange` is
@@ -42,8 +42,8 @@ struct WindingSign::Sample {
   double clearance;  ///< lower bound of the distance to the triangles
   double distance;   ///< distance to the surface, including the surfaces that close holes
   bool inside;
-  double margin = 0;        ///< lower bound of |w − level| for the winding number w
-  double gradient = 0;      ///< upper bound of |∇w|
+  double margin = 0;        ///< lower bound of |w − level_| for the winding number w
+  double gradient = 0;      ///< upper bound of the length of the winding number's gradient ∇w
   double derivative = 0;    ///< upper bound of the derivative of ∇w in any direction
   double edgeDistance = 0;  ///< lower bound of the distance to the unbalanced edges, at least `clearance`
 
@@ -66,8 +66,9 @@ struct WindingSign::Sample {
   bool isCertain() const { return margin > 2 * kExact + 1.01 * gradient * distance; }
 
  private:
-  /// Returns the sample after a step of length s. Every boundary edge is then still at least 1 − s/edgeDistance times
-  /// as far away as before. The bound of the derivative grows at most by the inverse cube of this factor.
+  /// Returns the sample for a point x at the distance `step`. From x, every unbalanced edge is at least (1 −
+  /// step/edgeDistance) times as far away as from this sample. The bound of the gradient's derivative grows at most by
+  /// the inverse cube of this factor.
   Sample movedBy(double step, const Vector3& x, double itsClearance, double itsDistance) const {
     const double nearer = 1 - step / edgeDistance;
     const double changes = derivative / (nearer * nearer * nearer), steepest = gradient + changes * step;
@@ -126,8 +127,7 @@ void WindingSign::applyTo(std::span<double> distances, std::span<const Vector3> 
 void WindingSign::applyToBatch(std::span<double> distances, std::span<const Vector3> points,
                                std::span<const double> clearances, std::vector<Sample>& samples) const {
   samples.clear();
-  // Points far from all triangles come first, because the signs of the greatest number of other points follow from
-  // their samples.
+  // Process points far from all triangles first, because a sample far away determines the signs of more other points.
   for (const std::uint32_t i : farthestFirst(clearances)) {
     Sample here = {points[i], clearances[i], distances[i], false};
     for (const Sample& other : samples)

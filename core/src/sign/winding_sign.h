@@ -15,9 +15,8 @@ double probeDistance(const Box& box);
 /// The sign of distances to a mesh by the winding number: a point is inside if its winding number is above
 /// ½.
 ///
-/// The surface on which the winding number w is ½ closes every hole of the mesh, and counts as surface. The
-/// distance to this surface is |w − ½|/|∇w| to first order. It replaces the distance to the triangles where
-/// it is smaller.
+/// The surface on which the winding number w is ½ closes every hole of the mesh, and counts as surface. The distance to
+/// this surface is |w − ½|/|∇w| to first order. The smaller of this distance and the distance to the triangles counts.
 class WindingSign {
  public:
   WindingSign() = default;
@@ -35,8 +34,8 @@ class WindingSign {
 
   /// Replaces unsigned distances by signed distances for a mesh in which some triangles do not count as surface.
   /// `distances` are the distances to the nearest triangle that counts, `clearances` the distances to the nearest of
-  /// all triangles. Outside points use the clearance, because from outside a triangle with the inside on both sides is
-  /// hidden behind others.
+  /// all triangles. For points outside, the clearance is a valid distance, because other triangles hide those with the
+  /// inside on both sides.
   void applyTo(std::span<double> distances, std::span<const Vector3> points, std::span<const double> clearances) const;
 
   /// Returns true if the triangle in `slot` has the outside in front of its centroid and the inside behind it. At the

@@ -25,8 +25,8 @@ bool inBox(const Vector3& x, const Vector3& a, const Vector3& b, const Axes& axe
   return std::ranges::all_of(axes, [&](int k) { return std::min(a[k], b[k]) <= x[k] && x[k] <= std::max(a[k], b[k]); });
 }
 
-/// Returns two coordinate axes onto whose plane the triangle projects with an area. Returns the same axis twice
-/// if the triangle is degenerate.
+/// Returns two coordinate axes. The triangle's projection to the plane of these axes has an area above 0. Returns the
+/// same axis twice if the triangle is degenerate.
 Axes projectionAxes(const Corners& t) {
   for (const Axes axes : {Axes{0, 1}, Axes{1, 2}, Axes{2, 0}})
     if (orientation(axes, t[0], t[1], t[2]) != 0) return axes;
@@ -158,8 +158,8 @@ bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
   return false;
 }
 
-/// Returns true if the corners of one triangle that are not shared, or the edges between these corners, come
-/// nearer to the other triangle than `margin`, or vice versa. The `shared` corners come first in both triangles.
+/// Returns true if one of two triangles comes nearer than `margin` to the unshared corners of the other one, or to the
+/// edges between these corners. The triangles have `shared` common corners, which come first in both.
 bool areNear(const Corners& one, const Corners& other, int shared, double margin) {
   const auto unshared = [&](const Corners& t) { return std::span(t).subspan(static_cast<std::size_t>(shared)); };
   return isNear(one, unshared(other), margin) || isNear(other, unshared(one), margin);
@@ -321,9 +321,9 @@ Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, doub
   const auto add = [&](const std::vector<Crossing>& found) {
     crossings.found.insert(crossings.found.end(), found.begin(), found.end());
   };
-  // Search the triangles in ranges that grow up to a fiftieth of all triangles. If a range has more crossings than
-  // `limit` allows, its search is stopped early and the range is halved, until the triangle is found at which the
-  // limit is reached. Even if all triangles intersect each other, most pairs thus are neither tested nor stored.
+  // Search the triangles range by range. The ranges grow, up to a fiftieth of all triangles. If the crossings of a
+  // range exceed `limit`, stop early and halve the range, until only the triangle is left at which the limit is
+  // reached. Thus most pairs are neither tested nor stored, even if all triangles intersect each other.
   constexpr std::uint32_t kLeast = 64;
   const std::uint32_t largest = std::max(kLeast, count / 50);
   std::uint32_t size = kLeast;

@@ -23,26 +23,26 @@ namespace hpsdf {
 namespace surface {
 namespace {
 
-/// The bodies of a surface, made of patches: sets of triangles that are connected across edges of exactly two
-/// triangles. Several patches form one body if only their union is closed and solid material lies between them. Every
-/// other patch is a body of its own. Solids that touch along an edge or in a shared wall are different bodies.
+/// The bodies that the patches of a surface form. A patch is a set of triangles that are connected across edges of
+/// exactly two triangles. Several patches form one body if only their union is closed and solid material lies between
+/// them. Every other patch is a body of its own. Solids that touch at an edge or a shared wall are different bodies.
 struct Bodies {
-  std::vector<std::uint32_t> ofPatch;  ///< for each patch, its body: the lowest index of a patch of the body
+  std::vector<std::uint32_t> ofPatch;  ///< for each patch, its body, named by the body's lowest patch index
   std::vector<char> closed;            ///< for each patch, 1 if its body is closed and thus has no one-sided patch
 };
 
 /// Angle in radians below which two faces count as coplanar.
 constexpr double kSameAngle = 1e-9;
 
-/// Returns true if an edge has exactly two faces, both of the same patch, and these run along the edge in
+/// Returns true if an edge has exactly two faces, both faces belong to the same patch, and they run along the edge in
 /// opposite directions.
 bool isWithinPatch(const mesh::Patches& patches, std::span<const mesh::DirectedEdge> edge) {
   return edge.size() == 2 && edge[0].rising != edge[1].rising &&
          patches.patchOf[edge[0].face] == patches.patchOf[edge[1].face];
 }
 
-/// Returns the directed edges that remain along an edge after directed edges of the same patch with opposite
-/// directions have cancelled in pairs. The order of the faces determines which of them cancel.
+/// Among the directed edges along one undirected edge, cancels pairs of opposite directions in the same patch. Returns
+/// the remaining directed edges. The order of the faces determines which ones cancel.
 std::vector<mesh::DirectedEdge> unbalanced(const mesh::Patches& patches, std::span<const mesh::DirectedEdge> edge) {
   std::vector<mesh::DirectedEdge> sides(edge.begin(), edge.end());
   std::ranges::stable_sort(sides, {}, [&](const mesh::DirectedEdge& side) { return patches.patchOf[side.face]; });
@@ -63,10 +63,10 @@ struct RadialFace {
   std::uint32_t patch;
 };
 
-/// Sorts the faces at an edge by angle, counterclockwise as seen with the edge pointing to the viewer. A face
-/// begins a solid if its `rising` equals `begins`, else it ends a solid. Coplanar faces get the same angle, and
-/// those that end a solid come first. Coincident faces of the same orientation are sorted by patch, so that all
-/// edges of a shared wall match the same patches.
+/// Sorts the faces at an edge by angle, counterclockwise as seen with the edge pointing to the viewer. Coplanar faces
+/// get the same angle. Among them, faces that end a solid come first: their `rising` differs from `begins`. All other
+/// faces begin a solid. Coincident faces of the same orientation are sorted by patch, so that all edges of a shared
+/// wall match the same patches.
 void sortAround(std::vector<RadialFace>& faces, bool begins) {
   std::ranges::sort(faces, {}, &RadialFace::angle);
   const auto before = [begins](const RadialFace& a, const RadialFace& b) {
@@ -106,8 +106,8 @@ std::vector<RadialFace> radialFaces(const TriangleMesh& mesh, const mesh::Patche
 /// Two faces at an edge with solid material between them.
 using Wedge = std::array<RadialFace, 2>;
 
-/// Matches each face that begins a solid with the face that ends the same solid, like opening and closing
-/// parentheses, in two passes around the edge. As many faces must begin a solid as end one.
+/// Matches each face that begins a solid with the face that ends the same solid, like opening and closing parentheses,
+/// in two passes around the edge. The faces that begin a solid must be as many as the faces that end one.
 std::vector<Wedge> wedgesOf(std::vector<RadialFace> faces, bool begins) {
   sortAround(faces, begins);
   std::vector<Wedge> wedges;
@@ -129,9 +129,9 @@ bool anyIsFlat(const std::vector<Wedge>& wedges) {
   return std::ranges::any_of(wedges, [](const Wedge& wedge) { return wedge[0].angle == wedge[1].angle; });
 }
 
-/// Joins patches that have solid material between them at an edge. If two coplanar faces would enclose a solid
-/// without thickness, all solids at the edge may be oriented inward; in this case the roles of solid and empty
-/// space are exchanged. If this also yields a solid without thickness, all patches at the edge are joined.
+/// Joins patches that have solid material between them at an edge. If two coplanar faces would enclose a solid without
+/// thickness, all solids at the edge may be oriented inward. The function then exchanges solid and empty space. If this
+/// also yields a solid without thickness, it joins all patches at the edge.
 void joinSolids(const std::vector<RadialFace>& faces, mesh::DisjointSets& bodies) {
   std::vector<Wedge> wedges = wedgesOf(faces, false);
   if (anyIsFlat(wedges)) wedges = wedgesOf(faces, true);
@@ -170,7 +170,7 @@ Bodies findBodies(const TriangleMesh& mesh, const mesh::Patches& patches, std::s
   return bodies;
 }
 
-/// The faces and the measures of one body, which is reversed as a whole or not at all.
+/// The faces and the measures of one body. A body is reversed as a whole or not at all.
 struct Body {
   std::vector<std::uint32_t> faces;
   double area = 0, volume = 0;
@@ -187,7 +187,7 @@ Vector3 areaVector(const TriangleMesh& mesh, std::uint32_t face) {
 
 void reverse(TriangleMesh& mesh, std::uint32_t face) { std::swap(mesh.triangles[face][1], mesh.triangles[face][2]); }
 
-/// Orients the faces of each patch consistently, like those that cover the greater part of the patch's area.
+/// Gives all faces of a patch the same orientation: the one that the greater part of the patch's area already has.
 /// Skips one-sided patches. Returns the number of reversed faces.
 std::size_t orientPatches(TriangleMesh& mesh, const mesh::Patches& patches) {
   std::vector<double> area(patches.count), against(patches.count);
@@ -204,9 +204,9 @@ std::size_t orientPatches(TriangleMesh& mesh, const mesh::Patches& patches) {
   return reversed;
 }
 
-/// Returns one entry per patch. The measures of a body are in the entry of its first patch; the entries of its
-/// other patches have no faces. The volume of a body is the sum of the signed tetrahedra between its triangles
-/// and the center of its bounding box. A one-sided body has `solid` = false.
+/// Returns the faces and measures of all bodies, in one entry per patch. A body is in the entry of its first patch; the
+/// entries of its other patches have no faces. A body's volume is the sum of the signed volumes of the tetrahedra
+/// between its triangles and the center of its bounding box. A one-sided body has `solid` = false.
 std::vector<Body> measureBodies(const TriangleMesh& mesh, const mesh::Patches& patches, const Bodies& bodies) {
   std::vector<Body> measured(patches.count);
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {

@@ -22,14 +22,14 @@
 namespace hpsdf::surface {
 namespace {
 
-/// The length of the smallest pieces of triangles relative to the longest side of the mesh. It starts at
+/// The length of the smallest pieces of subdivided triangles, divided by the longest side of the mesh. It starts at
 /// `kFinest` and is doubled, up to `kCoarsest`, while there are too many pieces.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
 /// Near holes of the mesh, the smallest pieces are longer by this factor than at intersections, because holes do
 /// not merit as many pieces.
 constexpr double kCoarserBesideHoles = 8;
 constexpr std::size_t kMostPairs = 2'000'000;
-constexpr std::size_t kMostPieces = 250'000;  // limit for pieces in addition to the mesh's triangles
+constexpr std::size_t kMostPieces = 250'000;  // limit for the number of pieces minus the number of mesh triangles
 
 enum class PieceKind : char {
   surface,      ///< at least one side of the piece is outside the solid
@@ -51,8 +51,8 @@ struct Cutter {
   std::uint32_t triangle;
   Corners corners;
   bool isCoplanar;  ///< true if both triangles lie in one plane
-  /// For each edge of a coplanar cutter: true if it can separate inside from outside. It cannot if a neighbour of
-  /// the cutter continues the cutter's plane across the edge.
+  /// For each edge of a coplanar cutter: true if the edge can separate inside from outside. It is false if a neighbour
+  /// of the cutter continues the cutter's plane across the edge.
   std::array<bool, 3> counts = {true, true, true};
 };
 
@@ -147,9 +147,9 @@ std::vector<Pair> intersectingPairs(const bvh::Hierarchy& hierarchy, const Trian
   return pairs;
 }
 
-/// Sets `counts` to false for each edge of a coplanar cutter across which another coplanar cutter continues the
-/// plane. A neighbour that is folded back onto the cutter does not continue the plane: it intersects the cutter,
-/// so that `pairs` contains the two triangles.
+/// Sets `counts` to false for each edge of a coplanar cutter across which another coplanar cutter continues the plane.
+/// A neighbour that is folded back onto the cutter does not count as a continuation: it intersects the cutter, and
+/// `pairs` lists the two triangles.
 void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, std::vector<Cutter>& cutters) {
   using DirectedEdge = std::array<std::uint32_t, 3>;  // start vertex, end vertex, triangle
   std::vector<DirectedEdge> edges;
@@ -171,8 +171,8 @@ void ignoreInnerEdges(const TriangleMesh& mesh, const std::vector<Pair>& pairs, 
   }
 }
 
-/// Subdivides all triangles that other triangles intersect, and returns the pieces of all triangles in the order
-/// of the triangles. The coordinates of the pieces are multiplied by `scale`. Throws `TooManyPieces`.
+/// Subdivides all triangles that other triangles intersect, and returns the pieces of all triangles in the order of the
+/// triangles. Multiplies the coordinates of all pieces by `scale`. Throws `TooManyPieces`.
 std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, const std::vector<Pair>& pairs,
                                       Subdivider& subdivider) {
   const auto scaledCorners = [&](std::uint32_t t) {
@@ -212,8 +212,8 @@ std::vector<Piece> subdivideTriangles(const TriangleMesh& mesh, double scale, co
   return pieces;
 }
 
-/// Tests whether the two sides of a piece are inside or outside the mesh, at points whose distance from the piece
-/// is `offset` in mesh units. The coordinates of pieces are multiplied by `scale`.
+/// Tests whether the two sides of a piece of a subdivided triangle are inside the mesh. The test points have the
+/// distance `offset` from the piece, in mesh units. Pieces come in with coordinates already multiplied by `scale`.
 struct SideProbe {
   const sign::WindingSign& winding;
   double scale, offset;
@@ -235,9 +235,9 @@ struct SideProbe {
     return isCertain ? PieceKind::inner : PieceKind::undecided;
   }
 
-  /// Returns true if an intersected piece lies in the interior of the mesh. All test points must be inside: points on
-  /// both sides of its quarters, and points around its centroid, in fourteen directions at the distance of its
-  /// longest side.
+  /// Returns true if an intersected piece lies in the interior of the mesh. Tests points on both sides of each quarter
+  /// of the piece, and points around the piece's centroid in fourteen directions, as far away as the piece's longest
+  /// side is long. All these points must be inside.
   bool isSurrounded(const Corners& corners) const {
     const Vector3 aside = step(corners);
     for (const Corners& quarter : quarters(corners))
@@ -267,7 +267,7 @@ struct SideProbe {
   }
 };
 
-/// Returns all pieces with their kinds, or std::nullopt if there are too many pieces. Pieces remain
+/// Returns the pieces of all triangles with their kinds, or std::nullopt if there are too many pieces. Pieces remain
 /// undecided only near holes of the mesh.
 std::optional<std::vector<Piece>> classifiedPieces(const TriangleMesh& mesh, double scale,
                                                    const std::vector<Pair>& pairs, const sign::WindingSign& winding,

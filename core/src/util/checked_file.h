@@ -97,7 +97,7 @@ struct FileKind {
 /// ends too early or contains an impossible value.
 class CheckedReader {
  public:
-  /// Throws `Error` (file) for a file that is missing, not a regular file, or cannot be opened.
+  /// Throws `Error` (of the kind `file`) for a file that is missing, not a regular file, or cannot be opened.
   CheckedReader(const std::filesystem::path& file, const FileKind& kind);
 
   template <typename T>

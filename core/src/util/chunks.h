@@ -98,7 +98,7 @@ Sum sumOfChunks(std::size_t items, std::size_t size, const Progress& progress, s
 }
 
 /// Like `sumOfChunks`, but adds the chunks' sums in any order and does not store them. The result is reproducible only
-/// if it does not depend on the order of addition.
+/// if the sum does not depend on the order of addition.
 template <typename Sum, typename Work>
 Sum unorderedSumOfChunks(std::size_t items, std::size_t size, const Progress& progress, std::string_view task,
                          const Work& work) {

@@ -26,9 +26,9 @@ std::string reason(int error) { return std::generic_category().message(error); }
 
 constexpr std::string_view kTemporary = ".part-";  ///< followed in file names by a process id, "-" and a number
 
-/// Returns the beginning that the names of all temporary files of `file` share, without a folder. If the
-/// name of `file` is too long for a suffix, the beginning contains its first characters (whole UTF-8
-/// characters) and a hash of the name.
+/// Returns the text with which the names of all temporary files of `file` begin: the name of `file` and `kTemporary`.
+/// If the name of `file` is too long for a suffix, only its first characters (whole UTF-8 characters) and a hash of the
+/// name are used.
 std::string beginningOfTemporaries(const std::filesystem::path& file) {
   constexpr std::size_t kLongest = 100, kKept = 60;
   std::string name = file.filename();
@@ -42,8 +42,8 @@ std::string beginningOfTemporaries(const std::filesystem::path& file) {
   return name + std::string(kTemporary);
 }
 
-/// Returns a name for a temporary file in the folder of `file`. No other writer of `file` uses this name,
-/// neither in this process nor in another process.
+/// Returns a name for a temporary file in the folder of `file`. The name contains the process id and a counter, and is
+/// therefore not in use by a running process.
 std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   static std::atomic<unsigned> counter = 0;
   std::filesystem::path name = file;
@@ -60,8 +60,8 @@ std::filesystem::path resolved(const std::filesystem::path& file) {
   return target.empty() ? file : target;
 }
 
-/// The names of the existing temporary files of this process, which `removeUnfinished` removes. At most 16
-/// names are stored at a time.
+/// The names of this process's existing temporary files, which `removeUnfinished` deletes. The array has room for 16
+/// names.
 std::array<std::atomic<const char*>, 16> unfinished{};
 static_assert(std::atomic<const char*>::is_always_lock_free, "a signal handler reads these");
 
@@ -87,8 +87,8 @@ bool isOurs(const std::filesystem::path& name) {
   });
 }
 
-/// Returns the id of the process that wrote a temporary file of `file`, as found in the temporary file's
-/// name. Returns std::nullopt for any other name.
+/// If `name` is the name of a temporary file of `file`, returns the process id that `name` contains: the id of the
+/// process that wrote the temporary file. Returns std::nullopt for any other name.
 std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
   const std::string text = name.filename(), before = beginningOfTemporaries(file);
   if (!text.starts_with(before)) return std::nullopt;
@@ -127,7 +127,7 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   const auto refuse = [&](int why) {
     throw Error(ErrorKind::file, file.string(), "cannot be written (" + reason(why) + "); check the folder");
   };
-  // Refuse a file name that is too long, because opening the temporary file, whose name is short enough, would succeed.
+  // Refuse a file name that is too long. The temporary file has a shorter name and would open, but `commit` would fail.
   if (error == std::errc::filename_too_long) refuse(error.value());
   if (std::filesystem::is_directory(status))
     throw Error(ErrorKind::file, file.string(), "is a folder; give a file name");

@@ -15,7 +15,7 @@
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::size_t kMostContacts = SphereMinima::kMost;  // contacts of two bodies; three manifolds hold four each
+constexpr std::size_t kMostContacts = SphereMinima::kMost;  // limit for the contacts of two bodies: 3 manifolds of 4
 constexpr int kNodes = 256;                                 // number of a soft body's nodes that one task handles
 constexpr int kPieces = 64;                                 // greatest number of points sampled on a node's path
 

@@ -27,7 +27,7 @@ bool isPossible(const btVector3& velocity, double step) { return velocity.length
 }  // namespace
 
 struct World::Parts {
-  /// Bullet's constraint solver, which also measures its time.
+  /// Bullet's constraint solver, extended to measure how long it takes.
   class TimedSolver final : public btSequentialImpulseConstraintSolver {
    public:
     btScalar solveGroup(btCollisionObject** bodies, int bodyCount, btPersistentManifold** manifolds, int manifoldCount,

@@ -35,8 +35,8 @@ constexpr double kCasingWidth = 3.4;
 // of small cells.
 constexpr double kOutlineFadesBelow = 10;
 constexpr double kOutlineGoneBelow = 3;
-// The least slope of the distance that is assumed for drawing lines. With the true slope, lines would widen to blots
-// where the distance is almost constant in the plane of a slice (near a medial axis or on a tangent plane).
+// Lines are drawn as if the distance had at least this slope. With the true slope, lines would widen to blots where the
+// distance is almost constant in the plane of a slice (near a medial axis or on a tangent plane).
 constexpr double kFlattestSlope = 0.25;
 
 // Returns a picture in which each pixel is the mean of its samples' colours, where colorOf(x, y, i) is the
@@ -55,8 +55,8 @@ Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
   return image;
 }
 
-// Returns the share of a sample, 0 to 1, that a line covers. The sample is at `distance` from the centre of the line;
-// lengths are in samples.
+// Returns the share of a sample, 0 to 1, that a line of the given width covers. The sample is at `distance` from the
+// centre of the line. Both lengths are in samples.
 float coverage(double distance, double width) {
   return static_cast<float>(std::clamp(width / 2 + 0.5 - distance, 0.0, 1.0));
 }
@@ -115,7 +115,7 @@ class CellOutlines {
   }
 
   // Returns the share of sample (x, y), 0 to 1, that outlines perpendicular to one axis cover. `position` is the
-  // sample's number along this axis. `step` is the index offset from a sample to the previous one along the axis.
+  // sample's coordinate along this axis. `step` is the index offset to the previous sample along the axis.
   float alongAxis(int x, int y, int position, std::ptrdiff_t step) const {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
     const std::uint32_t* cell = &cell_[i];

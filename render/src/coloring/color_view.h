@@ -37,10 +37,10 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
 /// line at distance zero.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
-/// Colours a lit surface in front of the backdrop. If `color` is empty, surface and boxes have plain materials, else
-/// the given colours with soft shading. Sections and planes are unlit and show the outlines of their cells; on a plane,
-/// the surface f = offset is a line. `lines` is empty or holds the share of each sample, 0 to 1, that lines along cell
-/// edges cover. `bodies` holds the colour of each body.
+/// Colours a view of a surface in front of the backdrop. The surface and boxes have soft shading and the colours that
+/// `color` returns, or plain materials if `color` is empty. Sections and planes are unlit and show the outlines of
+/// cells. On a plane, the surface f = offset is drawn as a line. `lines` holds the share of each sample, 0 to 1, that
+/// lines along cell edges cover, or is empty. `bodies` holds the colour of each body.
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
                    double offset = 0, const std::vector<float>& lines = {}, std::span<const LinearColor> bodies = {});
 

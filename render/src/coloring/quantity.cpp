@@ -62,7 +62,7 @@ std::vector<Weighted> weighted(const Field& field, const std::vector<double>& of
   return values;
 }
 
-/// Picks at most a million samples at even intervals, to represent all samples. Each has the weight 1.
+/// Picks at most a million samples at even intervals, to represent all samples. Gives each of them the weight 1.
 std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
   constexpr std::size_t kMost = 1'000'000;
   std::vector<Weighted> values;

@@ -85,7 +85,7 @@ struct Lights {
     const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
     const LinearColor lamps =
         keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim));
-    // Occlusion removes up to all ambient light of sky and ground, but only a part of the light of the lamps.
+    // Occlusion can remove all ambient light of sky and ground, but only a part of the light of the lamps.
     return lamps * (0.45F + 0.55F * open) + mix(ground, sky, 0.5F + 0.5F * n.y()) * open;
   }
 

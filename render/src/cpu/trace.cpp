@@ -61,8 +61,8 @@ Sample evaluate(const T* c, int degree, const Vector3& local) {
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
 /// The length along the ray, in world units, from a point to just behind the face where the ray leaves the point's
-/// node. With a margin, the node is first shrunk on every side by `margin` times its edge length. Without the
-/// overshoot, a ray that runs along a face, up to rounding, would leave the node again at every step.
+/// node. A length that ended on the face could, by rounding, keep a ray along the face in the same node at every step.
+/// With a margin, the node is first shrunk on every side by `margin` times its edge length.
 double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid, double margin = 0) {
   double exit = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {

@@ -1,8 +1,8 @@
 #pragma once
-// Lookup, evaluation and ray tracing of a field in double precision: the reference with which the shaders are compared.
-// It is itself tested against the queries of `Field`. So as not to share their faults, it repeats the lookup and
-// evaluation of core instead of calling them, and its march uses fewer bounds than the shaders and starts every ray
-// where it enters the domain.
+// Lookup, evaluation and ray tracing of a field in double precision: the reference for tests of the shaders. Tests also
+// compare this code with the queries of `Field`. To share no faults with these queries, it has its own lookup and
+// evaluation. To share no faults with the shaders, its march uses fewer bounds than theirs and starts every ray where
+// the ray enters the domain.
 
 #include <optional>
 #include <vector>
@@ -19,7 +19,7 @@ struct CellPoint {
   std::uint32_t node;
   int depth;
   Vector3 base;      ///< lower corner of the base cell, grid coordinates
-  Vector3 path;      ///< lower corner of the node within its base cell, counted in nodes of its depth
+  Vector3 path;      ///< lower corner of the node within its base cell, in units of the node's edge length
   Vector3 fraction;  ///< position of the point within the node, in [0, 1]³
 };
 
@@ -42,9 +42,9 @@ struct Hit {
   bool onFace;    ///< whether f crosses the offset on the face between two leaves, not within one leaf
 };
 
-/// A hit on the face between two leaves is a crack if |f − offset| exceeds kCrack · domain diagonal · slope, where the
-/// slope is |∇f| but at least 1. The threshold allows for continuous fields: the march enters a leaf up to 1.4e-6
-/// diagonals behind its face, and single precision adds 2e-7. The shaders use the same value.
+/// A hit on the face between two leaves is a crack if |f − offset| exceeds kCrack · domain diagonal · max(|∇f|, 1). In
+/// a field without jumps, |f − offset| stays below this threshold: the march enters a leaf at most 1.4e-6 diagonals
+/// behind its face, and single precision adds an error of 2e-7 diagonals. The shaders use the same value.
 constexpr double kCrack = 4e-6;
 
 /// A field, with the data that ray tracing needs. Keeps a reference to the field.
@@ -57,7 +57,7 @@ class TraceField {
   /// The leaf at a point in grid coordinates.
   CellPoint leafAt(const Vector3& p) const;
 
-  /// Value and gradient of the field at local coordinates of a leaf, which may lie slightly outside of the leaf.
+  /// Value and gradient of the field at local coordinates of a leaf; the point may lie slightly outside of the leaf.
   Sample sample(const CellPoint& leaf, const Vector3& local) const;
   double value(const CellPoint& leaf, const Vector3& local) const;
 

@@ -6,18 +6,18 @@
 
 namespace hpsdf::render {
 
-/// A field on the device, in buffer textures: Mesa's llvmpipe allows 2^27 texels in these, but only 128 MiB in a
-/// storage buffer. Floats in RGBA32UI texels are stored as their bits.
+/// A field on the device, in buffer textures. A buffer texture may have 2^27 texels on Mesa's llvmpipe, but a storage
+/// buffer only 128 MiB. Floats in RGBA32UI texels are stored as their bits. The textures are:
 ///
-/// * nodes, RGBA32UI: x is the index of the first child, or for a leaf degree · 2^27 + index of its first coefficient;
-///   y is the packed range of values (`packOutwards`), or the valueDeviation of a leaf; z is the gradientDeviation, w
-///   the secondDerivative (`SurfaceBounds`).
+/// * nodes, RGBA32UI. In a leaf, x is degree · 2^27 + index of the first coefficient, and y is the valueDeviation. In
+///   an internal node, x is the index of the first child, and y is the packed range of values (`packOutwards`). In any
+///   node, z is the gradientDeviation, and w is the secondDerivative (`SurfaceBounds`).
 /// * coefficients, R32F: the leaves' coefficients in the order of the nodes, padded for each leaf to a multiple of
 ///   four. Leaves up to degree 4 have the order of `LowDegree` in field.glsl.
 /// * coefficientQuads, RGBA32F: the same buffer of coefficients, four per texel.
 /// * linearParts, RGBA32F: `SurfaceBounds::linear` of each node.
-/// * zones, RGBA32UI: x is `LookupGrid::blendExtents`; y, z and w are the members of `BlendZoneBounds`. Empty without
-///   blending.
+/// * zones, RGBA32UI: x is `LookupGrid::blendExtents`; y, z and w are the members of `BlendZoneBounds`. This texture is
+///   empty for a field without blending.
 class FieldUpload {
  public:
   /// Throws `Error` if the field is too large for the device.

@@ -32,9 +32,9 @@ struct Instance {
   std::uint32_t body;
 };
 
-/// The transform from points relative to the eye to the clip space of a tile, in which rows run downwards and nearer
-/// points have greater depths. In perspective, the depth in clip space is leastDepth / depth, for which floats have the
-/// same relative precision near and far. For parallel rays, it falls linearly with the distance.
+/// The transform from points relative to the eye to a tile's clip space. Rows run downwards, and nearer points have
+/// greater clip-space depths. In perspective, the clip-space depth is leastDepth / depth. Floats have the same relative
+/// precision for this ratio near and far. For parallel rays, the clip-space depth falls linearly with the distance.
 Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
   const bool parallel = camera.projection == Projection::orthographic;
   const Eigen::RowVector4d right =

@@ -50,7 +50,7 @@ constexpr int blendedEvaluationLoops(int evaluation) {
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
 
-/// The smallest rectangle of a view that contains all blocks, of which there must be at least one.
+/// The smallest rectangle of a view that contains all blocks. `blocks` must not be empty.
 Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
   const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
   const auto [top, bottom] = std::ranges::minmax(blocks, {}, &Block::y);

@@ -65,7 +65,7 @@ class RenderTarget {
 
   void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
 
-  /// Clears all pixels to no cell or body, a zero normal or an infinite distance.
+  /// Clears the integers to "no cell" or "no body", and the floats or depths to 0. Depth 0 means infinite distance.
   void clear() const {
     static_assert(kNoCell == kNoBody);
     constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};

@@ -79,7 +79,7 @@ Oklab toOklab(const LinearColor& color) {
 
 LinearColor fromOklab(const Oklab& color) {
   LinearColor linear = oklabToLinear(color);
-  // If the colour cannot be displayed, bisect for the largest fraction of its chroma that can.
+  // If sRGB cannot display the colour, bisect for the largest share of its chroma at which the colour is displayable.
   if (!displayable(linear)) {
     double inside = 0, outside = 1;
     for (int i = 0; i < 24; ++i) {

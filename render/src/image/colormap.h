@@ -36,7 +36,8 @@ class ColorScale {
   ColorScale(double low, double high, bool logarithmic);
 
   /// A scale for values from `least` (above 0) to `greatest`. The ends of a logarithmic scale are powers of ten, at
-  /// most six decades apart. A linear scale runs from 0 to a number of one or two digits, or to 1 if `greatest` is 0.
+  /// most six decades apart. A linear scale runs from 0 to `greatest`, rounded up to one or two digits, or to 1 if
+  /// `greatest` is 0.
   static ColorScale around(double least, double greatest, bool logarithmic);
 
   LinearColor operator()(double value) const {
@@ -76,8 +77,8 @@ struct DistanceScale {
   double minimum = 0, maximum = 0;  ///< least and greatest distance shown
 };
 
-/// Chooses the scale for distances in [minimum, maximum]: colours up to a number of one or two digits, and about twelve
-/// iso-lines whose step is {1, 2, 5} · 10^n.
+/// Chooses the scale for distances in [minimum, maximum]. The range of the colours is the greatest magnitude of the
+/// distances, rounded up to one or two digits. The step between about twelve iso-lines is {1, 2, 5} · 10^n.
 DistanceScale distanceScale(double minimum, double maximum);
 
 }  // namespace hpsdf::render

@@ -7,8 +7,8 @@
 namespace hpsdf::render {
 namespace {
 
-/// Two differing pixels are neighbours if they are nearer to each other than this, in pixels, along both axes. Only one
-/// of several neighbours is listed, so that a single edge cannot fill the list.
+/// Two differing pixels count as neighbours if they are less than this many pixels apart along both axes. Only one of
+/// several neighbours is listed, so that a single edge cannot fill the list of differing pixels.
 constexpr int kNeighbourhood = 16;
 
 int difference(const Color& a, const Color& b) {

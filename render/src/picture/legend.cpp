@@ -299,7 +299,7 @@ void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, cha
     x = section.x0 - gap - extent;
     y = std::min<double>(section.y1, frame.view.y1 - gap);
   } else if (frame.view.y1 - section.y1 >= extent + 2 * gap) {
-    x = std::max<double>(x, frame.view.x0 + gap);  // room for the letter above the arrow, which extends to its left
+    x = std::max<double>(x, frame.view.x0 + gap);  // room for the upward arrow's letter, which extends to the left of x
     y = section.y1 + gap + extent;
   } else {
     x += gap;

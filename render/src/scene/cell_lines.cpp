@@ -15,7 +15,7 @@
 namespace hpsdf::render {
 namespace {
 
-// A cell edge fades if its length in the picture lies between two limits, in multiples of the line width.
+// A cell edge fades if its length in the picture lies between the next two limits, in multiples of the line width.
 constexpr double kFullLength = 24;  // edges of this length or more are drawn at full strength
 constexpr double kGoneLength = 6;   // edges of this length or less are not drawn
 
@@ -38,7 +38,7 @@ struct Edge {
 /// Identifies an edge of a cell. All cells of one size that share the edge have the same key for it.
 struct EdgeKey {
   std::array<std::uint64_t, 3> from;  ///< lower end of the edge, in units of the smallest possible cell
-  std::uint64_t kind;                 ///< axis and octree depth of the edge
+  std::uint64_t kind;                 ///< axis of the edge, and octree depth of its cells
   bool operator==(const EdgeKey&) const = default;
 };
 

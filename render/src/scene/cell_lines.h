@@ -7,9 +7,9 @@
 
 namespace hpsdf::render {
 
-/// The share of each pixel, 0 to 1, that lines of `lineWidth` pixels along the edges of cells cover. Lines behind the
-/// objects in the buffers are hidden. Lines fade with their distance, and vanish if their cells are small in the
-/// picture. A clipping plane cuts cells.
+/// Draws lines along the edges of cells. Returns the share of each pixel, 0 to 1, that the lines cover. `lineWidth` is
+/// in pixels. Lines behind the objects in the buffers are hidden. Lines fade with their distance, and vanish if their
+/// cells are small in the picture. The clipping plane of the view cuts cells.
 std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
                              const ViewBuffers& buffers, double lineWidth);
 

@@ -14,7 +14,8 @@
 namespace hpsdf::render {
 
 /// The pixels of a view whose centres may lie in the convex hull of the points. Returns no pixels if all points have
-/// depths below `leastDepth`, and the whole view if only some have, because the hull then extends behind the eye.
+/// depths below `leastDepth`. Returns the whole view if only some of the points have, because the hull then extends
+/// behind the eye.
 inline PixelRect pixelsAround(std::span<const PicturePoint> points, double leastDepth, int width, int height) {
   constexpr double kMargin = 1e-6;  // margin for rounding errors, pixels
   Eigen::AlignedBox2d hull;

@@ -83,7 +83,7 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
   ScenePlane plane{offset * Vector3::Unit(axis), Vector3::Unit(axis)};
   const double nudge = kClipNudge * field.domain().sizes()[axis];
   plane.lookupOffset[axis] = eyeAbove(view.camera, *view.clip) ? -nudge : nudge;
-  // Show the section in all pixels that see it. It hides all other hits, because rays start behind the clipping plane.
+  // Show the section in all pixels that see it. All other hits are behind it, as rays start behind the clipping plane.
   addScenePlane(
       field, view.camera, plane, Shown::section, [](const PlaneHit&) { return true; },
       [&](double value) { return value < view.offset; }, buffers);

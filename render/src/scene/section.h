@@ -11,9 +11,9 @@ namespace hpsdf::render {
 /// clipping plane.
 void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers);
 
-/// Shows the section of the domain with the plane of the slice `plane`, in pixels where it is nearer to the eye than
-/// the point that the buffers show. Leaves out the part that the view's clipping plane removes. Each pixel shows the
-/// same cell as a picture of the slice does at this point.
+/// Shows the section of the domain with the plane of the slice `plane`, in pixels where this section is nearer to the
+/// eye than the point that the buffers show. Leaves out the part that the view's clipping plane removes. Each point of
+/// the section shows the same cell as in a picture of the slice.
 void addPlane(const Field& field, const SurfaceView& view, const SliceView& plane, ViewBuffers& buffers);
 
 /// Returns the number of the axis that a direction is parallel to, or −1 if there is none.
@@ -24,8 +24,7 @@ int axisAlong(const Vector3& direction);
 void showCell(const Cell& cell, Shown shown, double distance, const Vector3& normal, const Vector3& ray,
               std::size_t pixel, ViewBuffers& buffers);
 
-/// Fills the buffer `shown` if it is empty, as it is for a surface alone, so that other parts of the scene can be
-/// added.
+/// Fills the buffer `shown` with `Shown::surface` if it is empty. Other parts of the scene can then be added.
 inline void prepareShown(ViewBuffers& buffers) { buffers.shown.resize(buffers.cell.size(), Shown::surface); }
 
 }  // namespace hpsdf::render

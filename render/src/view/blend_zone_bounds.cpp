@@ -110,8 +110,8 @@ class Polynomial {
     return sum;
   }
 
-  /// An upper bound of the length of the polynomial's gradient on the box, with respect to other coordinates. `perUnit`
-  /// is the derivative of the box's coordinates by these coordinates, for each axis.
+  /// An upper bound of the length of the polynomial's gradient on the box. The gradient is with respect to coordinates
+  /// in which one unit along an axis is `perUnit` units of the box's local coordinates.
   double gradientBound(const Vector3& perUnit) {
     Vector3 gradient = Vector3::Zero();
     for (int i = 0; i < size_; ++i)
@@ -202,7 +202,7 @@ class LeafBounder {
   const FieldData& field_;
   const std::vector<std::uint32_t>& extents_;
   Polynomial ofLeaf_, ofOther_;
-  Vector3 perUnit_;  // derivative of the restricted box's local coordinates by those of the leaf
+  Vector3 perUnit_;  // derivative of the restricted box's local coordinates with respect to the leaf's
 };
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 namespace hpsdf::render {
 
-/// The relative rounding error for which bounds of the field are widened, because devices compute in single precision.
+/// Bounds of the field are widened by this relative rounding error, because devices compute in single precision.
 constexpr double kFloatRounding = 4e-6;
 
 /// Bounds of the blended field F within a leaf: F = f + Σ wₙ dₙ / Σ wₙ, where f is the polynomial of this leaf, wₙ is

@@ -10,8 +10,8 @@
 
 namespace hpsdf::render {
 
-/// The transform from world to grid coordinates. Its operations have the same order as in the queries of a field, so
-/// that both put a plane through the middle of the domain on the same side of a face.
+/// The transform from world to grid coordinates. It rounds like the queries of a field, with operations in the same
+/// order. Renderers and queries therefore put a plane through the middle of the domain on the same side of a face.
 struct GridSpace {
   explicit GridSpace(const FieldData& field);
 
@@ -24,9 +24,8 @@ struct GridSpace {
   double diagonal;  ///< diagonal of the domain, world units
 };
 
-/// A slice in grid coordinates. Pixel (x, y) samples (origin + right · (2x+1−w) · stepX) +
-/// up · (h−2y−1) · stepY. This formula has only products and sums, which every IEEE device rounds in the same
-/// way.
+/// A slice in grid coordinates. Pixel (x, y) of w × h pixels samples the point (origin + right · (2x+1−w) · stepX) +
+/// up · (h−2y−1) · stepY. This formula has only products and sums, which every IEEE device rounds in the same way.
 struct SliceGeometry {
   SliceGeometry(const GridSpace& space, const SliceView& view, int width, int height);
 
@@ -40,16 +39,16 @@ struct SliceGeometry {
   double stepX, stepY;  ///< 1/(2w), 1/(2h)
 };
 
-/// Distance behind a clipping plane at which rays start, as a share of the domain's extent across the plane.
+/// Distance behind a clipping plane at which rays start, as a share of the domain's extent perpendicular to the plane.
 /// The cells that a section shows are looked up at the same distance behind the plane.
 constexpr double kClipNudge = 1e-6;
 
-/// Returns true if a clipping plane removes its side of greater coordinates, because the camera looks at it from there.
+/// Returns true if the camera looks at a clipping plane from the side of greater coordinates, which the plane removes.
 bool eyeAbove(const Camera& camera, const ClipPlane& clip);
 
-/// The rays of a camera. Let across = right · (2x+1−w) · stepX + up · (h−2y−1) · stepY. In perspective the ray
-/// of pixel (x, y) starts at the eye and runs along forward + across. A parallel ray starts at eye +
-/// across · scale and runs along forward.
+/// The rays of a camera. For pixel (x, y) of w × h pixels, let across = right · (2x+1−w) · stepX + up · (h−2y−1) ·
+/// stepY. In perspective, the pixel's ray starts at the eye and runs along forward + across. A parallel ray starts at
+/// eye + across · scale and runs along forward.
 struct RayGeometry {
   RayGeometry(const GridSpace& space, const Camera& camera, int width, int height,
               const std::optional<ClipPlane>& clip = {});

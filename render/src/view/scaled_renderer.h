@@ -11,10 +11,9 @@ namespace hpsdf::render {
 
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const Field&)>;
 
-/// Makes a renderer for a field of any size by calling `make` with a field whose lengths are near 1: with the field
-/// itself if the size of its domain lies within 2^±30, else with a copy in units of a power of two, which is exact.
-/// Views and buffers of the returned renderer are in the field's own units. The renderer that `make` creates must keep
-/// no reference to its argument.
+/// Makes a renderer for a field of any size. Calls `make` with the field itself if the size of its domain lies within
+/// 2^±30, else with a copy that is scaled, without rounding errors, to a size near 1. Views and buffers of the returned
+/// renderer are in the field's own units. The renderer that `make` creates must not keep a reference to its field.
 std::unique_ptr<Renderer> inUnitsNearOne(const Field& field, const MakeRenderer& make);
 
 }  // namespace hpsdf::render

@@ -10,7 +10,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// Greatest magnitudes of L_i' and L_i'' on [−1, 1], which occur at the ends of the interval.
+/// Greatest magnitudes of the derivatives L_i' and L_i'' of a Legendre polynomial on [−1, 1], at the interval's ends.
 double firstDerivative(int i) { return 0.5 * i * (i + 1); }
 double secondDerivative(int i) { return 0.125 * (i - 1) * i * (i + 1) * (i + 2); }
 

@@ -1,6 +1,7 @@
 #pragma once
-// The table of all settings of a construction. The program's options, the settings stored with a field, the identity of
-// a checkpoint file and the checks of ranges are derived from this table.
+// The table of all settings with which a field can be built. The program's options, the settings in field files and the
+// checks of ranges follow from this table. It also says which settings must be unchanged when a build resumes from a
+// checkpoint file.
 
 #include <cstdint>
 #include <limits>
@@ -28,7 +29,7 @@ struct BuildSetting {
   enum class Ending : std::uint8_t {
     none,           ///< the setting does not end the construction
     target,         ///< the target error is reached
-    byDistance,     ///< the errors of `NearFarError`, which replace the target error, are reached
+    byDistance,     ///< both errors of `NearFarError`, given instead of the target error, are reached
     otherQuantity,  ///< a maximum error or a limit of bytes is reached; the target error then has no default
     steps,          ///< a number of steps is done, even if the target error is not reached
   };
@@ -44,8 +45,8 @@ struct BuildSetting {
   std::vector<std::string_view> words = {};  ///< the words from which users choose, for a choice
   std::vector<double> fallback = {};         ///< default of a setting that `BuildOptions` leaves unset
   Ending ending = Ending::none;
-  std::string_view exclusive = {};  ///< a setting that this one replaces, so that both cannot be given
-  std::string_view owner = {};      ///< setting, and its word, without which this one has no effect: "continuity weak"
+  std::string_view exclusive = {};  ///< name of a setting that cannot be given together with this one
+  std::string_view owner = {};      ///< setting and word on which the effect of this setting depends: "continuity weak"
   bool (*hasOwner)(const BuildOptions&) = nullptr;
   int storedAt = 0;           ///< position among the settings in a field's file; 0: not stored
   bool decides = true;        ///< the finished field depends on the value of this setting
@@ -71,12 +72,11 @@ std::string settingText(const BuildSetting& setting, const BuildOptions& options
 /// Returns the default value of a setting, as users write it.
 std::string defaultText(const BuildSetting& setting);
 
-/// Returns `options` in which all settings that field files do not store are reset to the values that they have in a
-/// default `FieldMetadata`.
+/// Returns a copy of `options`. Settings that field files do not store get their values from a default `FieldMetadata`.
 BuildOptions storedSettings(const BuildOptions& options);
 
-/// Returns options with which `build` makes a field like `field`. They combine the settings in the field's metadata
-/// with settings that follow from the field's arrays, such as the base grid.
+/// Returns options with which `build` makes a field like `field`. These options combine the settings in the field's
+/// metadata with settings that follow from the field's arrays, such as the base grid.
 BuildOptions settingsOf(const FieldData& field);
 
 }  // namespace hpsdf

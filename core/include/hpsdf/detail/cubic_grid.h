@@ -45,8 +45,7 @@ struct CubicGrid {
 /// `kMaxCubicGridBytes`.
 double cubicGridBytes(const GridResolution& resolution);
 
-/// Returns a resolution with `alongLongest` cells along the domain's longest side, for which the cells are nearly
-/// cubic.
+/// Returns the resolution with `alongLongest` cells along the domain's longest side and with nearly cubic cells.
 GridResolution cubicGridResolution(const Box& domain, std::uint32_t alongLongest);
 
 /// Returns the finest resolution with nearly cubic cells whose file has at most `bytes` bytes. Throws `Error`
@@ -67,11 +66,11 @@ struct GridDifference {
   double max = 0;
 };
 
-/// The interpolation error of a grid: its difference from the field f. The error of f itself comes in addition.
+/// The interpolation error of a grid: its difference from the field f. The error of f itself is not included.
 struct CubicGridError {
   GridDifference everywhere;
   GridDifference nearSurface;  ///< difference over the points at which |f| ≤ `near`
-  double near = 0;             ///< greatest |f| that counts as near the surface: the diagonal of a cell
+  double near = 0;             ///< greatest |f| of a point near the surface: the length of a cell's diagonal
 };
 
 /// Compares a grid with the field from which the grid was sampled, at `points` random points that are uniform

@@ -31,7 +31,7 @@ struct SampleOptions {
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band = 0,
                            const SampleOptions& options = {}, const Progress& progress = {});
 
-/// Draws points near a surface. A uniformly distributed point of the surface is moved by a vector that is
+/// Draws points near a surface. Each point is a uniformly distributed point of the surface plus a vector that is
 /// uniformly distributed in a ball of `radius` (above 0). A point outside the domain is drawn again. Throws
 /// `Error` if hardly any point lies in the domain, if the surface has no area or if Φ is not finite. Throws
 /// `Cancelled` when `progress` says so.

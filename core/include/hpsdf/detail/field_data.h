@@ -18,8 +18,8 @@ namespace hpsdf {
 struct FieldMetadata {
   Source source;
   /// The settings that took effect. If the target was given as `NearFarError`, `targetError` is the error τ that the
-  /// construction reached, and `nearness` the exponent θ that it derived. Field files store the settings whose
-  /// `BuildSetting::storedAt` is not 0.
+  /// construction reached, and `nearness` is the exponent θ that the construction derived. Field files store the
+  /// settings whose `BuildSetting::storedAt` is not 0.
   BuildOptions settings = {.targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .quadrature = 0};
   double totalError = 0;               ///< weighted error ε, scaled to a surface of size 2 like the target error τ
   double referenceLength = 2;          ///< size L of the surface; ε·(L/2)^5 is the error at this size
@@ -28,12 +28,12 @@ struct FieldMetadata {
   /// std::nullopt if the number is unknown, as in files of version 1.
   std::optional<std::uint64_t> steps = {};
   double roundingRms = 0;  ///< RMS change of the field by rounding its coefficients to float; 0 for double
-  /// Greatest error |f − Φ| that the construction found when it probed the cells, without blending, if a maximum error
+  /// Greatest error |f − Φ| that the construction found at points in the cells, without blending; 0 if no maximum error
   /// was asked for. The effect of rounding is included if it exceeds a hundredth of the maximum error.
   double measuredError = 0;
 
-  /// Returns √(ε/|Ω|), the estimated RMS error over the domain Ω at the end of the construction, where ε is converted
-  /// to the surface's size L.
+  /// Returns the estimated RMS error of the field over the domain, at the end of the construction: √(ε·(L/2)^5 / V)
+  /// with the error ε (`totalError`), the surface's size L (`referenceLength`) and the domain's volume V.
   double rmsEstimate(const Box& domain) const;
 };
 
@@ -46,16 +46,18 @@ struct CellBound {
 /// The finished octree as arrays. The first nodes are the base cells, x fastest, then y, then z. A node is either
 ///   internal: bit 63 is clear, the low 32 bits are the index of its first child (child number x + 2y + 4z); or
 ///   a leaf:   bit 63 is set, bits 32..39 are the degree p, the low 32 bits the offset of its n(p) coefficients.
-/// All other bits are 0. The coefficients c_ijk of a leaf stand in lexicographic order of (i, j, k), i+j+k ≤ p, k
-/// fastest. They multiply the products L_i(u) L_j(v) L_k(w) of Legendre polynomials, which are not normalised, in local
-/// coordinates in [−1, 1]³, so that they are in units of length.
+/// All other bits are 0.
+///
+/// The polynomial of a leaf is Σ c_ijk L_i(u) L_j(v) L_k(w) over i+j+k ≤ p. Here u, v, w are local coordinates from −1
+/// to 1, and L_i is the Legendre polynomial with L_i(1) = 1. The coefficients c_ijk have the unit of length. They are
+/// stored in lexicographic order of (i, j, k), k fastest.
 struct FieldData {
   Box domain;
   std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< number of base cells along each axis
   std::vector<std::uint64_t> nodes;
   std::variant<std::vector<double>, std::vector<float>> coefficients;
-  /// Width of the zones along the faces of a leaf in which the leaf is blended with its neighbours. It is
-  /// measured in edges of the leaf, from 0 (no blending) to `kMaxBlend`.
+  /// Width of the zones along the faces of a leaf in which the leaf is blended with its neighbours, as a fraction of
+  /// the leaf's edge: from 0 (no blending) to `kMaxBlend`.
   double blend = 0;
   std::vector<CellBound> bounds = {};  ///< one for each node, 0 for internal nodes; empty if the field has no bounds
   FieldMetadata metadata = {};
@@ -77,10 +79,11 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
-/// Packs the six blend extents of a leaf into 32 bits. The blend extent at a face is the distance to either side of the
-/// face within which the leaf's weight grows from 0 outside the leaf to 1 inside. It is `FieldData::blend` times the
-/// edge of the deepest leaf that touches the face, the leaf itself included. 5 bits per face hold the depth of the
-/// deepest leaf, or `kDomainFace` if the face lies on the boundary of the domain.
+/// Packs the blend extents at the six faces of a leaf into 32 bits. Across a face, the leaf's blending weight grows
+/// from 0 outside the leaf to 1 inside; the blend extent is the distance from the face at which it reaches these
+/// values. The blend extent is `FieldData::blend` times the edge of the smallest leaf that touches the face. Each face
+/// takes 5 bits, which hold the depth of this smallest leaf, or `kDomainFace` if the face lies on the boundary of the
+/// domain.
 namespace blend_extent {
 constexpr int kDomainFace = 31;
 constexpr std::uint32_t packed(int axis, bool upper, int depth) {

@@ -10,15 +10,15 @@
 
 namespace hpsdf::detail {
 
-/// Coefficients row[i][a], a ≤ i, with which the Legendre polynomials satisfy L_i(shift + scale·t) = Σ_a row[i][a]
-/// L_a(t). Elements beyond the degree of the polynomial are not set.
+/// Coefficients that express Legendre polynomials of shifted and scaled arguments: L_i(shift + scale·t) = Σ_a row[i][a]
+/// L_a(t), with a ≤ i. Elements with i above the highest degree needed are not set.
 using LegendreRows = std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2>;
 
 inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
   LegendreRows row;
   row[0][0] = 1;
   for (int i = 0; i < degree; ++i) {
-    std::array<double, kMaxDegree + 2> product;  // (shift + scale·t) · L_i, by the recurrence of t·L_a
+    std::array<double, kMaxDegree + 2> product;  // coefficients of u·L_i(u), u = shift + scale·t
     std::fill_n(product.begin(), i + 2, 0.0);
     for (int a = 0; a <= i; ++a) {
       product[a] += shift * row[i][a];
@@ -32,8 +32,8 @@ inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
 }
 
 /// Converts the coefficients c of a cell's polynomial to the local coordinates of a part of the cell, along one axis.
-/// `rows` describes the part and comes from `legendreOfPart`. c is a cube of (degree + 1)³ numbers, z fastest, with
-/// zeros above the total degree.
+/// `rows` is the result of `legendreOfPart` for the part along this axis. c is a cube of (degree + 1)³ numbers, z
+/// fastest, with zeros above the total degree.
 inline void restrictToPart(std::vector<double>& c, int degree, int axis, const LegendreRows& rows) {
   const int n = degree + 1;
   const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};

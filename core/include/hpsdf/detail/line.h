@@ -30,8 +30,9 @@ struct LineSample {
   Vector3 gradient;
 };
 
-/// Samples of a field along a segment. Where two pieces of the segment meet, there are two samples with equal
-/// t, which hold the limits from the two pieces. A plot therefore shows jumps as steps.
+/// Samples of a field along a segment. Where two pieces of the segment meet, there are two samples with equal t: one
+/// holds the limits of value and gradient from the first piece, the other from the second. A plot therefore shows jumps
+/// as steps.
 struct Line {
   Vector3 from, to;
   std::vector<Piece> pieces;
@@ -43,15 +44,16 @@ struct Line {
   double slopeAlong(const LineSample& sample) const { return sample.gradient.dot(to - from) / length(); }
 };
 
-/// Samples a field at `count` ≥ 2 evenly spaced points of a segment, including its ends, and at both ends of
-/// every piece of the segment. A sample within the domain is the limit from the leaf of its piece. A sample
-/// outside the domain uses the field's continuation. Throws `Error` as `piecesAlong` does.
+/// Samples a field at `count` ≥ 2 evenly spaced points of a segment, including its ends, and at both ends of every
+/// piece of the segment. Within the domain, a sample holds the limits of value and gradient from the leaf that contains
+/// its piece. Outside the domain, it holds the values of the field's continuation. Throws `Error` as `piecesAlong`
+/// does.
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count);
 
 /// The jump of a field f at the point where a segment crosses from one leaf to the next leaf.
 struct LineJump {
   double t;      ///< position along the segment, 0 at its start and 1 at its end
-  double value;  ///< f after the crossing less f before it
+  double value;  ///< f after the crossing minus f before the crossing
 };
 
 /// Returns the jumps at all points within the domain where the line crosses from leaf to leaf, in order along

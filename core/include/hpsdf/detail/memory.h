@@ -13,8 +13,8 @@ namespace detail {
 /// contains proc and sys.
 double memoryOfControlGroups(const std::filesystem::path& root = "/");
 
-/// Returns the bytes of the machine's memory or, if it is lower, the limit that Linux control groups set for this
-/// process. The first call determines the number.
+/// Returns the size of the machine's memory in bytes or, if it is lower, the limit that Linux control groups set for
+/// this process. The size is determined at the first call.
 double machineMemory();
 
 }  // namespace detail
@@ -26,8 +26,8 @@ double allowedMemory();
 /// Returns a number of bytes as text with a suitable unit, such as "8.40 MB".
 std::string bytesText(double bytes);
 
-/// Throws `Error` (of the kind `limit`) if `what`, such as "a cloth of 1e6 nodes", would take more bytes than
-/// `allowedMemory`. The error message ends with `advice`, which says what the user can do.
+/// Throws `Error` (of the kind `limit`) if `bytes` exceeds `allowedMemory`. The message begins with `what`, the name of
+/// the thing that needs the bytes ("a cloth of 1e6 nodes"), and ends with `advice`, which tells the user what to do.
 void requireMemory(const std::string& what, double bytes, std::string_view advice);
 
 }  // namespace hpsdf

@@ -35,10 +35,10 @@ inline std::size_t editDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// Returns the known name that was probably meant by `wanted`: the nearest known name, the first of several
-/// equally near names, or an empty string if no name is near. A name is near if at most a third of its letters
-/// (or one letter) differ, or if it begins with `wanted` and `wanted` has three letters or more. Names of more
-/// than 64 letters are not compared, because names in untrusted files can be very long.
+/// Returns the known name that is most similar to `wanted`, or an empty string if no name is similar. If several names
+/// are equally similar, returns the first of them. A name is similar if at most a third of its letters (or one letter)
+/// differ, or if it begins with `wanted` and `wanted` has three letters or more. Names of more than 64 letters are not
+/// compared, because names in untrusted files can be very long.
 inline std::string nearestName(std::string_view wanted, std::span<const std::string> known) {
   constexpr std::size_t kLongest = 64;
   std::string best;
@@ -57,8 +57,8 @@ inline std::string nearestName(std::string_view wanted, std::span<const std::str
   return best;
 }
 
-/// Returns the end of a message about the unknown name `wanted`: "did you mean 'NAME'?" with `prefix` before
-/// the name if a known name is near, else `otherwise`.
+/// Returns the end of an error message about the unknown name `wanted`. If a known name NAME is near, this is
+/// "did you mean 'NAME'?" with `prefix` before NAME; else it is `otherwise`.
 inline std::string didYouMean(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
                               std::string_view prefix = "") {
   const std::string name = nearestName(wanted, known);

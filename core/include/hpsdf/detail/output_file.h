@@ -24,8 +24,8 @@ class OutputFile {
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
 
-  /// Forces everything written so far onto the disk, so that a full disk is noticed now at the latest. Throws
-  /// `Error` as `write` does.
+  /// Forces everything written so far onto the disk. Throws `Error` as `write` does; a full disk is noticed now at the
+  /// latest.
   void flush();
 
   /// Flushes the temporary file and gives it its final name. Throws `Error` as `write` does. Nothing can be
@@ -54,8 +54,8 @@ class OutputFile {
   std::FILE* stream_ = nullptr;
 };
 
-/// Checks before long work whether `file` can be written, as far as this can be foreseen. Throws the `Error` that the
-/// constructor of `OutputFile` would throw.
+/// Throws the `Error` that the constructor of `OutputFile` would throw for `file`. A caller thus learns before long
+/// work that it could not write the file.
 void checkWritable(const std::filesystem::path& file);
 
 }  // namespace hpsdf

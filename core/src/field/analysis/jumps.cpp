@@ -170,7 +170,7 @@ class FaceMeter {
       face.depths[side] = static_cast<std::uint8_t>(sides[side]->depth);
     }
 
-    // Evaluate the field on both sides of the face, at the samples for the higher degree of the two leaves.
+    // Evaluate the field on both sides of the face, at the samples for the higher one of the two leaves' degrees.
     const Samples& samples = samplesOfDegree_[std::max(face.degrees[0], face.degrees[1])];
     for (int side = 0; side < 2; ++side) {
       if (data_.blend > 0)

@@ -16,9 +16,9 @@ namespace {
 /// The shortest piece of a segment, as a fraction of the segment's length. Shorter pieces are rounding errors.
 constexpr double kShortest = 1e-12;
 
-/// One coordinate of the points of a segment, which is linear in the parameter t from 0 to 1. The unit is the
-/// edge of a cell of the greatest depth, so that faces of cells lie at integers. Even with rounding, all leaves
-/// at a face compute the same t for it, and faces farther along the segment never get a smaller t.
+/// One coordinate of the points of a segment, as a linear function of the parameter t from 0 to 1. The unit is the edge
+/// of a cell of the greatest depth, so that faces of cells lie at integers. Even with rounding, a face gets the same t
+/// from all leaves that touch it, and a face farther along the segment never gets a smaller t.
 struct Axis {
   double start = 0, speed = 0;  ///< coordinate at t = 0 and its change over the whole segment
   std::int64_t cells = 0;

@@ -23,8 +23,8 @@ namespace {
 
 using namespace detail;
 
-/// Returns the error down to which the octree is refined. If pruning follows, it is smaller than the goal of the
-/// whole construction.
+/// Returns the error down to which the octree is refined. If pruning follows, this error is smaller than the goal of
+/// the whole construction.
 ErrorGoal growthGoal(const BuildOptions& options, const ErrorGoal& goal) {
   return options.criterion == Criterion::optimal ? goal.times(kGrowth) : goal;
 }
@@ -86,13 +86,13 @@ class Construction {
     const BuildOptions& options = setup_.options;
     const std::uint64_t before = fitter_.evaluations();
 
-    // Prune the tree and raise its degrees. After that its cells are final.
+    // Prune the tree and raise its degrees. The cells are then final.
     if (options.criterion == Criterion::optimal) prune(tree);
     if (options.enrich) enrich(tree);
     FieldMetadata built = metadata(sumOfErrors(tree));
     FieldData field = layOut(std::move(tree), std::move(built));
 
-    // Reduce the jumps between cells in double precision, then round the coefficients. After that they are final.
+    // Reduce the jumps between cells in double precision, then round the coefficients. The coefficients are then final.
     if (options.continuityWeight)
       continuity::makeWeaklyContinuous(field, {.weight = *options.continuityWeight}, setup_.progress);
     roundCoefficients(budget_.coefficientType(), field);

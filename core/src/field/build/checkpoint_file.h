@@ -29,7 +29,8 @@ class CheckpointFile {
   /// saved its state.
   bool isDue() const;
 
-  /// Saves the state to the file. Reports errors to `Checkpoint::failed` if that callback is set.
+  /// Saves the state to the file by a call of `writeState`. Reports errors to `Checkpoint::failed` if that callback is
+  /// set.
   void keep(const std::function<void(CheckedWriter&)>& writeState);
 
  private:

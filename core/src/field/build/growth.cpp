@@ -124,8 +124,8 @@ class Growth {
     setup_.budget.requireRoomForBaseGrid(refiner_.bytes(), least);
   }
 
-  /// Chooses the exponent θ of the weight with which errors count at a distance from the surface. A cell at the mean
-  /// distance of the far cells then has the weight (near error / far error)², with the errors that the user asked for.
+  /// Chooses the exponent θ of the weight by which errors far from the surface count less. With this θ, a cell at the
+  /// mean distance of the far cells has the weight (near error / far error)². Both errors are the user's target errors.
   void chooseNearness() {
     double distance = 0, volume = 0;
     for (const BuildNode& node : state_.tree.nodes) {
@@ -211,15 +211,15 @@ class Growth {
     for (std::uint32_t child = first; child < first + 8; ++child) enqueue(child);
   }
 
-  /// Returns true if the total error of all cells of this cell's kind, near the surface or far from it, has
-  /// reached its goal.
+  /// Returns true if an error total has reached its goal: the near error if the cell is near the surface, else the far
+  /// error.
   bool isExactEnough(const CellError& cell) const {
     const ErrorGoal& goal = setup_.growthGoal;
     return setup_.goal.byDistance() && (cell.near ? goal.nearReached(state_.totals) : goal.farReached(state_.totals));
   }
 
-  /// Moves leaves that were put aside back to the queue if the near error, for leaves near the surface, or the
-  /// far error, for all others, no longer meets its goal. Returns false if the queue stays empty.
+  /// Moves leaves that were put aside back to the queue: near leaves if the near error no longer meets its goal, and
+  /// far leaves if the far error no longer does. Returns false if the queue stays empty.
   bool enqueueDeferred() {
     for (const std::uint32_t leaf : std::exchange(state_.deferred, {})) {
       if (isExactEnough(state_.tree.nodes[leaf].fit.error))

@@ -10,9 +10,9 @@
 
 namespace hpsdf::detail {
 
-/// If pruning follows, the octree is refined until the error is this fraction of the target. Compared with no
-/// pruning, on the mesh bunny_69k at τ = 1e-6, 0.7 takes 1.3 times the evaluations of the exact distance for 0.49
-/// times the coefficients; 0.5 takes 1.7 times the evaluations for 0.48 times the coefficients.
+/// If pruning follows, the octree is refined until the error is this fraction of the target. Compared with no pruning,
+/// a fraction of 0.7 means 1.3 times as many evaluations of the exact distance and 0.49 times as many coefficients; 0.5
+/// means 1.7 and 0.48 times as many (mesh bunny_69k, τ = 1e-6).
 constexpr double kGrowth = 0.7;
 
 /// The degree of the base cells before any refinement.

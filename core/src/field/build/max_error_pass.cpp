@@ -43,9 +43,10 @@ const Probes& probes() {
   return all;
 }
 
-/// Returns the greatest error |f − Φ| of the fit f to the exact distance Φ at the probes, plus half of the greatest
-/// difference of this error between two neighbouring probes. The error is assumed to rise no faster between probes than
-/// from probe to probe. `exact` holds Φ at the probes. Probes with |Φ| above `farthest` do not count.
+/// Estimates the greatest error |f − Φ| of the fit f to the exact distance Φ in a cell: the greatest error at the probe
+/// points, plus half of the greatest difference between the errors f − Φ at two neighbouring probes. It assumes that
+/// errors rise no faster between probes than from probe to probe. `exact` holds Φ at the probes. Probes with |Φ| above
+/// `farthest` do not count.
 double worstError(const Fit& fit, std::span<const double> exact, double farthest) {
   constexpr std::array<int, 3> kStride = {1, kAcross, kAcross * kAcross};
   std::array<double, kAcross * kAcross * kAcross> errors;

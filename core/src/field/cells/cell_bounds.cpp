@@ -53,8 +53,8 @@ struct Halves {
   LegendreRows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
 };
 
-/// Adds the term coefficient · L_i L_j L_k to the polynomial of a part. The bounds use |L_i| ≤ 1 and |L_i'| ≤
-/// i(i+1)/2 within [-1, 1].
+/// Adds the term coefficient · L_i(x) L_j(y) L_k(z) of Legendre polynomials to a part, with (i, j, k) = `order`. The
+/// bounds use |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
 void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
   const int total = order[0] + order[1] + order[2];
   if (total == 0) part.value = coefficient;
@@ -94,9 +94,9 @@ Part partOf(const std::vector<double>& cube, int degree, const Box& box, int num
   return part;
 }
 
-/// Number of points at which the exact distance Φ is evaluated to bound Φ over one part of a leaf: the part's
-/// centre and one point on either side of it, one leaf edge away along the polynomial's gradient. A point y gives
-/// the bounds Φ(y) ± |x − y|. The farther away y is, the more nearly these bounds are linear in x over the part.
+/// Number of points at which the exact distance Φ is evaluated for one part of a leaf: the part's centre, and two
+/// points one leaf edge away from the centre, on either side along the polynomial's gradient. Each point y gives the
+/// bounds Φ(y) ± |x − y| of Φ(x). The farther away y is, the more nearly these bounds are linear in x over the part.
 constexpr std::size_t kPointsPerPart = 3;
 /// Distance of the two outer points from the centre, in leaf edges. With 0.7, 1.4 and 2, the median bound for the mesh
 /// bunny is 1.03, 1.2 and 2.1 times as great.
@@ -115,13 +115,14 @@ std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain
   return partPoints;
 }
 
-/// Upper bounds, for one point y, of f(x) + |x − y| and of |x − y| − f(x) over the points x of one part of a leaf.
+/// Upper bounds of f(x) + |x − y| and of |x − y| − f(x) over all points x of one part of a leaf, for one point y and
+/// the part's polynomial f.
 struct ConeBounds {
   double over, under;
 };
 
-/// Computes upper bounds of f(x) + |x − y| and |x − y| − f(x) over the points x of a part. A function that is
-/// linear in each coordinate or convex along each axis is greatest at a corner. If the quadratic terms are more
+/// Computes upper bounds of f(x) + |x − y| and |x − y| − f(x) over the points x of a part with polynomial f. A function
+/// that is linear in each coordinate or convex along each axis is greatest at a corner. If the quadratic terms are more
 /// concave than |x − y| is convex, the maximum may exceed the corner values by the height of a parabola.
 ConeBounds coneBounds(const Part& part, const Vector3& y) {
   // Find the greatest values of f + |x − y| and |x − y| − f at the corners of the part.
@@ -153,8 +154,8 @@ ConeBounds coneBounds(const Part& part, const Vector3& y) {
   return {over, under};
 }
 
-/// Returns an upper bound of |f − Φ| over a part. For every point y, the exact distance Φ(x) lies between Φ(y) −
-/// |x − y| and Φ(y) + |x − y|.
+/// Returns an upper bound of the error |f − Φ| over a part with polynomial f. For every point y, the exact distance
+/// Φ(x) lies between Φ(y) − |x − y| and Φ(y) + |x − y|.
 double errorBound(const Part& part, std::span<const Vector3> partPoints, std::span<const double> distances) {
   double above = std::numeric_limits<double>::infinity(), below = above;  // bounds of f − Φ and of Φ − f
   for (std::size_t p = 0; p < partPoints.size(); ++p) {
@@ -241,9 +242,9 @@ struct Disagreement {
   }
 };
 
-/// Bounds the difference between the polynomials of two touching leaves in the zone where both leaves have a
-/// blending weight. The zone extends on either side of their interface by the edge of the smaller leaf times
-/// the blend width.
+/// Bounds the difference between the polynomials of two touching leaves in the zone where both leaves have a blending
+/// weight. The zone extends on either side of the leaves' common face by the edge of the smaller leaf times the blend
+/// width.
 Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode& small,
                                 const query::OctreeNode& large) {
   const int degree = std::max(node::degree(field.nodes[small.node]), node::degree(field.nodes[large.node]));
@@ -343,12 +344,12 @@ void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& le
         disagreement[pair.node].widen(pair.disagreement);
       }
   }
-  // Find the deepest leaf around each leaf, because weights are steepest in the narrowest blend zone. The
-  // neighbours of a neighbour determine its blend zones.
+  // Find the deepest leaf around each leaf, because weights are steepest in the narrowest blend zone. The blend zones
+  // of a neighbour depend on the neighbour's own neighbours.
   const std::vector<int> deepest = deepestAround(field, leaves);
-  // Bound the slope of the normalized weights: Σ ‖∇(w_n/Σw)‖ ≤ 2 Σ‖∇w_n‖ / Σw over at most eight leaves, of which
-  // at least one has a weight of 1/8 or more. A weight is a product of three ramps, and the slope of a ramp is at
-  // most 3/4 divided by the half width of the blend zone.
+  // Bound the slope of the normalized weights of at most eight leaves n: Σ ‖∇(w_n/Σw)‖ ≤ 2 (Σ‖∇w_n‖) / Σw. At least one
+  // leaf has a weight of 1/8 or more. A weight is a product of three ramps. The slope of a ramp is at most 3/4 divided
+  // by the half width of the blend zone.
   constexpr double kSlopes = 2 * 8 * 8 * 1.7320508075688773 * 0.75;
   const double rounding = kRounding * field.domain.diagonal().norm();
   for (const query::OctreeNode& leaf : leaves) {

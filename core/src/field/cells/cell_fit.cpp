@@ -14,8 +14,8 @@ namespace {
 /// notice a cancellation soon.
 constexpr std::size_t kBatch = 512;
 
-/// Returns the projection for cells of degree p = `degree`. It projects samples onto degree p+1, for which their
-/// number suffices.
+/// Returns the projection for cells of degree p = `degree`. It projects samples of a cell onto polynomials of degree
+/// p+1; the number of samples suffices for this.
 std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildOptions& options) {
   const int order = std::max(options.quadrature * degree, 2 * (degree + 1));
   if (options.cubature == CubatureKind::compact)
@@ -138,9 +138,9 @@ double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
   if (options_.estimator == Estimator::residual) return residual;
 
   // The paper's estimate is the squared norm of the coefficients of the top degree. If Φ is even or odd about the
-  // cell's centre, the coefficients of every other degree vanish, and the estimate may vanish too. The residual
-  // ∫Φ² − Σc² then replaces it, but only if the residual is far greater, so that the paper's estimate decides
-  // everywhere else.
+  // cell's centre, the coefficients of every other degree vanish, and the estimate may vanish too. The residual, ∫Φ²
+  // minus the squared norm of the fit, then replaces the estimate. It must be far greater than the estimate, so that
+  // the paper's estimate decides everywhere else.
   const double shell = basis::topDegreeError(fit.coefficients.data(), fit.degree, 1.0);
   return residual > 1000 * shell && residual > 1e-12 * meanSquare ? residual : shell;
 }

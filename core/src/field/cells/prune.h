@@ -18,10 +18,10 @@ struct PruneLimits {
   int mostDegree = kMaxDegree;
 };
 
-/// Prunes a tree: turns internal nodes into leaves and lowers degrees. The result has the least error + λ·bytes
-/// of all possible results, as in the pruning of trees in classification and source coding (Breiman et al. 1984;
-/// Chou, Lookabaugh, Gray 1989). λ is the greatest that keeps the error goal. The error of a node at a degree is
-/// the residual ∫Φ² − Σc² of the projection of its samples, which `Fit::cached` of every node must hold.
+/// Prunes a tree: turns internal nodes into leaves and lowers degrees. The pruned tree minimizes error + λ·bytes, as in
+/// classification and source coding (Breiman et al. 1984; Chou, Lookabaugh, Gray 1989). λ is the greatest value with
+/// which the tree keeps the error goal. The error of a node is the residual of its projection at the chosen degree: ∫Φ²
+/// minus the projection's squared norm. `Fit::cached` of every node must hold the projection.
 void prune(BuildTree& tree, const Nearness& nearness, const PruneLimits& limits);
 
 }  // namespace hpsdf::detail

@@ -39,8 +39,8 @@ void report(const Progress& progress, double fraction) {
   progress.update("closing jumps", std::clamp(fraction, 0.0, 1.0));
 }
 
-/// Solves (M + λI)d = −Mx₀ for the change d of the coefficients x₀ by conjugate gradients with the diagonal as
-/// preconditioner. M is the matrix of `FaceCoupling`, which measures jumps; λ is the weight of the change.
+/// Solves (M + λI)d = −Mx₀ by conjugate gradients with the matrix's diagonal as preconditioner. x₀ holds the
+/// coefficients of a field, d is their change, M of `FaceCoupling` measures jumps, and λ is the weight of the change.
 class ConjugateGradients {
  public:
   ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
@@ -82,7 +82,7 @@ class ConjugateGradients {
   /// Residuals whose norm is below this fraction of |x₀| are rounding errors.
   static constexpr double kRounding = 1e-13;
 
-  /// Sums of the squared components of the residual, without weights and with the preconditioner as weights.
+  /// The sum of the squared components of the residual, and the same sum with the preconditioner as weights.
   struct ResidualSquares {
     double sum = 0;
     double weighted = 0;  ///< sum with the preconditioner as weights
@@ -93,8 +93,8 @@ class ConjugateGradients {
     }
   };
 
-  /// Moves the solution by `length` along the search direction. Updates the residual and returns the sums of its
-  /// squares.
+  /// Moves the solution by `length` along the search direction. Updates the residual, and returns the sums of the
+  /// squares of the new residual.
   ResidualSquares step(double length) {
     const auto move = [&](ResidualSquares& squares, std::size_t first, std::size_t count) {
       for (std::size_t i = first; i < first + count; ++i) {
@@ -121,8 +121,8 @@ class ConjugateGradients {
   std::vector<double> change_, residual_, direction_, product_;
 };
 
-/// Returns Σ_e κ_e ∫(f − f₀)² for a change of the field from f₀ to f. The sum runs over all cells e, or over those in
-/// the narrow band; κ_e weights a cell by its nearness to the surface. The unit is squared distance times volume.
+/// Returns the weighted squared change Σ_e κ_e ∫(f − f₀)² of a field from f₀ to f. The cells e are all cells, or those
+/// in the narrow band. κ_e weights a cell by its nearness to the surface. The unit is distance² · volume.
 double weightedChange(const FieldData& field, std::span<const double> x0, std::span<const double> change) {
   const BuildOptions& settings = field.metadata.settings;
   const double volume = field.domain.sizes().prod();

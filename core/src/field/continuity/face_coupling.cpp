@@ -24,9 +24,9 @@ constexpr std::size_t faceCoefficientCount(int degree) { return std::size_t(degr
 constexpr std::size_t faceIndex(int a, int b) { return std::size_t(a + b) * (a + b + 1) / 2 + b; }
 constexpr std::size_t kMaxFaceCoefficients = faceCoefficientCount(kMaxDegree);
 
-/// Restricts a polynomial on a face to a quarter of the face. `share_[half][i][a]` is a coefficient in one
-/// dimension: on the lower or upper half of an interval, orthonormal polynomial i of the interval is the sum over
-/// a of share_[half][i][a] times orthonormal polynomial a of the half.
+/// Restricts a polynomial on a face to a quarter of the face. In one dimension: on the lower or upper half of an
+/// interval, the interval's orthonormal polynomial i equals Σ_a share_[half][i][a] times the half's orthonormal
+/// polynomial a.
 class QuarterRestriction {
  public:
   QuarterRestriction() {
@@ -279,9 +279,10 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
     out[c] += scale * trace.factor[side][c] * face[trace.faceIndex[c]];
 }
 
-/// Computes the jump (the difference of the polynomials) across the face of link n, times √(w_F·area/|Ω|), as
-/// coefficients on the small leaf's face. The unknowns of the large leaf contain the square root of a greater volume;
-/// `scale` converts them to the volume of the small leaf.
+/// Computes the jump across the face of link n: the difference of the two leaves' polynomials, as coefficients on the
+/// small leaf's face. The jump is scaled so that its squared coefficients sum to the face's part of xᵀMx. The unknowns
+/// of a leaf contain the square root of the leaf's volume. `scale` converts the large leaf's unknowns to the volume of
+/// the small leaf.
 void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
   std::array<double, kMaxFaceCoefficients> large;

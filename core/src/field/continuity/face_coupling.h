@@ -15,10 +15,11 @@ namespace hpsdf::continuity {
 /// is defined by xᵀMx = Σ_F w_F ∫_F (f_left − f_right)² dA / |Ω|, where F runs over the faces between leaves, w_F is
 /// the edge length of the smaller leaf perpendicular to F, and |Ω| is the volume of the domain (Koschier et al. 2017).
 ///
-/// The vector x holds the coefficients of all leaves in octree order, each multiplied by √(V/|Ω|)·‖L_i L_j L_k‖,
-/// where V is the leaf's volume. Hence |x|² is the mean of f² over the domain, and M has no unit. Where leaves of
-/// different sizes meet, the larger leaf's polynomial on the face is restricted to the smaller face by repeated
-/// halving. This is exact, because the restriction does not raise the degree.
+/// The vector x holds the coefficients of all leaves in octree order. Each coefficient is multiplied by √(V/|Ω|), with
+/// the leaf's volume V, and by the norm of the coefficient's Legendre basis function. Hence |x|² is the mean of f² over
+/// the domain, and M has no unit. Where leaves of different sizes meet, the larger leaf's polynomial on the face is
+/// restricted to the smaller face by repeated halving. This is exact, because the restriction does not raise the
+/// degree.
 ///
 /// The methods run on TBB. Their results do not depend on the number of threads.
 class FaceCoupling {
@@ -42,7 +43,7 @@ class FaceCoupling {
   /// A face between a leaf (`small`) and an equally large or larger leaf (`large`).
   struct Link {
     std::uint32_t small, large;          ///< indices into `leaves_`
-    std::array<std::uint32_t, 2> along;  ///< offset of the small leaf's face in the large one's, in small faces
+    std::array<std::uint32_t, 2> along;  ///< small face's offset within the large leaf's face, in small faces
     std::uint8_t axis;                   ///< axis perpendicular to the face
     std::uint8_t levels;                 ///< difference of the leaves' depths
     std::uint8_t side;                   ///< 0 if the face lies at the small leaf's lower end, 1 at its upper end
@@ -69,9 +70,9 @@ class FaceCoupling {
   std::vector<double> scale_;                  ///< √(leaf volume V / domain volume |Ω|), by depth in the octree
   std::vector<Link> links_;                    ///< the faces, in the order of their small leaves
   std::vector<double> jumps_;                  ///< face coefficients of the jumps for the x given to `apply` last
-  std::vector<std::size_t> jumpStart_;         ///< index of each link's first entry in `jumps_`; at the end its length
+  std::vector<std::size_t> jumpStart_;         ///< by link: index of its first entry in `jumps_`; last, `jumps_.size()`
   std::vector<std::uint32_t> linksOfLeaf_;     ///< indices into `links_`, grouped by leaf
-  std::vector<std::size_t> linksOfLeafStart_;  ///< index of a leaf's first entry in `linksOfLeaf_`; last, its length
+  std::vector<std::size_t> linksOfLeafStart_;  ///< by leaf: index of its first entry in `linksOfLeaf_`; last, its size
   std::array<std::array<Trace, 3>, kMaxDegree + 1> traces_;  ///< by degree and axis; empty for degrees that no leaf has
 };
 

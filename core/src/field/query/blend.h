@@ -15,9 +15,8 @@
 
 namespace hpsdf::query {
 
-/// Returns a bit mask of axes, with bit 0 for x. A bit is set if the point is so close to one of the two faces of
-/// its leaf perpendicular to that axis that other leaves may have a weight at the point. Returns 0 for a field
-/// without blending.
+/// Returns a bit mask of axes, with bit 0 for x. A set bit means that the point is near one of its leaf's two faces
+/// perpendicular to that axis, where other leaves may have a weight too. Returns 0 for a field without blending.
 inline unsigned blendZoneAxes(const FieldData& field, const std::array<double, 3>& local) {
   if (!(field.blend > 0)) return 0;
   const double core = 1 - 2 * field.blend;
@@ -52,9 +51,9 @@ inline std::int64_t fixedPointAcross(std::int64_t cellIndex, int depth, bool upp
   return upper ? (cellIndex + 1) << (kMaxDepth - depth) : (cellIndex << (kMaxDepth - depth)) - 1;
 }
 
-/// Returns true if only two leaves have a weight at a point, which is the usual case in blend zones. The point
-/// must be near exactly one face of its leaf, perpendicular to `axis`. `localAcross` holds its local coordinates
-/// in the leaf on the other side of this face.
+/// Returns true if only two leaves have a weight at a point, which is the usual case in blend zones. The point must be
+/// near exactly one face of its leaf, perpendicular to `axis`. `localAcross` holds the point's local coordinates in the
+/// leaf on the other side of this face.
 inline bool onlyTwoOverlap(const FieldData& field, const std::array<double, 3>& localAcross, int axis) {
   return (blendZoneAxes(field, localAcross) & ~(1U << axis)) == 0;
 }
@@ -90,8 +89,8 @@ struct CandidateCells {
     }
   }
 
-  /// Calls f(slot, cell index) for each candidate cell. The slot is x + 2y + 4z of the cell's offset from the
-  /// first cell.
+  /// Calls f(slot, cell index) for each candidate cell. The slot is x + 2y + 4z, where (x, y, z) is the cell's offset
+  /// from the first cell.
   template <typename F>
   void forEach(F&& f) const {
     for (int z = 0; z <= extra[2]; ++z)
@@ -100,7 +99,7 @@ struct CandidateCells {
   }
 };
 
-/// The internal nodes of the octree among the candidate cells of one depth, which are the cells near a point.
+/// The internal octree nodes among the candidate cells of one depth. Candidate cells are the cells near a point.
 struct OpenNodes {
   CandidateCells cells;
   std::array<std::uint64_t, 8> bits;  ///< the packed node in each slot; 0 for a leaf
@@ -156,12 +155,12 @@ OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const s
   return open;
 }
 
-/// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. The search
-/// proceeds depth by depth. A child's distance from the point, in units of its own edge, is not less than its
-/// parent's distance in units of the parent's edge. Hence only children of candidates can be candidates, at most
-/// eight at each depth. `ownDepth` is the depth of the leaf that holds the point. If that leaf is larger than an
-/// entry of the lookup grid, leaves of its size may have a weight although their entries are not candidates. The
-/// search then starts at the base cells.
+/// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. `ownDepth` is the depth
+/// of the leaf that holds the point. The search proceeds depth by depth. Only children of candidates can be candidates,
+/// at most eight at each depth: relative to its own edge, a child is not nearer to the point than its parent is
+/// relative to the parent's edge. The search starts in the lookup grid. If the leaf that holds the point is larger than
+/// a cell of the lookup grid, the search starts at the base cells instead, because grid cells near the point may not
+/// show all leaves.
 template <typename Visit>
 void visitOverlapping(const FieldData& field, const LookupGrid& lookupGrid,
                       const std::array<double, 3>& gridCoordinates, int ownDepth, Visit&& visit) {
@@ -171,8 +170,8 @@ void visitOverlapping(const FieldData& field, const LookupGrid& lookupGrid,
     open = visitNextDepth(field, lookupGrid.frame, gridCoordinates, depth, open, visit);
 }
 
-/// Computes Σ wₙ fₙ / Σ wₙ over leaves n. It sums the differences fₙ − f₀ to the first leaf, so that equal fₙ
-/// yield exactly their common value.
+/// Computes the weighted mean (Σ wₙ fₙ) / (Σ wₙ) of values fₙ of leaves n with weights wₙ. It sums the differences fₙ −
+/// f₀ from the first leaf's value f₀, so that equal values yield exactly that value.
 template <typename Result>
 class PartitionOfUnity;
 

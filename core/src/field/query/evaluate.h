@@ -23,7 +23,7 @@ constexpr std::int64_t kFixedPointOne = std::int64_t{1} << kMaxDepth;
 struct GridPoint {
   std::array<double, 3> coordinates;
   std::array<std::int64_t, 3> fixedPoint;  ///< the coordinates, rounded down to kMaxDepth binary digits
-  std::uint64_t path;                      ///< octree path: digits of `fixedPoint` after the point, 21 bits an axis
+  std::uint64_t path;                      ///< octree path: the fractional bits of `fixedPoint`, 21 for each axis
 
   /// Returns the index of the cell of depth `depth` that holds the point.
   CellIndex cellIndex(int depth) const {
@@ -32,7 +32,7 @@ struct GridPoint {
   }
 };
 
-/// Returns which of its parent's children, 0 to 7, the cell at depth `depth` of an octree path is.
+/// Returns the number, 0 to 7, of the child that an octree path takes to reach depth `depth`.
 inline std::uint32_t childOnPath(std::uint64_t path, int depth) {
   const std::uint64_t bits = (path >> (kMaxDepth - depth)) & (1 | std::uint64_t{1} << 21 | std::uint64_t{1} << 42);
   return static_cast<std::uint32_t>(bits | bits >> 20 | bits >> 40) & 7;
@@ -239,8 +239,8 @@ inline Vector3 closestInDomain(const GridFrame& domain, const Vector3& x) {
   return closest;
 }
 
-/// Returns |v| without squares, which overflow for long and vanish for short vectors. The three-argument hypot of
-/// GCC 12 would not propagate NaN and infinity.
+/// Returns |v|. Avoids squares, which overflow for long vectors and underflow for short ones. The three-argument hypot
+/// of GCC 12 would not propagate NaN and infinity.
 inline double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
 
 /// Continues the field to a point x outside the domain: changes f(q) at the closest point q of the domain to
@@ -251,12 +251,12 @@ inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
   const double distance = length(offset);
   result.value += distance;
   for (int axis = 0; axis < 3; ++axis)
-    if (offset[axis] != 0) result.gradient[axis] = 0;  // the closest point does not move with a clamped coordinate
+    if (offset[axis] != 0) result.gradient[axis] = 0;  // the closest point does not depend on a clamped coordinate
   result.gradient += offset / distance;
 }
 
-/// Makes the lookup grid of a field, an array of the octree nodes of one depth. This is the greatest depth at
-/// which the array takes at most a sixteenth of the bytes of the nodes and coefficients.
+/// Makes the lookup grid of a field, an array of the octree nodes of one depth. Chooses the greatest depth at which the
+/// array takes at most a sixteenth of the bytes of the nodes and coefficients.
 LookupGrid makeLookupGrid(const FieldData& field);
 
 /// Evaluates a field at many points. On every instruction set, the results are bit for bit equal to those of

@@ -36,8 +36,8 @@ std::size_t checkGrid(const FieldData& data) {
   return cells;
 }
 
-/// Throws `Error` unless the nodes form trees, that is, unless every group of children belongs to exactly one
-/// node and that node precedes the group.
+/// Throws `Error` unless the nodes form trees: every group of children must belong to exactly one node, which precedes
+/// the group.
 void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coefficients) {
   const auto& nodes = data.nodes;
   constexpr std::uint8_t kUnreached = 0xff;

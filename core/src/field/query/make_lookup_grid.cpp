@@ -19,8 +19,8 @@ void raise(std::uint8_t& number, std::uint8_t to) {
   }
 }
 
-/// Raises the entries of `deepest`, one for each face of `large`, to the depth of the smaller leaf `leaf` at
-/// those faces that `leaf` touches.
+/// Updates `deepest`, which has one entry for each face of the leaf `large`. For each face that the smaller leaf `leaf`
+/// touches, raises the entry to the depth of `leaf`.
 void touchFaces(const OctreeNode& leaf, const OctreeNode& large, FaceDepths& deepest) {
   const int levels = leaf.depth - large.depth;
   const std::int64_t last = (std::int64_t{1} << levels) - 1;

@@ -106,8 +106,8 @@ bool plyMayExceedFloat(const fs::path& file) {
   });
 }
 
-/// Returns true if the size of an STL file is exactly that of binary data with the number of faces in its header.
-/// assimp recognises binary STL files by the same test.
+/// Returns true if an STL file has exactly the size of a binary file with as many faces as its header says. assimp
+/// recognises binary STL files by the same test.
 bool isBinaryStl(const fs::path& file) {
   constexpr std::uintmax_t kHeader = 80, kFace = 50;
   std::uint32_t faces = 0;
@@ -201,8 +201,8 @@ Eigen::Affine3d toEigen(const aiMatrix4x4& m) {
   return result;
 }
 
-/// Triangulates a polygon of the mesh `part` into vertex indices of that mesh. The result is empty if the polygon
-/// is a point or a line.
+/// Triangulates a polygon of the mesh `part`. The triangles hold vertex indices of `part`. Returns no triangles if the
+/// polygon is a point or a line.
 std::vector<Triangle> trianglesOf(const aiFace& face, const aiMesh& part) {
   if (face.mNumIndices < 3) return {};
   std::vector<Vector3> corners;

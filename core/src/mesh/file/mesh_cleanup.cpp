@@ -74,7 +74,7 @@ bool hasNoArea(const TriangleMesh& mesh, const Triangle& triangle) {
 class EdgeMap {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();  ///< no triangle has the edge
-  static constexpr std::uint32_t kSeveral = kNone - 1;                               ///< several triangles have it
+  static constexpr std::uint32_t kSeveral = kNone - 1;                               ///< several have the edge
 
   explicit EdgeMap(const std::vector<Triangle>& triangles) {
     faceOf_.reserve(3 * triangles.size());
@@ -103,8 +103,8 @@ class EdgeMap {
   std::unordered_map<std::uint64_t, std::uint32_t> faceOf_;
 };
 
-/// Returns triangle t with its corners rotated so that its longest edge comes first. If the triangle is
-/// collinear, its last corner then lies between the other two.
+/// Returns triangle t with its corners in cyclic order so that the first two corners span the longest edge. If the
+/// corners are collinear, the last corner lies between the first two.
 Triangle longestEdgeFirst(const TriangleMesh& mesh, Triangle t) {
   const auto squared = [&](int i) { return (mesh.vertices[t[i]] - mesh.vertices[t[(i + 1) % 3]]).squaredNorm(); };
   const std::array<double, 3> lengths = {squared(0), squared(1), squared(2)};
@@ -137,10 +137,10 @@ bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
 
 /// Removes triangles with collinear corners by flipping their longest edges. Returns the number of flips.
 ///
-/// Collinear triangles come from polygons and CAD facets with corners along a straight side. Dropping them would
-/// open the mesh. A flip instead splits the neighbour across the longest edge in two, at the collinear triangle's
-/// middle corner. It changes neither the surface nor the number of triangles. If a flip is impossible, the
-/// triangle remains unchanged.
+/// Collinear triangles come from polygons and CAD facets with corners along a straight side. Dropping them would open
+/// the mesh. A flip instead splits the neighbour across the longest edge into two triangles, at the collinear
+/// triangle's middle corner. The flip changes neither the surface nor the number of triangles. If a flip is impossible,
+/// the collinear triangle remains unchanged.
 std::size_t flipCollinearFaces(TriangleMesh& mesh) {
   std::vector<std::uint32_t> pending;
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)

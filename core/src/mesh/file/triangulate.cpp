@@ -72,8 +72,8 @@ class CornerGrid {
     for (std::uint32_t i = 0; i < points.size(); ++i) corners_[ends[cellOf(points[i])]++] = i;
   }
 
-  /// Searches all corners in the box, and some corners near it, for one for which `is` returns true. Returns
-  /// std::nullopt if there is none.
+  /// Returns a corner for which `is` returns true, or std::nullopt if there is none. Tests all corners in the box and
+  /// some corners near it.
   template <typename Predicate>
   std::optional<std::uint32_t> find(const Eigen::AlignedBox2d& box, const Predicate& is) const {
     const std::size_t lastX = column(0, box.max().x()), lastY = column(1, box.max().y());
@@ -119,9 +119,9 @@ class EarClipper {
   }
 
   std::vector<Triangle> clip() {
-    // Cut off thin ears only if there is no other ear. Rounding to float moves corners off a straight side. An
-    // ear that is no thicker than this rounding, or whose cut passes another corner as closely, would yield
-    // slivers with random normals. The tolerance is relative to the length of the sides.
+    // Cut off thin ears only if there is no other ear. Rounding to float moves corners off a straight side. Ears as
+    // thin as these rounding errors, and ears whose cut passes another corner as closely, would yield slivers with
+    // random normals. The tolerance is relative to the length of the sides.
     constexpr double kRounding = 1e-4;
     while (left_ > 3) {
       std::optional<std::uint32_t> ear = findEar(kRounding, maybeClear_);
@@ -155,8 +155,8 @@ class EarClipper {
     return !other;
   }
 
-  /// Returns the bounding box of the triangle `ear` with every side moved outwards by `tolerance` times its
-  /// length. It contains all points for which `isNear` returns true.
+  /// Returns the bounding box of the triangle `ear` with every side moved outwards by `tolerance` times the side's
+  /// length. The box contains all points for which `isNear` returns true.
   static Eigen::AlignedBox2d boxAround(const std::array<Vector2, 3>& ear, double tolerance) {
     Eigen::AlignedBox2d box;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -176,8 +176,8 @@ class EarClipper {
     return true;
   }
 
-  /// Returns the corner with the smallest triangle. It is cut off if no ear is left because the polygon is flat
-  /// or intersects itself.
+  /// Returns the corner that makes the smallest triangle with its two neighbours. The clipper cuts this corner off if
+  /// the polygon has no ear, because it is flat or intersects itself.
   std::uint32_t flattestCorner() const {
     std::uint32_t best = start_;
     double least = std::numeric_limits<double>::infinity();

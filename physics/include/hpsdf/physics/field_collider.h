@@ -10,15 +10,15 @@
 
 namespace hpsdf::physics {
 
-/// A field with a table of guaranteed lower bounds of the field's values. Looking up a bound costs a third
+/// A field with a table of guaranteed lower bounds of the field's values. Looking up a bound takes a third of the time
 /// of evaluating the field.
 ///
-/// A field only approximates a distance function: between two points its value may change by more than
-/// their distance, and it jumps between cells. Therefore the value at a sphere's centre bounds the field
-/// within the sphere only with a tolerance, which is large where the field is coarse. Let g be the greatest
-/// function below the field with |g(x) − g(y)| ≤ |x − y|. The collider stores g as precisely as a grid of
-/// cells allows. Its bounds are derived from bounds of the polynomials of all leaves, including neighbours
-/// blended with them. They therefore hold for every field, whether or not the field stores bounds itself.
+/// A field only approximates a distance function: between two points, its value may change by more than their distance,
+/// and it jumps between cells. Therefore, its value at a sphere's centre does not exactly bound the field within the
+/// sphere. Let g be the greatest function that is nowhere above the field and satisfies |g(x) − g(y)| ≤ |x − y|. The
+/// collider stores g as precisely as a grid of cells allows. It derives g from bounds of the polynomials of all leaves,
+/// including neighbours blended with them. The bounds hold for every field, whether or not the field stores error
+/// bounds itself.
 class FieldCollider {
  public:
   /// Keeps a reference to the field, which must outlive the collider.
@@ -41,7 +41,7 @@ class FieldCollider {
   /// Lower bounds of the field for one cell of the table, in multiples of `unit_`, rounded down.
   struct Cell {
     std::uint16_t within;  ///< lower bound of the field in the cell
-    std::uint16_t around;  ///< lower bound, over all points y, of the field at y plus the distance from the cell to y
+    std::uint16_t around;  ///< lower bound, over all points y, of (field at y) + (distance from the cell to y)
   };
 
   const Cell& cellAt(const Vector3& inDomain) const;
@@ -50,7 +50,7 @@ class FieldCollider {
   int depth_;                         ///< depth at which octree cells are as large as cells of the table
   std::array<std::int64_t, 3> size_;  ///< cells of the table along each axis
   double unit_;
-  double wall_;              ///< lower bound of f at the domain's sides or, if that is above 0, of `around` there
+  double wall_;              ///< smallest `within` at the domain's sides; if that is above 0, smallest `around` there
   std::vector<Cell> cells_;  ///< bounds of all cells, x fastest
 };
 

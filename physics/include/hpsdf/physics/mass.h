@@ -18,10 +18,10 @@ struct MassProperties {
   Box box;          ///< bounding box of the mesh in the frame of inertia
 };
 
-/// Computes the mass properties of a closed mesh. Integrates over the tetrahedra that the faces form with one
-/// common point (divergence theorem; Tonon 2004 gives the moments of a tetrahedron). Throws `Error` if the mesh
-/// has no volume, has indices out of range, or has coordinates that are not finite. For an open mesh, the result
-/// belongs to one of the meshes that close it.
+/// Computes the mass properties of a closed mesh. Integrates over the tetrahedra that the faces form with one common
+/// point (divergence theorem; Tonon 2004 gives the moments of a tetrahedron). Throws `Error` if the mesh has no volume,
+/// has indices out of range, or has coordinates that are not finite. For an open mesh, the result is that of the mesh
+/// whose holes are closed by triangles to the common point.
 MassProperties massProperties(const TriangleMesh& mesh);
 
 }  // namespace hpsdf::physics

@@ -16,11 +16,11 @@ namespace hpsdf::physics {
 
 constexpr std::size_t kMaxSamples = std::size_t{1} << 24;  ///< greatest number of samples; choosing so many takes 6 GB
 
-/// The number of samples, by exactly one of `count` and `spacing`.
+/// Options of the sampling. Exactly one of `count` and `spacing` must be set.
 struct SampleOptions {
   std::optional<std::size_t> count = {};
-  /// The side length, in mesh units, of a square with the surface area that each sample represents. The
-  /// distance from a sample to its nearest neighbour is about 0.85 times this length.
+  /// The square root of the surface area per sample, in mesh units. The distance from a sample to its nearest neighbour
+  /// is about 0.85 times this length.
   std::optional<double> spacing = {};
   std::uint64_t seed = 1;  ///< seed of the random candidates
 };
@@ -49,9 +49,9 @@ class SurfaceSamples {
 /// face away from each other, like the two sides of a thin wall, are sampled independently. The same mesh
 /// and options always give the same bytes.
 ///
-/// Throws `Error` if the mesh has no triangles or no area, has indices out of range or coordinates that are
-/// not finite; if not exactly one of count and spacing is given; if the count is 0 or more than
-/// `kMaxSamples`; and if the spacing is not finite or not above 0.
+/// Throws `Error` if the mesh has no triangles or no area, has indices out of range or coordinates that are not finite;
+/// if `count` and `spacing` are both set or both unset; if the count is 0 or more than `kMaxSamples`; and if the
+/// spacing is not finite or not above 0.
 SurfaceSamples sampleSurface(const TriangleMesh& mesh, const SampleOptions& options);
 
 }  // namespace hpsdf::physics

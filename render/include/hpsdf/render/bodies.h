@@ -39,8 +39,8 @@ struct BodyBuffers {
   std::vector<std::uint32_t> body;      ///< index of the body in the list of drawn bodies
   std::vector<std::uint32_t> triangle;  ///< index of the triangle in the body's mesh
   /// The unit normal at the visible point. It is flipped if the eye sees the back of the triangle, because meshes may
-  /// be open or wrongly oriented. Where the mesh is smooth, the normal is interpolated between the triangle's corners,
-  /// so that it may point slightly away from the eye at a silhouette.
+  /// be open or wrongly oriented. Where the mesh is smooth, the normal is interpolated between the triangle's corners.
+  /// An interpolated normal may point slightly away from the eye at a silhouette.
   std::vector<Eigen::Vector3f> normal;
   std::vector<float> distance;  ///< distance along the ray from its start to the body, world units
 

@@ -27,7 +27,7 @@ struct Comparison {
 };
 Comparison compare(const Image& baseline, const Image& actual);
 
-/// Describes in one line why a comparison fails. Returns an empty string if both pictures have the same size and at
+/// Returns a line that says why a comparison fails. Returns an empty string if both pictures have the same size and at
 /// most the fraction `budget` of the pixels differs.
 std::string problem(const Comparison& comparison, double budget);
 

@@ -8,11 +8,11 @@
 
 namespace hpsdf::render {
 
-/// Plots the field f over the distance along a line, in charts from top to bottom: f and the exact distance; the error
-/// f − exact; |∇f| and the slope of f along the line; and coloured bands with the cells' degrees and depths. Thin
-/// vertical lines mark the borders of cells. `exact` holds the exact distance at each sample of the line; if it is
-/// empty, the jumps of f at cell borders are drawn instead of the error. A small picture omits the lower charts. Throws
-/// `Error` if the size is out of range, 16 to 16384 pixels.
+/// Plots a field f along a line, in charts from top to bottom: f and the exact signed distance; the error, which is f
+/// minus the exact distance; |∇f| and the slope of f along the line; and coloured bands with the cells' degrees and
+/// depths. Thin vertical lines mark the borders of cells. `exact` holds the exact distance at each sample of the line.
+/// If `exact` is empty, the jumps of f at cell borders are drawn instead of the error. A small picture omits the lower
+/// charts. Throws `Error` if the width or height is not 16 to 16384 pixels.
 Image drawLine(const Field& field, const Line& line, std::span<const double> exact, int width, int height);
 
 }  // namespace hpsdf::render

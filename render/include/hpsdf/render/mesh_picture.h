@@ -20,17 +20,17 @@ struct MeshPicture {
   int width = 1280;
   int height = 720;
   int samples = 1;     ///< samples per pixel along each axis, 1 to 8
-  bool whole = false;  ///< replaces the camera's distance by the nearest one that shows the whole mesh
+  bool whole = false;  ///< replaces the camera's distance by the least at which the whole mesh is visible
 };
 
 /// A function that makes a renderer for bodies with the given meshes, for example `makeCpuBodyRenderer`.
 using MakeBodyRenderer = std::function<std::unique_ptr<BodyRenderer>(std::vector<TriangleMesh>)>;
 
-/// Draws front faces in the colour of clay, back faces in blue, and faces that cross other faces in pale red. Boundary,
-/// non-manifold and inconsistent edges are drawn as lines, dashed where hidden, and a ring surrounds each defect that
-/// is small in the picture. `defects` are the defects of `mesh`. The mesh may have any position and size, because
-/// `make` receives a copy that is moved near the origin and scaled to a size near 1. Throws `Error` if a size, the
-/// camera or the mesh is out of range.
+/// Draws a mesh and its defects. Front faces are clay-coloured, back faces blue, and faces that cross other faces pale
+/// red. Boundary, non-manifold and inconsistent edges are drawn as lines, dashed where hidden. A ring surrounds each
+/// defect that is small in the picture. `defects` are the defects of `mesh`. The mesh may have any position and size,
+/// because `make` receives a copy that is moved near the origin and scaled to a size near 1. Throws `Error` if a size,
+/// the camera or the mesh is out of range.
 Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const MeshDefects& defects,
                const MeshPicture& picture);
 

@@ -21,10 +21,10 @@ namespace hpsdf::render {
 /// degrees or depths of the field, so that colours keep their meaning from slice to slice. In a picture of a surface,
 /// nearer objects hide farther ones, and a clipping plane cuts everything except bodies.
 ///
-/// Throws `Error`, before memory is allocated, if a size or sample count is out of range (16 to 16384 pixels; 1 to 8;
-/// at most 64 Mi samples in all). Throws `Error` if the colours do not suit the kind of view, if their reference data
-/// is missing, if the limits of the scale are invalid, if a plane misses the domain, and if the spacing of arrows is
-/// out of range.
+/// Throws `Error`, before memory is allocated, if the picture's size is out of range: 16 to 16384 pixels per side, 1 to
+/// 8 samples per pixel along each axis, at most 64 Mi samples in all. Throws `Error` if the colours do not suit the
+/// kind of view, if the colours' reference data is missing, if the limits of the scale are invalid, if a plane misses
+/// the domain, and if the spacing of arrows is out of range.
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const ReferenceData& reference = {});
 Image draw(Renderer& renderer, const Field& field, const SurfacePicture& picture, const ReferenceData& reference = {});
 
@@ -39,7 +39,7 @@ struct Drawn {
   bool seen = false;  ///< true if any pixel shows the field
   Legend legend = {};
   std::vector<std::string> details = {};  ///< details of the caption, the most important first
-  ScaleOptions scale = {};                ///< the scale as chosen; another picture that uses it gets the same colours
+  ScaleOptions scale = {};                ///< the chosen colour scale; pictures with equal scales have equal colours
   std::array<int, 2> corner = {0, 0};     ///< upper left corner of the view in the picture, pixels
 };
 /// Draws a picture as `draw` does. Returns it together with the data from which it was drawn.
@@ -81,7 +81,7 @@ struct ViewSize {
 };
 ViewSize viewSize(const SurfacePicture& picture);
 
-/// Returns the view of the plane that `draw` renders. Its pixels are square at the size that `viewSize` returns.
+/// Returns the view of the plane that `draw` renders. At the size that `viewSize` returns, the view has square pixels.
 SliceView sliceView(const Field& field, const SlicePicture& picture);
 
 /// Returns a view of the picture's plane, framed for `width` × `height` square pixels, for files of raw field values.

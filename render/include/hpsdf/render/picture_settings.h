@@ -50,9 +50,9 @@ struct ReferenceData {
 /// The range of values that the colours represent. Pictures of different views or fields are comparable if they use the
 /// same scale.
 struct ScaleOptions {
-  /// The lowest and the highest value of the colour scale, in ascending order; above 0 on a logarithmic scale. If
-  /// absent, the limits are chosen from the values shown, or from the values of all cells for a quantity that is
-  /// constant in each cell. A few outliers do not count, except for distances.
+  /// The lowest and the highest value of the colour scale; above 0 on a logarithmic scale. If absent, the limits are
+  /// chosen from the values in the picture, or from all cells if the quantity is constant in each cell. The choice
+  /// ignores a few outliers, except for distances.
   std::optional<std::array<double, 2>> limits = {};
   bool logarithmic = true;
   /// Degrees or depths that the legend contains in addition to those of the field; 0 to 255, in ascending order.

@@ -38,7 +38,7 @@ enum class Projection : std::uint8_t {
   orthographic,  ///< parallel rays, so that sizes do not depend on the distance
 };
 
-/// A camera that orbits a target, which it sees in the middle of the picture.
+/// A camera that orbits a target. The target is in the middle of the picture.
 struct OrbitCamera {
   double azimuthDegrees = 30;      ///< angle about the up axis; at 0 the camera looks along −z (y up) or +y (z up)
   double elevationDegrees = 20;    ///< angle above the horizon, −90 to 90
@@ -56,8 +56,8 @@ struct OrbitCamera {
 struct Camera {
   Vector3 eye;      ///< common start of the rays; orthographic: middle of the plane in which rays start
   Vector3 forward;  ///< unit vector
-  Vector3 right;    ///< vector to the right, half as long as the view is wide (in perspective, wide at distance 1)
-  Vector3 up;       ///< vector upwards, half as long as the view is high (in perspective, high at distance 1)
+  Vector3 right;    ///< vector to the right, as long as half the view's width (in perspective, at distance 1)
+  Vector3 up;       ///< vector upwards, as long as half the view's height (in perspective, at distance 1)
   Projection projection = Projection::perspective;
 };
 
@@ -127,8 +127,8 @@ struct ViewBuffers {
   std::vector<float> value;             ///< f at the point of a slice or at the hit of a ray
   std::vector<Eigen::Vector3f> normal;  ///< gradient of f scaled to a unit vector; empty for slices
   std::vector<float> distance;  ///< distance along the ray from its start to the hit, world units; empty for slices
-  /// 1 if the pixel's ray meets a crack, which is a face between two cells at which f jumps across the offset, else 0.
-  /// At a crack, `value` is f on the far side of the face. This buffer is empty for slices.
+  /// 1 if the pixel's ray meets a crack, else 0. A crack is a place on the face between two cells where f jumps across
+  /// the offset. At a crack, `value` is f on the far side of the face. This buffer is empty for slices.
   std::vector<std::uint8_t> crack;
   /// The part of the scene that each pixel shows. This buffer is empty if the scene is a surface alone.
   std::vector<Shown> shown;

@@ -14,7 +14,7 @@ struct DispatchFigures {
   double querySeconds = 0;      ///< time to find the contacts of fields
   std::size_t pairs = 0;        ///< pairs whose contacts were searched: one body is a field, and the boxes overlap
   std::size_t penetrating = 0;  ///< samples, spheres and nodes of soft bodies that lie in a field
-  std::size_t contacts = 0;     ///< passed to the solver: up to 12 per pair of bodies, and nodes within the margin
+  std::size_t contacts = 0;     ///< contacts for the solver: up to 12 per pair, or soft-body nodes within the margin
   double deepest = 0;           ///< greatest penetration, world units
 };
 

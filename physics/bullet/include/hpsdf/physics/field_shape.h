@@ -19,9 +19,9 @@ inline btVector3 toBullet(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
 /// dispatches them. When two fields collide, the samples of each one are evaluated in the field of the
 /// other.
 ///
-/// The shape refers to the field and the samples, which must outlive the shape. The frame of a body is that
-/// of `MassProperties`: its origin is the centre of mass. As a part of a compound shape this shape collides
-/// with nothing.
+/// The shape refers to the field and the samples, which must outlive the shape. The frame of a body with this shape is
+/// the frame of inertia in `MassProperties`, with its origin at the centre of mass. As a part of a compound shape this
+/// shape collides with nothing.
 class FieldShape final : public btConcaveShape {
  public:
   /// `samples` must be samples of the mesh from which `field` was built; mesh and world have the same unit.

@@ -28,10 +28,9 @@ struct Material {
   double restitution = 0;
   double rollingFriction = 0;
   double linearDamping = 0, angularDamping = 0;
-  /// The speed in units per second below which a body comes to rest. A body may sleep after two seconds in
-  /// which its centre and the points at its radius were slower, if all bodies that it touches may sleep too.
-  /// A negative value selects Bullet's thresholds, which suit bodies of size 1: 0.8 units and 1 radian per
-  /// second.
+  /// The speed in units per second below which a body counts as resting. A body may sleep once its centre and the
+  /// points at its radius have been slower for two seconds, if all bodies that it touches may sleep too. A negative
+  /// value selects Bullet's thresholds, which suit bodies of size 1: 0.8 units and 1 radian per second.
   double restSpeed = -1;
 };
 
@@ -53,10 +52,10 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// Adds a rigid body and returns its number: 0, 1, … in the order of addition. A body of mass 0 is static.
-  /// The world refers to the shape, which must outlive the world. The body's frame is that of the shape (for
-  /// a `FieldShape` the frame of inertia). Throws `Error` if the mass is negative or not finite, or if the
-  /// transform is not finite or not rigid.
+  /// Adds a rigid body and returns its number: 0, 1, … in the order of addition. A body of mass 0 is static. The world
+  /// refers to the shape, which must outlive the world. The body's frame is the frame of the shape; a `FieldShape` has
+  /// the frame of inertia. Throws `Error` if the mass is negative or not finite, or if the transform is not finite or
+  /// not rigid.
   std::size_t add(btCollisionShape& shape, double mass, const Eigen::Isometry3d& worldFromBody,
                   const Material& material = {});
 
@@ -66,9 +65,9 @@ class World {
   /// bodies.
   std::size_t add(std::unique_ptr<btSoftBody> body);
 
-  /// Simulates one step. Throws `Error`, which names the step and the body, if a position or velocity is no
-  /// longer finite, or if a body moves more than a million units in the step; Bullet would silently skip such
-  /// a motion. The world cannot be used after an error.
+  /// Simulates one step. Throws `Error` if a position or velocity is no longer finite, or if a body moves more than a
+  /// million units in the step; Bullet would silently skip such a motion. The error names the step and the body. The
+  /// world cannot be used after an error.
   void step();
 
   std::uint64_t steps() const { return steps_; }
