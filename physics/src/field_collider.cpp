@@ -12,7 +12,7 @@ namespace hpsdf::physics {
 namespace {
 
 constexpr std::size_t kMostCells = std::size_t{1} << 20;
-constexpr double kUnits = 32;        // stored bounds count 1/32 of the shortest cell edge; 16 bits reach 2048 edges
+constexpr double kUnits = 32;        // bounds are stored in 1/32 of the shortest cell edge; 16 bits reach 2048 edges
 constexpr double kTolerance = 0.05;  // accepted error of bounds of polynomials, in shortest cell edges
 constexpr double kRounding = 1e-12;  // upper bound of the relative rounding error of sums
 
@@ -310,11 +310,12 @@ double FieldCollider::lowerBound(const Vector3& x) const {
   return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-// A bound b at x means that the field at every point y with |x − y| < b is at least b − |x − y|. Let q be the point of
-// the domain closest to x. The first bound is `around` at q: the points of the domain closest to x and to y are at most
-// |x − y| apart. The second bound is `wall_` + |x − q|. For y outside the domain, it holds because y is at most |x − y|
-// nearer to the domain than x. For y inside, the path from x to y crosses a side of the domain, and a `wall_` of 0 or
-// more is a bound there. If `wall_` is negative, the second bound is below |x − q| and concerns no y inside.
+// Returns the greater of two bounds if x is outside the domain. A number b is a bound at x if the field is at least
+// b − |x − y| at every point y with |x − y| < b. Let q be the point of the domain closest to x. The first bound is
+// `around` at q. It holds because the points of the domain closest to x and to y are at most |x − y| apart. The second
+// bound is `wall_` + |x − q|. For y outside the domain, it holds because y is at most |x − y| nearer to the domain than
+// x. For y inside, the path from x to y crosses a side of the domain, where a `wall_` of 0 or more is a bound. If
+// `wall_` is negative, the second bound is below |x − q|, and no y inside has |x − y| < b.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

@@ -7,7 +7,7 @@
 namespace hpsdf::physics {
 namespace {
 
-constexpr std::uint32_t kLeafPoints = 16;  // with 8 or 32 the benchmark contacts/pile differs by at most 20 %
+constexpr std::uint32_t kLeafPoints = 16;  // 8 or 32 change the time of the benchmark contacts/pile by at most 20 %
 constexpr int kFitSteps = 64;              // gives radii within a few percent of the smallest possible radii
 
 class Builder {

@@ -25,8 +25,8 @@ bool inBox(const Vector3& x, const Vector3& a, const Vector3& b, const Axes& axe
   return std::ranges::all_of(axes, [&](int k) { return std::min(a[k], b[k]) <= x[k] && x[k] <= std::max(a[k], b[k]); });
 }
 
-/// Returns two coordinate axes. The triangle's projection to the plane of these axes has an area above 0. Returns the
-/// same axis twice if the triangle is degenerate.
+/// Returns two coordinate axes for projecting the triangle: its projection to their plane has an area above 0. Returns
+/// the same axis twice if the triangle is degenerate.
 Axes projectionAxes(const Corners& t) {
   for (const Axes axes : {Axes{0, 1}, Axes{1, 2}, Axes{2, 0}})
     if (orientation(axes, t[0], t[1], t[2]) != 0) return axes;
@@ -322,8 +322,8 @@ Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, doub
     crossings.found.insert(crossings.found.end(), found.begin(), found.end());
   };
   // Search the triangles range by range. The ranges grow, up to a fiftieth of all triangles. If the crossings of a
-  // range exceed `limit`, stop early and halve the range, until only the triangle is left at which the limit is
-  // reached. Thus most pairs are neither tested nor stored, even if all triangles intersect each other.
+  // range would exceed `limit`, stop early and halve the range. Repeat this until the range is the single triangle at
+  // which the limit is reached. Thus most pairs are never tested or stored, even if all triangles intersect each other.
   constexpr std::uint32_t kLeast = 64;
   const std::uint32_t largest = std::max(kLeast, count / 50);
   std::uint32_t size = kLeast;

@@ -63,10 +63,10 @@ struct RadialFace {
   std::uint32_t patch;
 };
 
-/// Sorts the faces at an edge by angle, counterclockwise as seen with the edge pointing to the viewer. Coplanar faces
-/// get the same angle. Among them, faces that end a solid come first: their `rising` differs from `begins`. All other
-/// faces begin a solid. Coincident faces of the same orientation are sorted by patch, so that all edges of a shared
-/// wall match the same patches.
+/// Sorts the faces at an edge by angle, counterclockwise as seen with the edge pointing to the viewer. Faces with
+/// `rising` equal to `begins` begin a solid; all other faces end one. Coplanar faces get the same angle. Among coplanar
+/// faces, those that end a solid come first. Coincident faces of the same orientation are sorted by patch, so that all
+/// edges of a shared wall match the same patches.
 void sortAround(std::vector<RadialFace>& faces, bool begins) {
   std::ranges::sort(faces, {}, &RadialFace::angle);
   const auto before = [begins](const RadialFace& a, const RadialFace& b) {
@@ -107,7 +107,7 @@ std::vector<RadialFace> radialFaces(const TriangleMesh& mesh, const mesh::Patche
 using Wedge = std::array<RadialFace, 2>;
 
 /// Matches each face that begins a solid with the face that ends the same solid, like opening and closing parentheses,
-/// in two passes around the edge. The faces that begin a solid must be as many as the faces that end one.
+/// in two passes around the edge. Equally many faces must begin a solid and end one.
 std::vector<Wedge> wedgesOf(std::vector<RadialFace> faces, bool begins) {
   sortAround(faces, begins);
   std::vector<Wedge> wedges;

@@ -13,7 +13,7 @@
 namespace hpsdf {
 namespace {
 
-/// The shortest piece of a segment, as a fraction of the segment's length. Shorter pieces are rounding errors.
+/// The shortest piece of a segment, as a fraction of the segment's length. Shorter pieces result from rounding errors.
 constexpr double kShortest = 1e-12;
 
 /// One coordinate of the points of a segment, as a linear function of the parameter t from 0 to 1. The unit is the edge

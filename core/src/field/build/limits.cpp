@@ -136,7 +136,7 @@ static void requireGridMemory(const BuildOptions& options) {
 }
 
 void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
-  constexpr double kTolerance = 1.5;  // the extrapolated need may exceed the limit by this factor
+  constexpr double kTolerance = 1.5;  // the extrapolated memory may exceed the allowed memory by this factor
   const double fixed = double(need.fixedBytes), most = allowedMemory(options);
   if (fixed > most)
     refuse("the distance that the field is made from holds ", bytesText(fixed), " of memory, more than the ",

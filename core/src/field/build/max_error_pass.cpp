@@ -150,8 +150,8 @@ class MaxErrorPass {
       return candidate;
     }
 
-    // Compare the leaf with the exact distance at the probes. A probe slightly outside the narrow band counts
-    // too, because it represents the points around it that lie within the band.
+    // Compare the leaf's polynomial with the exact distance at the probes. A probe slightly outside the narrow band
+    // counts too, because it represents the points around it that lie within the band.
     const Box box = state_.tree.boxOf(leaf);
     const std::vector<double> exact = fitter_.distances(box, probes().local);
     const double band = setup_.options.band;

@@ -98,8 +98,8 @@ Part partOf(const std::vector<double>& cube, int degree, const Box& box, int num
 /// points one leaf edge away from the centre, on either side along the polynomial's gradient. Each point y gives the
 /// bounds Φ(y) ± |x − y| of Φ(x). The farther away y is, the more nearly these bounds are linear in x over the part.
 constexpr std::size_t kPointsPerPart = 3;
-/// Distance of the two outer points from the centre, in leaf edges. With 0.7, 1.4 and 2, the median bound for the mesh
-/// bunny is 1.03, 1.2 and 2.1 times as great.
+/// Distance of the two outer points from the part's centre, in leaf edges. With 0.7, 1.4 and 2 instead of 1, the median
+/// error bound for the mesh bunny is 1.03, 1.2 and 2.1 times as great.
 constexpr double kSideDistance = 1;
 
 std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain, double edge) {
