@@ -19,7 +19,7 @@ function(hpsdf_target target)
     -ffp-contract=off)
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
     # false alarms in GCC 12's own std::string (GCC bugs 105651, 105329)
-    target_compile_options(${target} PRIVATE -Wno-restrict -Wno-stringop-overflow)
+    target_compile_options(${target} PRIVATE -Wno-restrict -Wno-stringop-overflow -Wno-array-bounds)
   endif()
   if(HPSDF_SANITIZE)
     # what UndefinedBehaviorSanitizer finds ends the program, as the others' findings do: a report alone fails no test

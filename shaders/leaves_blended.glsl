@@ -12,9 +12,9 @@ const int kDeepest = 20;  // greatest depth of a leaf
 // Returns true if a point of a leaf, in local coordinates, lies near a face, where several leaves are blended.
 bool isInBlendZone(vec3 local) { return any(greaterThan(abs(local), vec3(1.0 - 2.0 * blend))); }
 
-// Finds the cells of depth `level` that are at most `near` (up to 0.5) times their edge length away from a point. Their
-// indices run from `first` to `first` + `more`, so that there are one or two along each axis. The point is given by its
-// cell of depth `depth` and its position `fraction` in that cell.
+// Finds the cells of depth `level` that are at most `near` (up to 0.5) times their edge length away from a point. The
+// indices of these cells run from `first` to `first` + `more`, one or two cells along each axis. The point is given by
+// the cell of depth `depth` that contains it and by its position `fraction` in that cell.
 void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float near, out ivec3 first,
                     out ivec3 more) {
   ivec3 cell;
@@ -35,15 +35,15 @@ void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float 
   more = clamp(cell + ivec3(greaterThan(inCell, vec3(1.0 - near))), ivec3(0), last) - first;
 }
 
-// Takes, for each axis, the face of the leaf that is nearer to the point `local`. Returns the depth of the smallest
-// leaf at this face, or kWall if the face lies on the domain's boundary.
+// For each axis, takes the nearer of the leaf's two faces to the point `local`. Returns the depth of the smallest leaf
+// at this face, or kWall if the face lies on the domain's boundary.
 ivec3 smallestNeighbour(uint extents, vec3 local) {
   uvec3 shift = uvec3(0u, 10u, 20u) + 5u * uvec3(greaterThan(local, vec3(0.0)));
   return ivec3(uvec3(extents) >> shift & kWall);
 }
 
-// Returns, for each axis, the distance of a point from the leaf's nearer face, positive inside the leaf. The unit is
-// the distance beyond this face at which the leaf's blending weight falls to zero.
+// Returns, for each axis, the distance of a point from the leaf's nearer face, positive inside the leaf. The
+// distance is scaled such that the leaf's blending weight falls to zero at -1.
 vec3 rampPosition(uint extents, int depth, vec3 local) {
   ivec3 neighbour = smallestNeighbour(extents, local);
   vec3 t = (1.0 - abs(local)) * ldexp(vec3(0.5), neighbour - depth) / blend;
@@ -76,7 +76,7 @@ int candidateNumber(ivec3 offset) { return offset.x + 2 * offset.y + 4 * offset.
 // contains the point, and a value (w).
 struct LeafSum {
   vec4 first, sum, weights;
-  float lowest, highest;  // range of the polynomials whose weights, widened by `margin`, reach the point
+  float lowest, highest;  // range of the values of all polynomials whose weights reach the point with `margin`
 };
 
 // Adds the polynomial of a leaf, with cell index other.xyz and depth other.w, to the weighted sum.
@@ -173,7 +173,7 @@ LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margi
 }
 
 // Returns the value of the blended field at a point, and the range of values that nearby leaf polynomials have at the
-// point. Nearby leaves are those whose weights would reach the point if they reached farther by the share `margin`.
+// point. A leaf is nearby if its weight would reach the point after its blend zone is widened by the share `margin`.
 FieldRange blendedRange(Node leaf, uint depth, uvec3 cellIndex, vec3 local, float margin) {
   LeafSum total = leafSumAt(leaf, ivec3(cellIndex), int(depth), local, margin, false);
   return FieldRange(total.first.w + total.sum.w / total.weights.w, total.lowest, total.highest);

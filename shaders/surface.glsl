@@ -16,8 +16,8 @@ layout(location = 16) uniform dvec3 shownHi;
 layout(location = 17) uniform bool parallel;  // whether the rays are parallel (orthographic camera)
 
 // The state of each pixel after a march pass. The integers are the kind (kMiss to kBracketed), the bits of the floats
-// March::t and March::side, and the last leaf. If the march has found a bracket of the root, the floats are its ends a
-// and b and a first guess of the root. If the march has not ended, they are the last height and the longest next step.
+// March::t and March::side, and the last leaf. If the march has found a bracket [a, b] of the root, the floats are a, b
+// and a first guess of the root. If the march has not ended, the floats are the last height and the longest next step.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 

@@ -67,7 +67,8 @@ float lengthToExit(CellPoint at, MarchRay ray, float margin) {
   return min(exits.x, min(exits.y, exits.z));
 }
 
-// Length of a step over which the height is guaranteed to stay positive, if its slope is at least `steepest`.
+// Length of a step along the ray over which `height` is guaranteed to stay positive, if its slope along the ray is at
+// least `steepest`.
 float certainlyAbove(float height, float steepest) {
   return height > 0.0 ? (steepest < 0.0 ? height / -steepest : kInfinity) : 0.0;
 }
@@ -204,7 +205,7 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   float shallowest = leaf.slope + leaf.slopeDeviation;
   float toExit = leaf.toLeave;  // length to the exit from the leaf, or from the leaf's part without blending
   if (kBlended && !leaf.zone.inside) toExit = lengthToExit(leaf.at, ray, leaf.zone.width);
-  bool falling = !leaf.zone.inside && shallowest < 0.0;  // decreases in the whole leaf: at most one root
+  bool falling = !leaf.zone.inside && shallowest < 0.0;  // the height decreases in the whole leaf: at most one root
   if (march.side != 0.0 && falling && leaf.lowest > 0.0) {
     if (leaf.highest + leaf.slope * toExit < 0.0) {
       march.kind = kBracketed;

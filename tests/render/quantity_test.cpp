@@ -22,6 +22,10 @@ Vector3 pointOf(const SliceView& view, int x, int y, int width, int height) {
   return view.origin + view.right * ((x + 0.5) / width - 0.5) + view.up * (0.5 - (y + 0.5) / height);
 }
 
+TEST(ColorModes, standInTheOrderOfTheirEnumerators) {
+  for (std::size_t i = 0; i < colorModes().size(); ++i) EXPECT_EQ(std::size_t(colorModes()[i].color), i);
+}
+
 TEST(Quantity, ofASliceIsThatOfItsPoints) {
   const Seen seen;
   const SliceView view = planeSlice(seen.field.domain(), {0.1, 0, 0.05}, {1, 2, 3}, 60, 40);

@@ -17,29 +17,11 @@ namespace {
 
 using render::ColorBy;
 
-/// A colour mode of pictures and its name in commands. `explanation` is a clause of the help text of `color`.
-struct NamedColor {
-  std::string_view name;
-  ColorBy color;
-  std::string_view explanation = {};
-};
-constexpr NamedColor kColors[] = {
-    {"normal", ColorBy::normal},
-    {"degree", ColorBy::degree},
-    {"depth", ColorBy::depth},
-    {"distance", ColorBy::distance},
-    {"value-jump", ColorBy::valueJump, "value-jump and gradient-jump show the greatest jump at a cell's faces"},
-    {"gradient-jump", ColorBy::gradientJump},
-    {"slope", ColorBy::slope, "slope the difference of the gradient's length from 1"},
-    {"error", ColorBy::error, "error the difference from the exact distance"},
-    {"difference", ColorBy::difference, "difference the difference from another field"},
-    {"cell-error", ColorBy::cellError, "cell-error the estimated RMS error of a cell"}};
-
 /// Returns a list of the colour modes that show a quantity, in words such as "slope, error and difference".
 std::string quantityNames() {
   std::vector<std::string_view> names;
-  for (const NamedColor& named : kColors)
-    if (render::isQuantity(named.color)) names.push_back(named.name);
+  for (const render::ColorMode& mode : render::colorModes())
+    if (render::isQuantity(mode.color)) names.push_back(mode.name);
   const std::string_view last = names.back();
   names.pop_back();
   return fmt::format("{} and {}", fmt::join(names, ", "), last);
@@ -148,23 +130,24 @@ std::string viewName(const render::OrbitCamera& camera) {
 
 std::vector<std::string> colorNames(std::optional<ColorBy> without) {
   std::vector<std::string> names;
-  for (const NamedColor& named : kColors)
-    if (named.color != without) names.emplace_back(named.name);
+  for (const render::ColorMode& mode : render::colorModes())
+    if (mode.color != without) names.push_back(mode.name);
   return names;
 }
 
 std::string quantityHelp() {
   std::vector<std::string_view> explanations;
-  for (const NamedColor& named : kColors)
-    if (!named.explanation.empty()) explanations.push_back(named.explanation);
+  for (const render::ColorMode& mode : render::colorModes())
+    if (!mode.explanation.empty()) explanations.push_back(mode.explanation);
   return fmt::format("{}.", fmt::join(explanations, ", "));
 }
 
-std::string_view colorName(ColorBy color) { return std::ranges::find(kColors, color, &NamedColor::color)->name; }
+std::string_view colorName(ColorBy color) { return render::colorModes()[std::size_t(color)].name; }
 
-/// Returns the colour mode of this name. The search always succeeds, because the registry accepts only the names in
-/// kColors.
-ColorBy colorNamed(std::string_view name) { return std::ranges::find(kColors, name, &NamedColor::name)->color; }
+/// Returns the colour mode of this name. The search always succeeds, because the registry accepts only `colorNames`.
+ColorBy colorNamed(std::string_view name) {
+  return std::ranges::find(render::colorModes(), name, &render::ColorMode::name)->color;
+}
 
 render::CellStyle cellStyle(std::string_view name) {
   return name == "lines"   ? render::CellStyle::lines

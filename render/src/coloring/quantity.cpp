@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <span>
 
 #include "hpsdf/error.h"
@@ -17,19 +16,26 @@ namespace {
 /// Evaluates a quantity at all points, in one batch, and writes the values to `out`.
 void measure(const Field& field, ColorBy quantity, const ReferenceData& reference, std::span<const Vector3> points,
              std::span<double> out) {
-  if (quantity == ColorBy::slope) {
-    std::vector<ValueAndGradient> results(points.size());
-    field.valuesAndGradients(points, results);
-    for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(results[i].gradient.norm() - 1);
-    return;
+  const auto differences = [&](const auto& evaluateExpected) {
+    std::vector<double> expected(points.size());
+    field.values(points, out);
+    evaluateExpected(expected);
+    for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - expected[i]);
+  };
+  switch (quantity) {
+    case ColorBy::slope: {
+      std::vector<ValueAndGradient> results(points.size());
+      field.valuesAndGradients(points, results);
+      for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(results[i].gradient.norm() - 1);
+      return;
+    }
+    case ColorBy::error:
+      return differences([&](std::vector<double>& expected) { (*reference.exact)(points, expected); });
+    case ColorBy::difference:
+      return differences([&](std::vector<double>& expected) { reference.other->values(points, expected); });
+    default:
+      throw Error("this quantity is not evaluated at single points");
   }
-  std::vector<double> expected(points.size());
-  field.values(points, out);
-  if (quantity == ColorBy::difference)
-    reference.other->values(points, expected);
-  else
-    (*reference.exact)(points, expected);
-  for (std::size_t i = 0; i < points.size(); ++i) out[i] = std::abs(out[i] - expected[i]);
 }
 
 /// A value of a quantity, and its weight in the choice of a colour scale's limits.
@@ -72,16 +78,34 @@ std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
 
 }  // namespace
 
-std::span<const std::string> titlesOf(ColorBy quantity) {
-  static const std::map<ColorBy, std::vector<std::string>> titles = {
-      {ColorBy::valueJump, {"worst jump of the value", "jump of value", "value jump"}},
-      {ColorBy::gradientJump, {"worst jump of the gradient", "jump of gradient", "gradient jump"}},
-      {ColorBy::slope, {"slope error ||∇f| − 1|", "||∇f| − 1|", "slope error"}},
-      {ColorBy::error, {"error |f − exact|", "error"}},
-      {ColorBy::difference, {"difference |f − other|", "difference"}},
-      {ColorBy::cellError, {"estimated cell error", "cell error"}}};
-  return titles.at(quantity);
+std::span<const ColorMode> colorModes() {
+  static const std::vector<ColorMode> modes = {
+      {ColorBy::normal, "normal"},
+      {ColorBy::degree, "degree"},
+      {ColorBy::depth, "depth"},
+      {ColorBy::distance, "distance"},
+      {ColorBy::valueJump,
+       "value-jump",
+       "value-jump and gradient-jump show the greatest jump at a cell's faces",
+       {"worst jump of the value", "jump of value", "value jump"}},
+      {ColorBy::gradientJump, "gradient-jump", "", {"worst jump of the gradient", "jump of gradient", "gradient jump"}},
+      {ColorBy::slope,
+       "slope",
+       "slope the difference of the gradient's length from 1",
+       {"slope error ||∇f| − 1|", "||∇f| − 1|", "slope error"}},
+      {ColorBy::error, "error", "error the difference from the exact distance", {"error |f − exact|", "error"}},
+      {ColorBy::difference,
+       "difference",
+       "difference the difference from another field",
+       {"difference |f − other|", "difference"}},
+      {ColorBy::cellError,
+       "cell-error",
+       "cell-error the estimated RMS error of a cell",
+       {"estimated cell error", "cell error"}}};
+  return modes;
 }
+
+std::span<const std::string> titlesOf(ColorBy quantity) { return colorModes()[std::size_t(quantity)].titles; }
 
 void requireReferenceData(ColorBy color, const ReferenceData& reference) {
   if ((color == ColorBy::valueJump || color == ColorBy::gradientJump) && reference.jumps == nullptr)

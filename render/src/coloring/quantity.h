@@ -11,8 +11,8 @@
 
 namespace hpsdf::render {
 
-/// The names of a quantity, from the longest to the shortest. The first name that fits is the title of the
-/// colour bar, the last name is for captions.
+/// The titles of a quantity, from the longest to the shortest. The first one that fits stands above the colour bar,
+/// the last one is for captions.
 std::span<const std::string> titlesOf(ColorBy quantity);
 
 /// Throws `Error` if `reference` lacks the data that colouring by `color` needs.

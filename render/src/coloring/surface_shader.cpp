@@ -15,7 +15,7 @@ constexpr Color kPlainBox = {222, 216, 204};
 
 constexpr int kRings = 3, kTapsInRing = 6;
 constexpr double kOcclusionRadius = 0.035;  // radius of the ambient occlusion, as a share of the view's height
-constexpr double kFlatRise = 0.06;  // sine of the angle above the tangent plane up to which neighbours do not occlude
+constexpr double kFlatRise = 0.06;  // sine of the least angle above the tangent plane at which neighbours occlude
 constexpr double kOcclusionStrength = 2.6;
 
 /// The positions and normals at the samples of a view, in the camera's frame: x right, y up, z towards the eye.

@@ -26,7 +26,7 @@ struct BodyRay {
 struct TriangleHit {
   double distance;
   Vector3 barycentric;
-  bool fromBehind;  ///< whether the ray meets the back of the triangle, from which its corners run clockwise
+  bool fromBehind;  ///< whether the ray meets the triangle's back, the side from which the corners run clockwise
 };
 
 /// The intersection of a ray with a triangle (Möller, Trumbore 1997).

@@ -12,7 +12,7 @@ namespace {
 constexpr double kNudge = 1e-6;  // overshoot of a step across a cell's face; also the shortest step
 constexpr double kPastFace =
     4e-7;  // distance behind a face at which a ray leaves a node, as a share of the domain's extent
-constexpr double kConverged = 1e-8;  // the refinement of a root ends when an iteration changes it by less
+constexpr double kConverged = 1e-8;  // the refinement of a root ends when an iteration changes the root by less
 constexpr double kGrain = 0.25;  // step in a blend zone where no bound excludes a root, as a share of the blend extent
 constexpr int kStepLimit = 1 << 16;
 constexpr int kMostRefinements = 24;
@@ -74,7 +74,8 @@ double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3
   return exit;
 }
 
-/// Length of a step over which the height is guaranteed to stay positive, if its slope is at least `steepest`.
+/// Length of a step along the ray over which `height` is guaranteed to stay positive, if its slope along the ray is at
+/// least `steepest`.
 double certainlyAbove(double height, double steepest) {
   if (!(height > 0)) return 0;
   return steepest < 0 ? height / -steepest : std::numeric_limits<double>::infinity();
@@ -245,7 +246,8 @@ class TraceField::March {
   }
 
  private:
-  /// The ray's point at parameter t, its leaf, and bounds along the ray for the height of the leaf's polynomial.
+  /// The point of the ray at parameter t, the leaf that contains it, and bounds for the height of the leaf's polynomial
+  /// along the ray.
   struct LeafPoint {
     CellPoint at;
     Vector3 localDirection;  ///< change of the local coordinates per world unit along the ray
@@ -320,8 +322,9 @@ class TraceField::March {
     return std::nullopt;
   }
 
-  /// Takes a step where the leaf's polynomial alone is the field. With second derivatives up to `curve`, the height
-  /// sags below its chord by at most curve · length² / 8 and is monotone if it falls by more than curve · length² / 2.
+  /// Takes a step where the leaf's polynomial alone is the field. Second derivatives along the ray are at most `curve`.
+  /// Over a step of a given length, the height therefore sags below its chord by at most curve · length² / 8. It is
+  /// monotone if it falls by more than curve · length² / 2.
   std::optional<Hit> stepInLeaf(const LeafPoint& leaf) {
     const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
     const bool falling = leaf.shallowest < 0;  // the height decreases in the whole leaf: it has at most one root

@@ -76,8 +76,8 @@ class TraceField {
   bool inBlendZone(const CellPoint& at) const;
 
   Sample samplePolynomial(std::uint32_t leaf, const Vector3& local) const;
-  /// The blended field by its definition: the weighted mean of the polynomials of all leaves with a weight at the
-  /// point.
+  /// The blended field by its definition: the weighted mean of the polynomials of all leaves whose blending weights at
+  /// the point are above 0.
   Sample sampleBlended(const CellPoint& leaf, const Vector3& local) const;
   /// The blending weight of a leaf at a point, and its gradient in grid coordinates.
   struct Weight {

@@ -14,7 +14,7 @@ namespace {
 using NodeTexel = std::array<std::uint32_t, 4>;
 
 constexpr int kOffsetBits = 27;  // bits of a coefficient's index; the other 5 bits hold a degree up to 30
-constexpr int kLowDegree = 4;    // highest degree that field.glsl evaluates without loops; same value as there
+constexpr int kLowDegree = 4;    // highest degree evaluated without loops; same value as kLowDegree in field.glsl
 
 void checkFits(std::size_t texels, std::size_t largest, const char* what) {
   if (texels > largest)

@@ -6,8 +6,8 @@
 
 namespace hpsdf::render {
 
-/// A field on the device, in buffer textures. A buffer texture may have 2^27 texels on Mesa's llvmpipe, but a storage
-/// buffer only 128 MiB. Floats in RGBA32UI texels are stored as their bits. The textures are:
+/// A field on the device, in buffer textures. Storage buffers would be too small: Mesa's llvmpipe limits them to
+/// 128 MiB, but allows 2^27 texels in a buffer texture. RGBA32UI texels hold floats as their bits. The textures are:
 ///
 /// * nodes, RGBA32UI. In a leaf, x is degree · 2^27 + index of the first coefficient, and y is the valueDeviation. In
 ///   an internal node, x is the index of the first child, and y is the packed range of values (`packOutwards`). In any

@@ -33,8 +33,9 @@ struct Instance {
 };
 
 /// The transform from points relative to the eye to a tile's clip space. Rows run downwards, and nearer points have
-/// greater clip-space depths. In perspective, the clip-space depth is leastDepth / depth. Floats have the same relative
-/// precision for this ratio near and far. For parallel rays, the clip-space depth falls linearly with the distance.
+/// greater clip-space depths. In perspective, the clip-space depth of a point is the least visible depth divided by the
+/// point's depth, because floats represent this ratio near and far with the same relative precision. For parallel rays,
+/// the clip-space depth falls linearly with the distance.
 Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
   const bool parallel = camera.projection == Projection::orthographic;
   const Eigen::RowVector4d right =
@@ -42,7 +43,7 @@ Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width,
   const Eigen::RowVector4d up = (Eigen::RowVector4d() << camera.up.transpose() / camera.up.squaredNorm(), 0).finished();
   const Eigen::RowVector4d depth = (Eigen::RowVector4d() << camera.forward.transpose(), 0).finished();
   const Eigen::RowVector4d one = Eigen::RowVector4d::Unit(3);
-  constexpr double kMargin = 1.001;  // gives the farthest point a depth above 0
+  constexpr double kMargin = 1.001;  // gives the farthest point a clip-space depth above 0
   Eigen::Matrix4d result;
   result.row(3) = parallel ? one : depth;
   result.row(2) = parallel ? Eigen::RowVector4d(one - depth / (kMargin * farthest))

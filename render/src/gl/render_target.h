@@ -41,7 +41,7 @@ void forEachPixel(const Tile& tile, const F& f) {
   });
 }
 
-/// A render target for the tiles of a part of a view. Each pixel has integers, and either four floats or a depth.
+/// A render target that holds one tile of a view at a time. Each pixel has integers, and either four floats or a depth.
 class RenderTarget {
  public:
   /// `integers` is the OpenGL format of the integers, `other` is the format of the floats or depths. Throws `Error` if

@@ -78,7 +78,8 @@ struct DistanceScale {
 };
 
 /// Chooses the scale for distances in [minimum, maximum]. The range of the colours is the greatest magnitude of the
-/// distances, rounded up to one or two digits. The step between about twelve iso-lines is {1, 2, 5} · 10^n.
+/// distances, rounded up to one or two digits. There are about twelve iso-lines. Their step is 1, 2 or 5 times a
+/// power of ten.
 DistanceScale distanceScale(double minimum, double maximum);
 
 }  // namespace hpsdf::render

@@ -17,7 +17,7 @@ namespace {
 constexpr Color kMarkCasing = {24, 22, 34};
 constexpr float kMarkCasingStrength = 0.7F;
 constexpr float kHiddenMark =
-    0.7F;  // opacity of hidden marks, which are dashed rather than faint, so that hues stay distinct
+    0.7F;  // opacity of hidden marks; dashes show that they are hidden, so that they can keep strong hues
 // The following lengths of a mark's parts are in multiples of the width of a thin line.
 constexpr double kDash = 4;  // length of a dash, and of the gap after it
 constexpr double kLineWidth = 1.8;
@@ -25,8 +25,8 @@ constexpr double kDotRadius = 2.6;
 constexpr double kMarkCasingBorder = 0.9;
 constexpr double kSmallGroup = 16;     // a group of defects up to this size gets a ring
 constexpr double kLeastRing = 9;       // radius of the smallest ring
-constexpr double kHiddenBeyond = 4;    // a surface hides a mark if it is nearer by more than this many pixel sizes
-constexpr double kNearestMark = 1e-3;  // least depth of an edge's drawn part, as a share of its farther end's depth
+constexpr double kHiddenBeyond = 4;    // a surface that is nearer by more than this many pixel sizes hides a mark
+constexpr double kNearestMark = 1e-3;  // least depth of an edge's drawn part, as a share of the farther end's depth
 constexpr int kGroupCell = 8;          // size of a grid cell in pixels; marks in neighbouring cells form one group
 
 /// The names and the colour of a kind of defects, as a row of the legend without a number.
@@ -47,7 +47,7 @@ std::string countOf(const MeshDefects& defects, DefectKind kind) {
 
 bool isEdge(DefectKind kind) { return kind != DefectKind::pinchedVertex && kind != DefectKind::crossing; }
 
-/// A line, a dot or a ring in the picture. The two ends of a dot or of a ring are both its centre.
+/// A line, a dot or a ring in the picture. Both ends of a dot or a ring are at its centre.
 struct Stroke {
   PicturePoint from, to;
   double radius = 0;     ///< radius of a ring, pixels; 0 for lines and dots

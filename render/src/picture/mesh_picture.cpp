@@ -56,7 +56,7 @@ class Normalization {
   double unit_ = 1;
 };
 
-/// Sets the distance of the camera from its target to the least at which the view shows all points.
+/// Sets the distance of the camera from its target to the least distance at which the view shows all points.
 OrbitCamera nearestForWhole(const std::vector<Vector3>& points, OrbitCamera orbit, const Box& domain, int width,
                             int height) {
   OrbitCamera inSpace = orbit;

@@ -22,7 +22,7 @@ constexpr double kCreaseDegrees = 40;
 constexpr std::size_t kMostTriangles = std::size_t{1} << 26;
 constexpr std::size_t kMostBodies = std::size_t{1} << 24;
 constexpr double kGreatest = 1e15;        // greatest coordinate, so that squares of triangle areas stay finite
-constexpr double kRigidTolerance = 1e-6;  // greatest entry of RᵀR − identity for a rotation R
+constexpr double kRigidTolerance = 1e-6;  // a matrix R counts as rigid if no entry of RᵀR − identity is greater
 
 bool isInRange(const Vector3& point) { return point.allFinite() && point.cwiseAbs().maxCoeff() <= kGreatest; }
 

@@ -27,8 +27,8 @@ class BodyMesh {
   const std::vector<Triangle>& triangles() const { return mesh_.triangles; }
   const Box& box() const { return box_; }
 
-  /// The unit normal for shading at a point of a triangle, given by barycentric coordinates. It points to the
-  /// side from which the corners run counter-clockwise.
+  /// The unit normal for shading, at the point of a triangle with the given barycentric coordinates. The normal points
+  /// to the side from which the corners run counter-clockwise.
   Vector3 normal(std::uint32_t triangle, const Vector3& barycentric) const;
 
  private:

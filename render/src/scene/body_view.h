@@ -24,7 +24,7 @@ struct BodyPoint {
   std::uint32_t body, triangle;
   double distance;  ///< distance along the pixel's ray from its start, world units
   Vector3 barycentric;
-  bool fromBehind;  ///< whether the ray meets the back of the triangle, from which its corners run clockwise
+  bool fromBehind;  ///< whether the ray meets the triangle's back, the side from which the corners run clockwise
 };
 void showBody(const BodyMeshes& meshes, std::span<const Body> bodies, const BodyPoint& point, std::size_t pixel,
               BodyBuffers& buffers);

@@ -14,8 +14,8 @@
 namespace hpsdf::render {
 
 /// The pixels of a view whose centres may lie in the convex hull of the points. Returns no pixels if all points have
-/// depths below `leastDepth`. Returns the whole view if only some of the points have, because the hull then extends
-/// behind the eye.
+/// depths below `leastDepth`. Returns the whole view if only some of the points have such depths, because the hull
+/// then extends behind the eye.
 inline PixelRect pixelsAround(std::span<const PicturePoint> points, double leastDepth, int width, int height) {
   constexpr double kMargin = 1e-6;  // margin for rounding errors, pixels
   Eigen::AlignedBox2d hull;
@@ -35,9 +35,9 @@ inline PixelRect pixelsAround(std::span<const PicturePoint> points, double least
           clamped(std::floor(hull.max().y() + 0.5 + kMargin), height)};
 }
 
-/// Draws objects in parallel, given the rectangle of each object. Calls fill(y0, y1, indices) for strips of 16
-/// rows, where `indices` are the ascending indices of the rectangles that meet the strip. The result does not
-/// depend on the number of threads if `fill` changes only the rows of its strip.
+/// Draws objects in parallel, in strips of 16 pixel rows. Calls fill(y0, y1, indices) for the strip of rows y0 to
+/// y1 − 1, where `indices` are the ascending indices of the objects whose rectangles in `rects` meet the strip. The
+/// result does not depend on the number of threads if `fill` changes only the rows of its strip.
 template <typename Fill>
 void forEachStrip(int height, const std::vector<PixelRect>& rects, const Fill& fill) {
   constexpr int kRows = 16;

@@ -13,7 +13,7 @@ namespace {
 struct ScenePlane {
   Vector3 point;
   Vector3 normal;                          ///< unit vector
-  Vector3 lookupOffset = Vector3::Zero();  ///< offset from the plane at which cells and values are looked up
+  Vector3 lookupOffset = Vector3::Zero();  ///< added to points of the plane before cells and values are looked up
 };
 
 /// The intersection of a pixel's ray with a plane.
@@ -83,7 +83,8 @@ void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffer
   ScenePlane plane{offset * Vector3::Unit(axis), Vector3::Unit(axis)};
   const double nudge = kClipNudge * field.domain().sizes()[axis];
   plane.lookupOffset[axis] = eyeAbove(view.camera, *view.clip) ? -nudge : nudge;
-  // Show the section in all pixels that see it. All other hits are behind it, as rays start behind the clipping plane.
+  // Show the section in all pixels that see it. Rays start behind the clipping plane, so that the section lies in front
+  // of all hits of the surface.
   addScenePlane(
       field, view.camera, plane, Shown::section, [](const PlaneHit&) { return true; },
       [&](double value) { return value < view.offset; }, buffers);

@@ -7,8 +7,8 @@
 namespace hpsdf::render {
 
 /// Shows the section of the solid (where f is below the offset) with the view's clipping plane, in front of everything
-/// else. Its pixels get the section's cells and values, and the plane's normal towards the eye. Does nothing without a
-/// clipping plane.
+/// else. The pixels of the section get its cells and values, and the plane's normal towards the eye. Does nothing
+/// without a clipping plane.
 void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers);
 
 /// Shows the section of the domain with the plane of the slice `plane`, in pixels where this section is nearer to the

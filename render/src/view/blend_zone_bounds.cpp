@@ -10,7 +10,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// A node and its box. Lengths are in units of the smallest possible cell, from the domain's lower corner.
+/// A node and its box. The origin is the domain's lower corner, the unit is the edge of the smallest possible cell.
 struct NodeBox {
   std::uint32_t node;
   int depth;
@@ -65,7 +65,8 @@ void visitTouching(const FieldData& field, const NodeBox& leaf, const Visit& vis
   });
 }
 
-/// A polynomial on a box. With n = degree + 1, the coefficient of L_i L_j L_k has the index (i · n + j) · n + k.
+/// A polynomial on a box. The coefficient of the Legendre product L_i(x) L_j(y) L_k(z) has the index
+/// (i · n + j) · n + k, where n = degree + 1.
 class Polynomial {
  public:
   template <typename T>

@@ -24,8 +24,8 @@ struct SurfaceBlocks {
   std::vector<Block> blocks;
 };
 
-/// Finds the blocks of pixels whose rays may hit the surface. Projects those nodes to the view in which the sign of
-/// f − offset may differ from `SurfaceBlocks::side`, and descends to nodes that cover about one block.
+/// Finds the blocks of pixels whose rays may hit the surface. Descends through the nodes in which the sign of
+/// f − offset may differ from `SurfaceBlocks::side`, down to nodes that cover about one block of the view.
 SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<SurfaceBounds>& bounds, const GridSpace& space,
                             const RayGeometry& rays, double offset);
 

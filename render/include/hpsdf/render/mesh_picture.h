@@ -14,13 +14,13 @@
 namespace hpsdf::render {
 
 struct MeshPicture {
-  /// The camera, which orbits the centre of the mesh by default. Its distance is in diagonals of a cube around the
-  /// mesh.
+  /// The camera, which orbits the centre of the mesh by default. `camera.distance` is in diagonals of a cube around
+  /// the mesh.
   OrbitCamera camera;
   int width = 1280;
   int height = 720;
   int samples = 1;     ///< samples per pixel along each axis, 1 to 8
-  bool whole = false;  ///< replaces the camera's distance by the least at which the whole mesh is visible
+  bool whole = false;  ///< replaces the camera's distance by the least distance that shows the whole mesh
 };
 
 /// A function that makes a renderer for bodies with the given meshes, for example `makeCpuBodyRenderer`.

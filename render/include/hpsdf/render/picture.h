@@ -34,7 +34,7 @@ using View = std::variant<SliceView, SurfaceView>;
 struct Drawn {
   Image image;
   View view;
-  ViewBuffers buffers;  ///< hold samples × samples entries for each pixel of the view
+  ViewBuffers buffers;  ///< the rendered data, samples × samples entries per pixel of the view
   int samples = 1;
   bool seen = false;  ///< true if any pixel shows the field
   Legend legend = {};
@@ -50,8 +50,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
 
 /// The point and the cell of the field that a pixel shows at its middle sample.
 struct Pick {
-  /// The position in world units. If rounding has moved the position across a face of its cell, it is moved
-  /// back into the cell, by at most 1e-5 of the domain's extent along each axis.
+  /// The position in world units. A position that rounding has moved across a face of its cell is moved back into the
+  /// cell, by at most 1e-5 of the domain's extent along each axis.
   Vector3 position;
   std::uint32_t cell;  ///< `Cell::id`
   int degree, depth;
@@ -84,7 +84,7 @@ ViewSize viewSize(const SurfacePicture& picture);
 /// Returns the view of the plane that `draw` renders. At the size that `viewSize` returns, the view has square pixels.
 SliceView sliceView(const Field& field, const SlicePicture& picture);
 
-/// Returns a view of the picture's plane, framed for `width` × `height` square pixels, for files of raw field values.
+/// Returns a view of the picture's plane, framed for `width` × `height` square pixels, for an export of field values.
 SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height);
 
 }  // namespace hpsdf::render

@@ -26,8 +26,8 @@ enum class ColorBy : std::uint8_t {
   degree,    ///< polynomial degree of the cell
   depth,     ///< octree depth of the cell
   distance,  ///< value of the field f; not for surfaces
-  // The following enumerators are quantities: numbers that are never negative, shown on a colour scale from
-  // dark to light.
+  // The following enumerators are quantities: numbers that are never negative. A colour scale from dark to light shows
+  // them.
   valueJump,     ///< greatest jump of f at the cell's faces; needs `ReferenceData::jumps`
   gradientJump,  ///< greatest jump of ∇f at the cell's faces; needs `ReferenceData::jumps`
   slope,         ///< error of the slope, ||∇f| − 1|, at the point
@@ -37,13 +37,24 @@ enum class ColorBy : std::uint8_t {
 };
 constexpr bool isQuantity(ColorBy color) { return color >= ColorBy::valueJump; }
 
+/// The texts of a colour mode.
+struct ColorMode {
+  ColorBy color;
+  std::string name;                      ///< the mode's name in commands, such as "value-jump"
+  std::string explanation = {};          ///< words for the mode in help texts that list the quantities
+  std::vector<std::string> titles = {};  ///< titles of a quantity's colour bar, from the longest to the shortest
+};
+
+/// Returns all colour modes, in the order of `ColorBy`.
+std::span<const ColorMode> colorModes();
+
 /// The data, besides the field, from which some quantities are computed. The objects must exist while a picture is
 /// drawn.
 struct ReferenceData {
   const Jumps* jumps = nullptr;
   const DistanceFunction* exact = nullptr;  ///< the exact signed distance
   const Field* other = nullptr;             ///< the field to compare with, which is continued outside of its domain
-  /// The defects of the mesh, in the field's units. They are marked on the field's surface as in a picture of the mesh.
+  /// The defects of the mesh, in the field's units. Pictures of the field's surface mark these defects.
   const MeshDefects* defects = nullptr;
 };
 
@@ -99,22 +110,22 @@ struct Caption {
 
 struct SurfacePicture {
   OrbitCamera camera;
-  double offset = 0;  ///< the surface drawn is f = offset; world units
+  double offset = 0;  ///< the picture shows the surface f = offset; world units
   ColorBy color = ColorBy::normal;
   int width = 1280;
   int height = 720;
   int samples = 1;  ///< samples per pixel along each axis, 1 to 8
   ScaleOptions scale = {};
-  std::optional<ClipPlane> clip = {};  ///< cuts the solid open; the cut shows the outlines of its cells
-  bool cracks = false;                 ///< marks jumps of f across the offset at cell faces (`ViewBuffers::crack`)
+  std::optional<ClipPlane> clip = {};  ///< cuts the solid open; the section shows the outlines of cells
+  bool cracks = false;                 ///< marks the cracks of the surface (`ViewBuffers::crack`)
   bool bare = false;                   ///< draws the view alone, without legend and caption
   bool surface = true;                 ///< draws the surface, and the cut by the clipping plane
   std::optional<Plane> plane = {};     ///< draws the section of the domain with this plane
   ShownCells cells = {};
   int arrows = 0;  ///< spacing of gradient arrows in pixels, 4 to 1000; 0 draws none
   ShownBodies bodies = {};
-  /// Replaces the caption about the field, for pictures in which the field is only a part. With `ColorBy::normal`, the
-  /// panel of facts about the field is omitted too, and the view becomes wider.
+  /// Replaces the caption about the field. With `ColorBy::normal`, the panel of facts about the field is omitted too,
+  /// and the view becomes wider.
   std::optional<Caption> caption = {};
 };
 

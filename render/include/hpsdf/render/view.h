@@ -61,10 +61,10 @@ struct Camera {
   Projection projection = Projection::perspective;
 };
 
-/// Converts an orbiting camera to a `Camera`, which defines the rays. An orthographic view is as high as a perspective
-/// view is at the target. Orthographic rays start just in front of the domain, whatever the distance of the camera, so
-/// that no ray starts within the domain and lengths along the rays stay precise. Throws `Error` if numbers are out of
-/// range.
+/// Converts an orbiting camera to a `Camera`, which defines the rays. An orthographic view has the height that a
+/// perspective view has at the depth of the target. Orthographic rays start just in front of the domain, whatever the
+/// distance of the camera. Lengths along the rays then stay precise, and no ray starts within the domain. Throws
+/// `Error` if numbers are out of range.
 Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int height);
 
 /// The start of the ray of pixel (x, y) of a view of width × height pixels, world units.
@@ -77,7 +77,7 @@ Vector3 pixelRay(const Camera& camera, int x, int y, int width, int height);
 struct PicturePoint {
   double x, y;      ///< pixels from the view's upper left corner: the middle of pixel (0, 0) is at (½, ½)
   double depth;     ///< distance from the eye along `forward`; in perspective, x and y are undefined if depth <= 0
-  double distance;  ///< distance of the point from the start of the ray through it, world units
+  double distance;  ///< length of the ray from its start to the point, world units
 };
 
 /// Projects a point to the picture of a camera. This is the inverse of `pixelEye` and `pixelRay`. The
@@ -90,7 +90,7 @@ double pixelSize(const Camera& camera, double depth, int height);
 
 /// The clipping plane {x_axis = offset}. It removes everything on the eye's side of the plane from the
 /// picture. The eye of an orthographic view counts as infinitely far away. If the rays of an orthographic
-/// view run along the plane, the side on which `Camera::eye` lies is removed.
+/// view are parallel to the plane, the side on which `Camera::eye` lies is removed.
 struct ClipPlane {
   int axis = 2;
   double offset = 0;  ///< world units
