@@ -60,8 +60,8 @@ void nextLegendre(inout float value, inout float previous, float x, float i) {
   value = next;
 }
 
-// Polynomials up to this degree are evaluated without loops and load four coefficients at once, because loops and
-// single loads are slow on llvmpipe. Their terms up to degree 3 are stored first, then the terms of degree 4.
+// Polynomials up to this degree are evaluated without loops and with loads of four coefficients, because loops and
+// single loads are slow on llvmpipe. The terms up to degree 3 are stored first, then the terms of degree 4.
 const int kLowDegree = 4;
 
 struct LowDegree {

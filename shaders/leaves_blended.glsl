@@ -6,10 +6,10 @@ layout(location = 18) uniform float blend;         // width of the blend zones a
 
 const bool kBlended = true;
 
-const int kWall = 31;     // stands for the depth of a neighbour where the leaf lies at the domain's boundary
+const int kWall = 31;     // in place of a neighbour's depth, for a leaf's face on the domain's boundary
 const int kDeepest = 20;  // greatest depth of a leaf
 
-// Returns true if a point of a leaf, in local coordinates, lies near a face, where several leaves are blended.
+// Returns true if the point `local` lies so near to a face of its leaf that several leaves are blended there.
 bool isInBlendZone(vec3 local) { return any(greaterThan(abs(local), vec3(1.0 - 2.0 * blend))); }
 
 // Finds the cells of depth `level` that are at most `near` (up to 0.5) times their edge length away from a point. The
@@ -50,8 +50,8 @@ vec3 rampPosition(uint extents, int depth, vec3 local) {
   return mix(t, vec3(1.0), equal(neighbour, ivec3(kWall)));
 }
 
-// The derivatives, with respect to the leaf's local coordinates, of the three factors of its blending weight. `t` are
-// the positions that rampPosition returns.
+// Returns the derivatives of the three factors of a leaf's blending weight, with respect to the leaf's local
+// coordinates. `t` is the result of rampPosition.
 vec3 rampSlopes(uint extents, int depth, vec3 local, vec3 t) {
   return -sign(local) * 0.75 * (1.0 - t * t) * ldexp(vec3(0.5), smallestNeighbour(extents, local) - depth) / blend;
 }
@@ -76,10 +76,10 @@ int candidateNumber(ivec3 offset) { return offset.x + 2 * offset.y + 4 * offset.
 // contains the point, and a value (w).
 struct LeafSum {
   vec4 first, sum, weights;
-  float lowest, highest;  // range of the values of all polynomials whose weights reach the point with `margin`
+  float lowest, highest;  // value range of the polynomials whose weights, widened by `margin`, reach the point
 };
 
-// Adds the polynomial of a leaf, with cell index other.xyz and depth other.w, to the weighted sum.
+// Adds the polynomial of `leaf` to the weighted sum. The leaf has the cell index other.xyz and the depth other.w.
 void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int depth, vec3 local, float margin,
              bool withGradient) {
   bool own = other.w == depth && other.xyz == cellIndex;
@@ -108,9 +108,9 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   total.sum += vec4(weight.xyz * difference.w + weight.w * difference.xyz, weight.w * difference.w);
 }
 
-// Finds the node at the candidate cell `cell` on the first level of the search: the cell itself, or a larger leaf that
-// contains it, `up` levels above. Returns false if this larger leaf also contains an earlier candidate cell, because
-// each leaf must count only once.
+// Finds the node for the candidate cell `cell` on the first level of the search. The node is the cell itself, or a
+// larger leaf, `up` levels above, that contains the cell. Returns false if this larger leaf also contains an earlier
+// candidate cell, because each leaf must count only once.
 bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int up) {
   up = level;
   node = fetchNode(baseCellIndex(uvec3(cell >> level)));
@@ -121,8 +121,8 @@ bool firstLevelNode(ivec3 cell, ivec3 offset, int level, out Node node, out int 
   return !any(greaterThan(min(offset, cell - (cell >> up << up)), ivec3(0)));
 }
 
-// Finds the node at the candidate cell `cell` on a lower level. `parents` holds the indices of the first children of
-// the candidate nodes one level above. Returns false if there is no such node.
+// Finds the node for the candidate cell `cell` below the first level of the search. `parents` holds, for each internal
+// candidate node one level above, the index of its first child. Returns false if the cell's parent is none of them.
 bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell, out Node node) {
   ivec3 parent = (cell >> 1) - parentFirst;
   if (any(lessThan(parent, ivec3(0))) || any(greaterThan(parent, parentMore))) return false;

@@ -15,9 +15,9 @@ layout(location = 15) uniform dvec3 shownLo;   // lower corner of the domain's v
 layout(location = 16) uniform dvec3 shownHi;
 layout(location = 17) uniform bool parallel;  // whether the rays are parallel (orthographic camera)
 
-// The state of each pixel after a march pass. The integers are the kind (kMiss to kBracketed), the bits of the floats
-// March::t and March::side, and the last leaf. If the march has found a bracket [a, b] of the root, the floats are a, b
-// and a first guess of the root. If the march has not ended, the floats are the last height and the longest next step.
+// The state of each pixel after a march pass. The integers are March::kind, the bits of the floats March::t and
+// March::side, and March::lastLeaf. For the kind kBracketed, the floats are a, b and a first guess of the root, which
+// lies between a and b. For the kind kUnderWay, the floats are March::lastHeight and March::longestStep.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 

@@ -1,9 +1,9 @@
-// Draws a block of 8 x 8 pixels whose rays may hit the surface, as one point.
+// Draws one point for each block of 8 x 8 pixels whose rays may hit the surface.
 
 layout(location = 1) uniform ivec2 firstPixel;
 layout(location = 13) uniform ivec2 viewport;
 
-layout(location = 0) in vec3 block;  // x, y of the block's upper left pixel; distance at which its rays start
+layout(location = 0) in vec3 block;  // x, y: upper left pixel of the block; z: distance at which its rays start
 
 flat out float start;
 

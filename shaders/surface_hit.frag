@@ -1,5 +1,5 @@
-// Second pass for a surface: refines the first root of f - offset along each ray within the bracket that the march has
-// found. Positions along the ray are in double precision. A pixel whose march has not ended counts as a miss.
+// Second pass for a surface: refines the first root of f - offset along each ray. The march pass has found a bracket of
+// the root. Positions along the ray are in double precision. A pixel whose march has not ended counts as a miss.
 
 layout(location = 11) uniform int mostRefinements;
 
@@ -10,7 +10,7 @@ layout(location = 1) out vec4 normal;
 const float kTurned = 1e-4;     // greatest turn of the gradient in the last Newton step, roughly in radians
 const float kInfinity = 1e30;
 const float kConverged = 1e-8;  // refinement ends when the root changes by less, in domain diagonals; as in trace.cpp
-const float kCrack = 4e-6;      // least jump that counts as a crack at slope 1, in domain diagonals; as in trace.h
+const float kCrack = 4e-6;      // a greater jump at slopes up to 1 is a crack; in domain diagonals; as in trace.h
 
 vec3 localAt(CellPoint cell, Ray ray, double t) {
   dvec3 inBase = ray.origin - dvec3(cell.base) + t * ray.direction;
@@ -46,7 +46,8 @@ Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool brac
     change = -height / slope;
     bool newton = added + change >= a && added + change <= b;
     if (!newton) change = 0.5 * (a + b) - added;
-    // `turned` bounds the gradient's turn in the step. A Newton step ends at most turned * |change| / 2 from the root.
+    // `turned` bounds the relative change of the slope in the step. A Newton step ends at most turned * |change| / 2
+    // away from the root.
     float turned = newton ? abs(curve / slope * change) : kInfinity;
     bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
     if (close || abs(change) <= kConverged * diagonal) break;

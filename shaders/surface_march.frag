@@ -11,7 +11,7 @@ layout(location = 12) uniform bool resume;       // whether to continue only the
 layout(location = 19) uniform int blendedSteps;  // number of steps that one evaluation in a blend zone counts as
 layout(location = 14) uniform float startSide;   // sign of f - offset at the start of every ray
 
-layout(binding = 4) uniform samplerBuffer linearParts;  // linear part of a leaf: slopes in x, y, z, value in the middle
+layout(binding = 4) uniform samplerBuffer linearParts;  // a leaf's linear part: slopes in x, y, z; value at the centre
 
 flat in float start;  // distance along the ray at which the march starts (Block::start)
 
@@ -20,8 +20,8 @@ layout(location = 1) out vec4 floats;
 
 // These constants have the same values as in trace.cpp.
 const float kNudge = 1e-6;     // overshoot of a step across a cell's face, and shortest step; in domain diagonals
-const float kPastFace = 4e-7;  // distance behind a face at which a ray leaves a node, as a share of the domain's extent
-const float kGrain = 0.25;     // step in a blend zone where no bound excludes a root, as a share of the blend extent
+const float kPastFace = 4e-7;  // lengthToExit ends this far behind a face, as a share of the domain's extent
+const float kGrain = 0.25;     // least length of a step in a blend zone, as a share of the blend extent
 
 const float kInfinity = 1e30;
 
@@ -67,8 +67,8 @@ float lengthToExit(CellPoint at, MarchRay ray, float margin) {
   return min(exits.x, min(exits.y, exits.z));
 }
 
-// Length of a step along the ray over which `height` is guaranteed to stay positive, if its slope along the ray is at
-// least `steepest`.
+// Returns the length of a step along the ray over which `height` is certain to stay positive. `steepest` is a lower
+// bound of the height's slope along the ray.
 float certainlyAbove(float height, float steepest) {
   return height > 0.0 ? (steepest < 0.0 ? height / -steepest : kInfinity) : 0.0;
 }
@@ -198,7 +198,7 @@ void advance(MarchRay ray, LeafPoint leaf, float stepLength, float ahead, float 
   }
 }
 
-// Takes a step by the polynomial of one leaf. Returns true if the blended field has to be evaluated instead.
+// Takes a step along the ray by one leaf's polynomial. Returns true if the blended field has to be evaluated instead.
 bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   float curve = leaf.at.node.secondDerivative * dot(leaf.localDirection, leaf.localDirection);
   float steepest = leaf.slope - leaf.slopeDeviation;
@@ -234,8 +234,8 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
   return false;
 }
 
-// Marches by the polynomials of single leaves. Returns true if the ray reaches a point at which the blended field has
-// to be evaluated, and sets `leaf` to the leaf there.
+// Marches along the ray, using the polynomials of single leaves. Returns true if the ray reaches a point at which the
+// blended field has to be evaluated. Then `leaf` is the leaf at this point.
 bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
   bool blended = false;
   while (!blended && march.kind == kUnderWay && march.steps < mostSteps) {
@@ -251,8 +251,8 @@ bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
   return blended;
 }
 
-// Takes a step by the blended field: as far as the height is guaranteed to stay positive, but at least a small part of
-// the blend zone. The first evaluation in a leaf is at t itself, without a step.
+// Takes a step along the ray, using the blended field. The step goes as far as the height is guaranteed to stay
+// positive, but at least a small part of the blend zone. In a new leaf, the field is first evaluated at t itself.
 void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
   march.steps += blendedSteps;
   float stepLength = leaf.at.node.index == march.zoneLeaf ? min(leaf.toLeave, march.zoneStep) : 0.0;
@@ -271,8 +271,8 @@ void stepInBlendZone(MarchRay ray, LeafPoint leaf, inout March march) {
     march.t += stepLength == leaf.toLeave ? stepLength + ray.nudge : stepLength;
     if (!(march.t <= ray.length)) march.kind = kMiss;
   }
-  // Choose the next step so short that all polynomials that may be blended along the step stay above zero. The step is
-  // at least kGrain blend extents long.
+  // Choose the length of the next step: so short that the heights of all polynomials that may be blended stay positive,
+  // but at least kGrain blend extents.
   float lowest = march.side > 0.0 ? ahead.lowest - offset : offset - ahead.highest;
   float extent = leaf.zone.extent / length(leaf.localDirection);
   march.zoneStep = max(kGrain * extent, min(extent, certainlyAbove(lowest, leaf.steepestOfAll))) + ray.nudge;

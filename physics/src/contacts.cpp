@@ -103,7 +103,7 @@ class Search {
   std::array<ValueAndGradient, kBatch> results_;
 };
 
-/// Sorts the contacts from index `first` on by depth, and keeps only the deepest `count` of them.
+/// Sorts the contacts with indices of at least `first` by depth, and keeps only the deepest `count` of them.
 void keepDeepest(std::size_t count, std::size_t first, std::vector<Contact>& contacts) {
   const auto begin = contacts.begin() + static_cast<std::ptrdiff_t>(first);
   const auto end = begin + static_cast<std::ptrdiff_t>(std::min(count, contacts.size() - first));

@@ -192,10 +192,10 @@ std::vector<double> leastAround(std::vector<double> values, const std::array<std
   return values;
 }
 
-/// Returns an upper bound of path length divided by straight distance, for the shortest path of steps between
-/// neighbouring cells. For each order a, b, c of the axes, a path takes steps along axis a, along both a and b, and
-/// along all three axes. The path's length is a linear function of its end point, and the gradient of this function
-/// bounds the ratio.
+/// Returns an upper bound of (length of a path) / (distance between its ends) for the shortest paths of steps between
+/// neighbouring cells. For each order a, b, c of the axes, a path takes steps along axis a, diagonal steps along a and
+/// b, and diagonal steps along all three axes. The path's length is a linear function of its end point. The norm of
+/// this function's gradient bounds the ratio.
 double worstDetour(const Vector3& cell) {
   double worst = 1;
   std::array<int, 3> order = {0, 1, 2};
@@ -310,12 +310,12 @@ double FieldCollider::lowerBound(const Vector3& x) const {
   return std::max(bound > 0 ? bound + beyond : 0, wall_ + beyond);
 }
 
-// Returns the greater of two bounds if x is outside the domain. A number b is a bound at x if the field is at least
-// b − |x − y| at every point y with |x − y| < b. Let q be the point of the domain closest to x. The first bound is
-// `around` at q. It holds because the points of the domain closest to x and to y are at most |x − y| apart. The second
-// bound is `wall_` + |x − q|. For y outside the domain, it holds because y is at most |x − y| nearer to the domain than
-// x. For y inside, the path from x to y crosses a side of the domain, where a `wall_` of 0 or more is a bound. If
-// `wall_` is negative, the second bound is below |x − q|, and no y inside has |x − y| < b.
+// Returns the bound of the cell that contains x, or the greater of two bounds if x is outside the domain. A number b is
+// a bound at x if the field is at least b − |x − y| at every point y with |x − y| < b. Let q be the point of the domain
+// closest to x. The first bound is `around` at q. It holds because the points of the domain closest to x and to y are
+// at most |x − y| apart. The second bound is `wall_` + |x − q|. For y outside the domain, it holds because y is at most
+// |x − y| nearer to the domain than x. For y inside, the path from x to y crosses a side of the domain, where a `wall_`
+// of 0 or more is a bound. If `wall_` is negative, the second bound is below |x − q|, and no y inside has |x − y| < b.
 double FieldCollider::lowerBoundAround(const Vector3& x) const {
   const Box& domain = field_->domain();
   const Vector3 closest = x.cwiseMax(domain.min()).cwiseMin(domain.max());

@@ -24,6 +24,7 @@ Vector3 pointOf(const SliceView& view, int x, int y, int width, int height) {
 
 TEST(ColorModes, standInTheOrderOfTheirEnumerators) {
   for (std::size_t i = 0; i < colorModes().size(); ++i) EXPECT_EQ(std::size_t(colorModes()[i].color), i);
+  EXPECT_EQ(colorModes().size(), std::size_t(ColorBy::cellError) + 1) << "one for each enumerator; name the last here";
 }
 
 TEST(Quantity, ofASliceIsThatOfItsPoints) {

@@ -111,9 +111,9 @@ Error cannotWrite(const fs::path& file) {
                fmt::format("cannot be written ({}); check the folder's permissions", std::strerror(errno)));
 }
 
-/// Divides numbered tasks among processes that share a lock file. A process claims a task by locking one byte of the
-/// file (fcntl record lock). The task's number determines the byte's offset. The file is empty, because a locked byte
-/// need not exist. When a process ends, for any reason, the system releases its locks. The lock file must never be
+/// Divides numbered tasks among processes by locks on single bytes of a shared file. A process claims a task by a lock
+/// (fcntl record lock) on the byte whose offset follows from the task's number. The file stays empty, because a locked
+/// byte need not exist. When a process ends, for any reason, the system releases its locks. The lock file must never be
 /// removed: a process that opened a new file of the same name would not see the locks on the old file.
 class FileLocks {
  public:
@@ -262,8 +262,8 @@ class Batch {
     }
   }
 
-  /// Returns the existing field of the mesh if the record stored beside it shows that a new construction would give the
-  /// same field. Returns std::nullopt otherwise.
+  /// Returns the mesh's existing field if it is up to date, that is, if the record stored beside it matches the present
+  /// program, mesh and options. Returns std::nullopt otherwise.
   std::optional<CurrentField> finished(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh), record = recordOf(mesh);
     if (!fs::exists(output) || !fs::exists(record)) return std::nullopt;
@@ -277,8 +277,8 @@ class Batch {
     }
   }
 
-  /// Removes the half-written files that a killed process left for this mesh. A killed process also leaves the mesh's
-  /// mark file: without the mark file, the folder need not be searched. The caller must hold the mesh's lock.
+  /// Removes the half-written files that a killed process left for this mesh. Searches the folder only if the mesh's
+  /// mark file exists, because a killed process leaves the mark file too. The caller must hold the mesh's lock.
   void removeAbandoned(const BatchMesh& mesh) const {
     if (!fs::exists(markOf(mesh))) return;
     const fs::path output = outputOf(mesh);
@@ -299,9 +299,9 @@ class Batch {
     try {
       write(mesh, field, content);
     } catch (const Error&) {
-      // If the file system lost the locks, another process may have removed the unfinished files of this process,
-      // because it presumed this process dead. If the other process has finished the field, use that field. Otherwise
-      // write the field again: the files are not removed a second time.
+      // If the file system lost the locks, another process may have taken this process for dead and removed its
+      // unfinished files. If the other process has finished the field, use that field. Otherwise write the field once
+      // more: the files are not removed a second time.
       if (std::optional<CurrentField> other = finished(mesh)) return {Status::elsewhere, std::move(other)};
       write(mesh, field, content);
     }

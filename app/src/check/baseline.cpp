@@ -11,8 +11,8 @@
 namespace hpsdf::app {
 namespace {
 
-/// Reads the size of a baseline (an accepted picture or table) from JSON, an array of two whole numbers. The types are
-/// checked because nlohmann's JSON would silently convert other numbers.
+/// Reads the size of a baseline (an accepted picture or table) from `json`, which must be an array of two whole
+/// numbers. The types are checked because nlohmann's JSON would silently convert other numbers.
 std::array<std::size_t, 2> sizeOf(const std::string& file, const Json& json) {
   const auto isWhole = [](const Json& number) { return number.is_number_unsigned(); };
   if (!json.is_array() || json.size() != 2 || !std::ranges::all_of(json, isWhole))

@@ -1,6 +1,6 @@
 #pragma once
-// Describes a baseline, an accepted picture or table with which `hpsdf check` compares new results. The description is
-// stored in a small JSON file beside the baseline. docs/check.md is the manual.
+// A baseline is an accepted picture or table with which `hpsdf check` compares new results. A small JSON file beside
+// the baseline describes it. docs/check.md is the manual.
 
 #include <array>
 #include <filesystem>

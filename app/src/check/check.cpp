@@ -83,8 +83,8 @@ void judge(CheckedItem& item) {
   if (item.verdict != Verdict::differs || isDataFile(item.picture)) item.difference.clear();
 }
 
-/// Reverses the verdict on a negative control, a picture that is wrong on purpose. The control passes if its comparison
-/// failed with the verdict `stated`.
+/// Reverses the verdict on a negative control, a picture that is wrong on purpose. The control passes only if its
+/// comparison failed with the verdict `stated`.
 void reverseVerdict(CheckedItem& item, Verdict stated) {
   if (item.verdict == stated)
     setVerdict(item, Verdict::passed, "");
@@ -97,8 +97,9 @@ void reverseVerdict(CheckedItem& item, Verdict stated) {
 
 using NegativeControls = std::map<int, Verdict>;  ///< expected verdicts on deliberately wrong pictures, by script line
 
-/// Uncomments the commands in a script's lines "# wrong REASON: COMMAND". These commands draw wrong pictures on
-/// purpose. Every command keeps its line and column, so that error messages stay correct.
+/// Uncomments the commands in the lines "# wrong REASON: COMMAND" of a script. They draw wrong pictures on purpose.
+/// Returns the verdict that is expected for each of these lines. Every command keeps its line and column, so that error
+/// messages stay correct.
 NegativeControls enableControls(const std::string& file, std::string& text) {
   NegativeControls controls;
   std::size_t begin = 0;

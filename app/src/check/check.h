@@ -35,8 +35,8 @@ struct WorstDifference {
   std::string difference;
 };
 
-/// One result of a check: a picture or a raw-value file with its baseline, or a script that failed or wrote
-/// no files.
+/// The result for one picture or file of raw values that was compared with its baseline, or for one script that failed
+/// or wrote no files.
 struct CheckedItem {
   std::string script = {};
   std::string picture = {};  ///< file name; "" for a script
@@ -55,12 +55,13 @@ struct CheckedItem {
   std::filesystem::path difference = {};  ///< path of a picture of the differences; "" for none
   std::vector<WorstDifference> worst = {};
 
-  /// The name of the item: "gallery/degree.png" for a picture, or the name of the script if the item is a script.
+  /// Returns the name of the item: "gallery/degree.png" for a picture, or "gallery" if the item is the script itself.
   std::string name() const { return picture.empty() ? script : script + "/" + picture; }
-  /// The name of the picture: "degree.png", "degree.png, wrong in line 7" for a picture that is wrong on purpose, or
-  /// "(script)" if the item is a script.
+  /// Returns the name of the picture, such as "degree.png". Returns "degree.png, wrong in line 7" for a picture that is
+  /// wrong on purpose, and "(script)" if the item is a script.
   std::string pictureText() const;
-  /// "SCRIPT/" followed by `pictureText()`, or only the script's name if the item is a script.
+  /// Returns the title "script/picture", such as "gallery/degree.png", or only the script's name if the item is a
+  /// script.
   std::string title() const { return picture.empty() ? script : script + "/" + pictureText(); }
 };
 
@@ -82,9 +83,9 @@ struct CheckOutcome {
 
 constexpr const char* kCheckResults = "results.json";
 
-/// Runs the scripts and writes their pictures and the pictures of differences into the output folder. Results
-/// of an earlier check are first removed from the output folder. Throws `Error` for a folder without scripts,
-/// for an unknown name in `only`, and for an output folder that contains other files.
+/// Runs the scripts. Writes their pictures, and pictures that show the differences from the baselines, into the output
+/// folder. Results of an earlier check are first removed from the output folder. Throws `Error` for a folder without
+/// scripts, for an unknown script name in `request.only`, and for an output folder that contains other files.
 CheckOutcome check(const Registry& registry, const Console& console, const CheckRequest& request);
 
 /// Returns an HTML page with the results of all comparisons. The pictures of each failure are embedded in the

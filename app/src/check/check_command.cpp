@@ -118,7 +118,7 @@ std::string nameOf(const Json& item) {
   return item.at("script").get<std::string>() + "/" + item.at("picture").get<std::string>();
 }
 
-/// Returns the result for the picture `name`, of the form SCRIPT/PICTURE, in the last check. Ignores pictures that are
+/// Returns the last check's result for the picture `name`, which has the form SCRIPT/PICTURE. Ignores pictures that are
 /// wrong on purpose. Throws `Error` if no result has this name.
 Json resultNamed(const std::string& name, const Json& results, const fs::path& from) {
   std::vector<std::string> names;

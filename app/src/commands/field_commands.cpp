@@ -49,8 +49,8 @@ Json madeJson(const Session& session, const Arguments& arguments) {
   return json;
 }
 
-/// Replaces the current field by a post-processed version of it, and saves the new field if an output is given. Reports
-/// the new field as JSON that includes `figures`, or as the text that textOf(field) returns.
+/// Replaces the current field by `field`, a post-processed version of it. Saves `field` if an output is given. Reports
+/// `field` as JSON that includes `figures`, or as the text that textOf(field) returns.
 void changeCurrent(Session& session, const Arguments& arguments, Field field, const Json& figures, const auto& textOf) {
   const CurrentField& before = session.current();
   session.changeField({std::move(field), arguments.textOr("output", before.name), {}, before.surface});

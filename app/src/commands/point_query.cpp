@@ -39,7 +39,8 @@ std::optional<Vector3> parsePoint(std::string_view text) {
   return next == end ? std::optional(point) : std::nullopt;
 }
 
-/// True for a header line of column names: it begins with a letter or a quote and is not a point such as "nan nan nan".
+/// True if the text is a header line of column names: it begins with a letter or a quote, and it is not a point such as
+/// "nan nan nan".
 bool isHeader(std::string_view text) {
   return !text.empty() && (isLetter(text[0]) || text[0] == '"') && !parsePoint(text);
 }

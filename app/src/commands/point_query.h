@@ -14,8 +14,8 @@ namespace hpsdf::app {
 
 enum class PointFormat : std::uint8_t { csv, json };
 
-/// Reads points from `in`, evaluates the field at them and passes the results to `write`. Returns the number
-/// of points. Throws `Error` "name:line: …" for a line that is not a point.
+/// Reads points from `in`, evaluates the field at them and passes the results to `write`. Returns the number of points.
+/// If a line is not a point, throws `Error` with the message "name:line: …".
 std::size_t queryPoints(const Field& field, std::istream& in, const std::string& name, PointFormat format,
                         const std::function<void(std::string_view)>& write);
 

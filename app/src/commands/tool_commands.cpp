@@ -21,8 +21,8 @@ namespace {
 
 constexpr int kMostNestedScripts = 16;
 
-/// Counts one more running script in the session while this object lives. During this time, `json` decides whether
-/// commands report as JSON.
+/// While this object lives, the session counts one more running script, and `json` decides whether commands report as
+/// JSON.
 class ScriptScope {
  public:
   ScriptScope(Session& session, bool json) : session_(session), jsonBefore_(session.setJson(json)) {

@@ -12,7 +12,7 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr double kRedrawSeconds = 0.1;
 constexpr double kQuietSeconds = 10;
-// Work that takes less than this time shows no progress. The time is longer for logs, where lines cannot be
+// Progress is shown only for work that takes longer than this time. The time is longer for logs, where lines cannot be
 // erased.
 constexpr double kQuickSeconds = 0.3, kQuickSecondsInALog = 2;
 constexpr int kBarColumns = 24;

@@ -23,16 +23,16 @@ std::vector<Parameter> checkpointParameters();
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings);
 
 /// Returns the command parameter for the setting `name` of the table `buildSettings`. The function `settingKind`
-/// returns only the `ParameterKind` of this parameter, which holds the accepted values.
+/// returns only the type, the accepted values and the default of this parameter.
 Parameter settingParameter(const char* name);
 ParameterKind settingKind(const char* name);
 
-/// Returns the parameter for the number of threads. Its help text contains `result`, such as "The field is", followed
-/// by "the same whatever their number".
+/// Returns the parameter for the number of threads. `result` begins a sentence of its help text: "The field is" gives
+/// "The field is the same whatever their number."
 Parameter threadsParameter(const std::string& result);
 
-/// Returns the parameter for the number of random points. The function `seedParameter` returns the parameter for the
-/// seed of the random number generator.
+/// Returns the parameter for the number of random points; `count` is its default. The function `seedParameter` returns
+/// the parameter for the seed of the random number generator.
 Parameter pointsParameter(std::string help, std::string count, double minimum);
 Parameter seedParameter(std::string help = "Which points.");
 

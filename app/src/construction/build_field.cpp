@@ -64,8 +64,8 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     checkBuild(domain, options);
     warnOfCutSurface(console, box, domain);
 
-    // Set up the exact distance function and measure the time. The default memory limit covers the octree alone, so the
-    // memory of the distance function is added to the limit.
+    // Set up the exact distance function and measure how long this takes. The default memory limit is meant for the
+    // octree alone, so add the memory of the distance function to it.
     const auto start = std::chrono::steady_clock::now();
     auto exact = distanceTo(console, surface, prepared, insideOptions);
     if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact->bytes();

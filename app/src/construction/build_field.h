@@ -33,14 +33,13 @@ struct BuiltField {
 };
 
 /// Loads the surface and builds its field. Progress and warnings go to the console's `err`. If `checkpoint` names a
-/// file, the construction saves its state in this file and continues from the state of an earlier call. In this case
-/// the arguments must include those of `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled` after
-/// Ctrl-C.
+/// file, the construction saves its state in this file, and continues from a state that an earlier call saved there.
+/// The arguments must then include those of `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled`
+/// after Ctrl-C.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 
-/// Returns the name of the checkpoint file, in which a construction saves its state. `output` is the name of
-/// the field file.
+/// Returns the name of the checkpoint file in which the construction of the field file `output` saves its state.
 std::filesystem::path checkpointOf(const std::filesystem::path& output);
 
 /// If the mesh has holes, warns that error bounds do not hold near the holes.

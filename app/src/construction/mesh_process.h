@@ -36,8 +36,8 @@ ImportedMesh importInSubprocess(const std::filesystem::path& program, const std:
 /// with this command.
 bool asksForReading(std::span<const std::string> words);
 
-/// Reads the mesh file that `words` name and writes it as a reply (mesh_reply.h) to standard output. `words` also give
-/// the limits of time and memory. Runs in the separate process. Returns the exit status.
+/// Runs in the separate process: reads a mesh file and writes the mesh as a reply (mesh_reply.h) to standard output.
+/// `words` hold the name of the file and the limits of time and memory. Returns the exit status.
 int readForOtherProcess(std::span<const std::string> words);
 
 }  // namespace hpsdf::app

@@ -29,8 +29,9 @@ constexpr std::size_t MeshReport::*kCounts[] = {&MeshReport::components,        
                                                 &MeshReport::unreferencedVertices, &MeshReport::degenerateFaces,
                                                 &MeshReport::flippedFaces,         &MeshReport::duplicateFaces};
 
-/// The header of a reply of the process that reads a mesh file. Vertices, triangles and text follow it. The header
-/// needs neither a version nor a byte order, since the same program on the same machine writes and reads it.
+/// The header of a reply, with which a separate process returns the contents of a mesh file. Vertices, triangles and
+/// text follow the header. The header needs neither a version nor a byte order, since the same program on the same
+/// machine writes and reads it.
 struct Header {
   std::array<char, 8> magic = kMagic;
   std::uint64_t checksum = 0;  ///< checksum of all bytes that follow this member

@@ -31,9 +31,8 @@ class DamagedReply : public Error {
 /// Length of the reply header in bytes. Every reply begins with this header.
 extern const std::size_t kReplyHeaderBytes;
 
-/// Returns the length of the whole reply in bytes, as its header states it. `beginning` holds at least the
-/// first `kReplyHeaderBytes` bytes of the reply. Throws `DamagedReply` for fewer bytes, and for bytes that
-/// are not a header.
+/// Returns the length in bytes of a whole reply, which the reply's header states. `beginning` holds at least the first
+/// `kReplyHeaderBytes` bytes of the reply. Throws `DamagedReply` if there are fewer bytes or if they are not a header.
 std::uint64_t replyBytes(std::span<const std::byte> beginning);
 
 /// Parses a whole reply. Memory is allocated only for elements that are present in `bytes`. The indices, coordinates,
@@ -43,7 +42,8 @@ MeshReply parseReply(std::span<const std::byte> bytes);
 /// A function that receives the bytes of a reply in pieces.
 using ReplySink = std::function<void(std::span<const std::byte>)>;
 
-/// Writes a mesh as a reply. This function and the next two allocate no memory: they work even when none is left.
+/// Writes a mesh as a reply. `writeMesh`, `writeRefusal` and `writeOutOfMemory` allocate no memory, so that they work
+/// even when none is left.
 void writeMesh(const ImportedMesh& imported, const ReplySink& sink);
 void writeRefusal(std::string_view reason, const ReplySink& sink);  ///< a very long reason is cut off
 void writeOutOfMemory(const ReplySink& sink);

@@ -18,8 +18,8 @@ std::string faultyEdges(const MeshReport& report);
 
 std::string closednessText(const MeshReport& report);
 
-/// Returns the name of an inside test as the option --sign spells it. An inside test is a method that tells inside from
-/// outside. Returns "unknown" for `automatic`.
+/// Returns the name by which the option --sign selects an inside test (a method that tells inside from outside).
+/// Returns "unknown" for `automatic`.
 std::string insideTestName(InsideTest sign);
 
 /// Returns the reason why an inside test was chosen, with a position if one is known: "the mesh meets itself, as at

@@ -39,8 +39,8 @@ Vector3 exactNormal(const ExactDistance& exact, const Vector3& x, double signedD
   const double least = 1e-9 * exact.source().box.sizes().maxCoeff();  // shorter offsets are mostly rounding error
   const Vector3 offset = x - exact.closestPoint(x).point;
   const double distance = offset.norm(), thickness = exact.source().thickness;
-  // Near a hole of the mesh, the closest part of the surface is the patch that closes the hole. The normal of
-  // this patch is unknown.
+  // Near a hole of the mesh, the signed distance is measured to the patch that closes the hole, not to the closest
+  // triangle. The normal of the patch is unknown.
   const bool isBesideHole = std::abs(std::abs(signedDistance + thickness / 2) - distance) > least;
   if (distance < least || isBesideHole) return Vector3::Zero();
   return offset / (thickness == 0 && signedDistance < 0 ? -distance : distance);

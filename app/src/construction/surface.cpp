@@ -17,8 +17,9 @@
 namespace hpsdf::app {
 namespace {
 
-/// Memory for setting up an exact distance function, in bytes per mesh face. With the outer hull as inside test it is
-/// kBytesPerHullFace, and at most 250,000 pieces of intersected faces need additional memory.
+/// Memory for setting up an exact distance function, in bytes per mesh face. kBytesPerHullFace applies if the inside
+/// test is the outer hull. Up to 250,000 pieces of intersected faces then need additional memory, which is not counted
+/// here.
 constexpr double kBytesPerFace = 520, kBytesPerHullFace = 800;
 
 DistanceFunction normalizedFunction(const DistanceFunction& distance) {

@@ -13,7 +13,7 @@
 
 namespace hpsdf::app {
 
-/// The prefixes of the names of shapes: kBuiltin for shapes given as meshes, kAnalytic for shapes in closed
+/// The prefixes of shape names: kBuiltin for shapes that are meshes, kAnalytic for shapes whose distance has a closed
 /// form.
 constexpr std::string_view kBuiltin = "builtin:";
 constexpr std::string_view kAnalytic = "analytic:";

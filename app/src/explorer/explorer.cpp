@@ -87,8 +87,8 @@ Explorer::Explorer(Session& session) : session_(session) {
 }
 
 void Explorer::change(ViewState next) {
-  // During a gesture, such as the drag of a slider, a command can replace the previous command. The new command then
-  // starts from the history before the gesture.
+  // `before_` is the history before a gesture, such as the drag of a slider. A command that replaces the previous
+  // command of the same gesture starts from this history again.
   if (!replaces_) before_ = {view_, undone_.size(), redone_};
   undone_.resize(before_.undone);
   redone_ = before_.redone;
@@ -243,8 +243,8 @@ const std::map<std::string, Widget>& Explorer::widgets() {
   return ui_.widgets();
 }
 
-/// Returns the command for a turn of the mouse wheel by `notches` away from the user: a zoom of the slice or a movement
-/// of the camera.
+/// Returns the command that zooms the slice or moves the camera when the mouse wheel is turned by `notches` (positive:
+/// away from the user).
 std::string Explorer::wheelCommand(double notches) const {
   if (view_.slice) return fmt::format("plane zoom={:.5g}", view_.zoom * std::pow(1.15, notches));
   const render::OrbitCamera& c = view_.camera;
@@ -319,8 +319,8 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
     picture.scale = scale;
     return picture;
   };
-  // Place the plane and the camera relative to the current field, even if `field` is the other field, drawn beside it.
-  // Both pictures then show the same part of space.
+  // Place the plane and the camera relative to the session's current field, even if `field` is the second field, which
+  // is drawn beside it. Both pictures then show the same part of space.
   const Field& current = session_.current().field;
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), reference)
                      : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), reference);

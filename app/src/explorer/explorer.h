@@ -41,8 +41,8 @@ class Explorer final : public SessionExtension {
   bool canUndo() const { return !undone_.empty(); }
   bool canRedo() const { return !redone_.empty(); }
 
-  /// The settings of the next construction as texts. The keys are the names of `build`'s parameters; the key
-  /// `mesh` stands for the surface.
+  /// Returns the settings for the next construction of the field: names of `build` parameters and their values as text.
+  /// The value of `mesh` is the name of the surface.
   const std::map<std::string, std::string>& settings() const { return settings_; }
   void setSetting(const std::string& name, const std::string& value) { settings_[name] = value; }
   /// Builds the field again with `settings()`. If `maxSteps` is given, the construction ends after that many
@@ -65,11 +65,12 @@ class Explorer final : public SessionExtension {
   const Ui& ui() const { return ui_; }
   void setClipboard(const std::string& text) { ui_.setClipboard(text); }
 
-  /// Draws the panels, and redraws the picture if it is out of date. `shrink` divides the picture's resolution along
-  /// each axis, so that drawing keeps up with a moving mouse. During long work the last picture is shown again.
+  /// Draws and returns the whole frame. Redraws the picture in it only if the picture is out of date. `shrink` divides
+  /// the picture's resolution along each axis, so that drawing keeps up with a moving mouse. During long work the last
+  /// picture is shown again.
   render::Image frame(int shrink = 1);
-  /// True if there is no picture, or if the last one was drawn at reduced resolution or for a state other than the
-  /// present.
+  /// True if the picture must be redrawn: there is none yet, or the last one was drawn at reduced resolution or for
+  /// another state of the explorer.
   bool isStale() const { return !picture_ || shrunk_ != 1 || drawnFor_ != pictureKey(); }
 
   /// Runs one line of script. Widgets act by calling this function.
@@ -143,7 +144,7 @@ class Explorer final : public SessionExtension {
   bool replaces_ = false;  ///< true if the running command replaces the previous one
 
   std::optional<std::uint64_t> allSteps_;
-  enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< steps: ends early, after a given number of steps
+  enum class Rebuilding : std::uint8_t { no, whole, steps };  ///< `steps`: ends after a given number of steps
   Rebuilding rebuilding_ = Rebuilding::no;
 
   std::optional<FieldStatistics> figures_;

@@ -44,8 +44,8 @@ double cellSize(const Field& field, int depth) {
   return std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
 }
 
-/// Returns the point of the largest jump on an interface between cells; the interface with the largest jump has rank 1.
-/// The slice through the point is perpendicular to the interface, so that it shows the cells on both sides.
+/// Returns the point of the largest jump on a cell interface. Rank 1 is the interface with the largest jump of all. The
+/// slice through the point is perpendicular to the interface, so that it shows the cells on both sides.
 Destination worstPoint(Session& session, std::size_t rank) {
   const auto& worst = explorerOf(session).worst(rank);
   if (rank > worst.size())

@@ -69,7 +69,7 @@ struct Controls {
   }
 };
 
-/// Draws the controls of the camera or of the slice plane, the cells and the colours.
+/// Draws the controls of the picture: the camera or the slice plane, the cells and the colours.
 void drawViewPanel(const Controls& controls, Explorer& explorer);
 /// Draws the parameters of the next construction, its progress while it runs, and the button that starts it.
 void drawBuildPanel(const Controls& controls, Explorer& explorer);

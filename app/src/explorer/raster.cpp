@@ -43,8 +43,8 @@ float edge(const ImVec2& a, const ImVec2& b, const ImVec2& p) {
   return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
 
-/// Tells whether the edge from a to b covers the pixels whose centres lie on it (top-left rule). Two triangles traverse
-/// their shared edge in opposite directions, so exactly one of them covers these pixels.
+/// Tells whether pixels whose centres lie exactly on the edge from a to b belong to the triangle (top-left rule). Two
+/// triangles traverse their shared edge in opposite directions, so the pixels belong to exactly one of them.
 bool coversItsEdge(const ImVec2& a, const ImVec2& b) { return a.y == b.y ? a.x > b.x : a.y > b.y; }
 
 void paintTriangle(render::Image& image, const Coverage& texture, const Clip& clip, const ImDrawVert* a,

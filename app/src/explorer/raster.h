@@ -11,14 +11,15 @@
 
 namespace hpsdf::app {
 
-/// The only texture of the panels, Dear ImGui's font atlas: the coverage, 0 to 255, of glyphs, lines and a white spot.
+/// The only texture of the panels: Dear ImGui's font atlas. It holds the coverage (0 to 255) of glyphs, lines and a
+/// white spot.
 struct Coverage {
   int width = 0, height = 0;
   std::vector<std::uint8_t> texels;
 };
 
-/// Blends the triangles over the picture in their order, with the rules of a graphics card. A triangle covers
-/// the pixels whose centres it contains. Colours and texture coordinates are interpolated, and the texture is
+/// Blends the triangles of `data` over the picture, one after the other and by the rules of graphics cards. A triangle
+/// covers the pixels whose centres it contains. Colours and texture coordinates are interpolated, and the texture is
 /// sampled bilinearly.
 void paint(render::Image& image, const ImDrawData& data, const Coverage& texture);
 

@@ -82,8 +82,8 @@ class Ui {
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
 
-  // The following functions draw widgets. The argument `widgets` of `frame` calls them. They return the change that
-  // the user made in this frame. A path has the form panel/name. A label may be empty.
+  // The following functions draw widgets. Only the function `widgets`, the argument of `frame`, may call them. Each
+  // function returns the change that the user made in this frame. A path has the form panel/name. A label may be empty.
 
   /// Draws the background of a panel and calls `content` to fill the panel. `scroll` is the scroll position in
   /// pixels, or std::nullopt for a panel that never scrolls. Returns the new scroll position.

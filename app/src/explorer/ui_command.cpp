@@ -21,8 +21,9 @@ std::optional<Point> parsePoint(const std::string& text) {
   return Point{*x, *y};
 }
 
-/// Returns the pixel that `target` names: the pixel X,Y, or the centre of a widget. Throws `Error` for a
-/// widget that takes no input. If `types` is true, also throws `Error` for a widget that takes no text.
+/// Converts `target` to a pixel. `target` is either the text "X,Y" or the path of a widget, which stands for the
+/// widget's centre. Throws `Error` for a widget that takes no input. If `types` is true, also throws `Error` for a
+/// widget that takes no text.
 Point targetPixel(Explorer& explorer, const std::string& target, bool types) {
   if (const auto pixel = parsePoint(target)) return *pixel;
   const auto& widgets = explorer.widgets();

@@ -73,7 +73,7 @@ std::string levelText(const std::vector<int>& levels);
 /// Returns a script that sets every part of the explorer's state. Each line of the script ends in a newline.
 std::string scriptOf(const ViewState& view);
 
-/// Compares two states by the scripts that `scriptOf` makes of them, which contain every part of a state.
+/// Compares two states by comparing their scripts. A script made by `scriptOf` contains every part of a state.
 inline bool operator==(const ViewState& a, const ViewState& b) { return scriptOf(a) == scriptOf(b); }
 
 /// Returns the choice of a renderer as an argument of the command `show`, for instance "cpu=true" or

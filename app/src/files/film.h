@@ -17,9 +17,9 @@ namespace hpsdf::app {
 /// file by ffmpeg. Until `publish` is called, an older film at the same place stays intact.
 class Film {
  public:
-  /// The output is an MP4 file if `output` ends in .mp4, and otherwise a folder. Throws `Error` if the output
-  /// cannot be written, if the folder holds files that are not an earlier film, or if an MP4 file is wanted and
-  /// ffmpeg is not installed.
+  /// Makes a film without frames. The film becomes an MP4 file if `output` ends in .mp4, and otherwise a folder. Throws
+  /// `Error` if the output cannot be written, if the folder holds files that are not an earlier film, or if an MP4 file
+  /// is wanted and ffmpeg is not installed.
   explicit Film(const std::string& output);
 
   /// Adds a frame. `figures` is the JSON object that describes the frame in frames.json.

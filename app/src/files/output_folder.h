@@ -32,7 +32,8 @@ class OutputFolder {
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// Throws `Error` if the folder holds files but not the file `marker`. This file marks a folder of earlier results.
+  /// Throws `Error` if the folder holds files but not the file `marker`. The marker shows that the files are results of
+  /// an earlier run.
   void requireOwn(const std::string& marker) const;
 
   /// Writes the file `marker`, so that the folder is recognized even if the run ends without results. Then removes the

@@ -127,8 +127,8 @@ std::vector<Group> byGroup(const std::vector<Parameter>& parameters) {
   return groups;
 }
 
-/// The place in docs/commands.md where an option of a command is described: with this command, with the
-/// command `build`, or in the section of shared options.
+/// The place in docs/commands.md where an option of a command is described: with the command itself, with the command
+/// `build`, or in the section of shared options.
 enum class DescribedAt : std::uint8_t { here, build, sharedOptions };
 
 bool isSameOption(const Parameter& a, const Parameter& b) { return a.name == b.name && a.help == b.help; }
@@ -166,8 +166,8 @@ std::string markdownNames(const std::vector<const Parameter*>& parameters) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// Returns descriptions of the parameters that only this command has, by group, and references to the descriptions of
-/// the parameters that the command shares with other commands.
+/// Returns the parameters of a command as Markdown: descriptions of the parameters that only this command has, by
+/// group, and references to the descriptions of the parameters that it shares with other commands.
 std::string markdownParameters(const Registry& registry, const Command& command) {
   std::string text;
   std::vector<const Parameter*> shared;

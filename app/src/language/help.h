@@ -14,7 +14,7 @@ enum class HelpDetail : std::uint8_t {
   all,
 };
 
-/// Returns a description of the program, with a first session and a list of all commands.
+/// Returns the help text of the program, with an example of a first session and a list of all commands.
 std::string overviewHelp(const Registry& registry);
 
 /// Returns the help text of one command: usage, purpose, examples, and its parameters by group.

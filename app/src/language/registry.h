@@ -96,8 +96,8 @@ std::string paragraphs(std::string_view text);
 struct Word {
   std::string text = {};
   int column = 0;  ///< column of the first character, from 1
-  /// Index of the `=` if the word has the form `name=value` in a script. npos if the word has no `=` or if the
-  /// `=` was quoted.
+  /// Index of the `=` in a word of a script that has the form `name=value`. npos if the word has no `=` or if the `=`
+  /// was quoted.
   std::size_t equals = std::string::npos;
 };
 

@@ -46,8 +46,8 @@ struct Statement {
 /// Splits the text of a script into statements and the statements into words.
 class Scanner {
  public:
-  /// The scanner appends `includedFrom` to every error message. It adds the length of each variable value that it
-  /// substitutes to `variableBytes`.
+  /// Makes a scanner for the script `text`. The scanner appends `includedFrom` to every error message, and adds the
+  /// length of each variable value that it substitutes to `variableBytes`.
   Scanner(std::string_view name, std::string_view text, std::string_view includedFrom, std::size_t& variableBytes)
       : name_(name), text_(text), includedFrom_(includedFrom), variableBytes_(variableBytes) {}
 

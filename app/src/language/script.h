@@ -25,10 +25,10 @@ struct Call {
   int line;                  ///< line in the outermost script; for an included call the line of its `include`
 };
 
-/// Reads and checks a whole script, so that a mistake in the last line is found before the first line runs.
-/// `name` is the file name of the script: error messages begin with this name, and included files are searched in the
-/// script's folder. Words of the form $name are replaced by the values in `variables`. The registry must outlive the
-/// calls, which refer to its commands. Throws `Error` "file:line:column: …".
+/// Parses a script into calls of commands. Checks the whole script first, so that a mistake in the last line is found
+/// before the first line runs. `name` is the file name of the script: error messages begin with this name, and included
+/// files are searched in the script's folder. Words of the form $name are replaced by the values in `variables`. The
+/// registry must outlive the calls, which refer to its commands. Throws `Error` with a message "file:line:column: …".
 std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
                               Variables variables);
 

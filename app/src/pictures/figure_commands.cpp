@@ -25,8 +25,8 @@ Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int
           {"slope", gradient.norm()}};
 }
 
-/// Returns the value, gradient and cell of the field at the point that a pixel of the last picture shows. Returns null
-/// if the pixel shows no part of the field. If `withAll` is true, adds figures that take long to compute: the exact
+/// Returns the field's value, gradient and cell at the point that the pixel (x, y) of the last picture shows. Returns
+/// null if the pixel shows no part of the field. If `withAll` is true, adds values that take long to compute: the exact
 /// distance, if it is known, and the jumps of the field at the nearest face of the cell.
 Json pickJson(Session& session, int x, int y, bool withAll) {
   const Field& field = session.current().field;

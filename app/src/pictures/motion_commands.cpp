@@ -112,8 +112,8 @@ render::Drawn drawFrame(Session& session, const Call& call, const std::optional<
   return drawn(slicePicture(arguments, domain), render::drawSlice);
 }
 
-/// Returns the numbers of refinement steps after which a frame is drawn: 0, then a geometric sequence from 1 to `all`.
-/// The numbers ascend strictly. There are `frames` numbers, or all + 1 numbers if all + 1 is less than `frames`.
+/// Returns the numbers of refinement steps after which a frame is drawn, in strictly ascending order: 0, then a
+/// geometric sequence from 1 to `all`. There are `frames` of these numbers, but at most all + 1.
 std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   frames = std::min<std::uint64_t>(frames, all + 1);
   std::vector<std::uint64_t> steps = {0};
@@ -125,8 +125,8 @@ std::vector<std::uint64_t> frameSteps(std::size_t frames, std::uint64_t all) {
   return steps;
 }
 
-/// Extends the colour scale to all degrees or depths that can occur in a frame: from the lowest in `base`, the field
-/// before refinement, to the highest in the finished field.
+/// Extends the colour scale to all degrees or depths that can occur in a frame. The lowest of them occurs in `base`,
+/// the field before refinement. The highest is already part of the scale.
 void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy color) {
   if (scale.levels.empty()) return;
   const FieldStatistics figures = statistics(base);

@@ -174,8 +174,8 @@ const std::vector<Parameter> kRenderDrawn = {
      "Draws cells of these polynomial degrees only: numbers and ranges, as in 2,4-6."},
     {"depths", text("LIST").advanced(), "Draws cells of these depths only: numbers and ranges, as in 2,4-6."}};
 
-/// Returns the parameters that choose the colours of a picture. They offer all colour modes (`ColorBy`) except `left`.
-/// The help text of the parameter `color` begins with the text `ofCells`.
+/// Returns the parameters that choose the colours of a picture. The parameter `color` accepts all colour modes
+/// (`ColorBy`) except `left`. Its help text begins with the text `ofCells`.
 std::vector<Parameter> colorParameters(ColorBy left, const std::string& ofCells, const std::string& standard) {
   return {
       {"color", choice(colorNames(left)).byDefault(standard), ofCells + " " + quantityHelp()},

@@ -41,8 +41,8 @@ std::string buildCommandLine(const std::string& surface, const std::string& file
   return line;
 }
 
-/// Returns the mean time in seconds in which the renderer traces one frame of the surface, over eight frames or as many
-/// as fit into two seconds. A first frame is drawn to warm up and is not measured.
+/// Returns the renderer's mean time for one frame of the surface, in seconds. The mean is over eight frames, or over as
+/// many as fit into two seconds. A first frame is drawn to warm up and is not measured.
 double frameSeconds(render::Renderer& renderer, const Field& field, const render::SurfacePicture& picture) {
   using Clock = std::chrono::steady_clock;
   constexpr int kFrames = 8;

@@ -51,7 +51,7 @@ class Session {
   int scriptDepth = 0;
 
   void setField(CurrentField field);
-  /// Replaces the current field by a post-processed version of it. The exact distance to the field's surface is kept.
+  /// Replaces the current field by `field`, a post-processed version of it. Keeps the exact distance function.
   void changeField(CurrentField field);
   bool hasField() const { return field_ != nullptr; }
   /// Returns the current field. Throws `Error` if the session has no field.
@@ -64,8 +64,8 @@ class Session {
   bool knowsJumps() const { return jumps_.has_value(); }
 
   /// Returns the exact distance to `surface` and keeps it for later calls. If `surface` is empty, takes the surface
-  /// from which the field was made, provided that it is a shape or that the field was built in this session. Otherwise
-  /// takes the surface of the previous call. Throws `Error` if no surface is known or if it cannot be read.
+  /// from which the field was made, provided that it is a shape or that the field was built in this session. If neither
+  /// holds, takes the surface of the previous call. Throws `Error` if no surface is known or if it cannot be read.
   const DistanceFunction& exact(const std::string& surface);
   /// True if `exact` can be called with an empty `surface`.
   bool knowsExact() const;
@@ -96,8 +96,8 @@ class Session {
     Backend backend = {};
   };
   Other& other(const std::string& file);
-  /// Drops the second fields whose files have been modified. Returns whether any were dropped. A second field whose
-  /// file was deleted is kept.
+  /// Forgets the second fields whose files have been modified since they were read. Returns whether there were any. A
+  /// second field whose file was deleted is kept.
   bool forgetChangedOthers();
   const Jumps& otherJumps(const std::string& file);
   render::Renderer& otherRenderer(const std::string& file, const Backend& backend);

@@ -52,10 +52,10 @@ class Scene {
   };
   const std::deque<Drop>& drops() const { return drops_; }  ///< bodies not added yet, in the order of their times
   const std::deque<BodyKind>& kinds() const { return kinds_; }
-  std::size_t lost() const;    ///< number of bodies below `floor_` (centre of a rigid, lowest node of a soft body)
+  std::size_t lost() const;    ///< number of bodies below `floor_`: centre of a rigid body or lowest node of a soft one
   std::size_t moving() const;  ///< number of rigid bodies in the world that are not static
   std::size_t waiting() const { return drops_.size(); }  ///< number of bodies not added yet
-  /// The length with which penetration depths are compared: the radius of a marble, the size of a body or the collision
+  /// Returns the reference length for penetration depths: the radius of a marble, the size of a body or the collision
   /// margin of a cloth.
   double bodySize() const { return bodySize_; }
 

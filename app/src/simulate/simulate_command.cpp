@@ -223,7 +223,7 @@ void runSimulate(Session& session, const Arguments& arguments) {
   printJson(console.out, json);
 }
 
-/// Returns the camera parameters of the command `render`, with help texts of `camera` and `target` for simulations.
+/// Returns the camera parameters of the command `render`, but `camera` and `target` with help texts for simulations.
 std::vector<Parameter> sceneCameraParameters(const Registry& registry) {
   std::vector<Parameter> parameters = cameraParameters(registry);
   Parameter& camera = parameterNamed("camera", parameters);

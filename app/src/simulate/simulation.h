@@ -34,11 +34,11 @@ struct SimulationFigures {
   std::size_t lost = 0;               ///< number of bodies below the floor at the end
   std::uint64_t steps = 0;
   double simulated = 0;  ///< simulated time, seconds
-  /// Wall-clock times in seconds: setting up the simulation, all steps, all field queries, the physics solver, and the
-  /// greatest time that the field queries of one step took.
+  /// Wall-clock times in seconds, in this order: setting up the simulation, all steps, all field queries, the physics
+  /// solver, and the field queries of the step in which they took longest.
   double setUpSeconds = 0, seconds = 0, querySeconds = 0, solverSeconds = 0, longestQuerySeconds = 0;
   CountPerStep penetrating, touching;  ///< contacts found, and contacts passed to the solver
-  double size = 0;  ///< length to compare depths with: a marble's radius, a body's size or a cloth's margin
+  double size = 0;  ///< reference length for depths: a marble's radius, a body's size or a cloth's margin
   double deepest = 0, sumOfDeepest = 0,
          deepestAtEnd = 0;  ///< penetration depths, world units; `deepestAtEnd` covers the last second
   std::uint64_t state = 0;  ///< hash of all positions at the end
@@ -46,7 +46,7 @@ struct SimulationFigures {
 
 /// The camera that takes the pictures of a simulation. It does not influence the simulation.
 struct SimulationCamera {
-  /// Camera, picture size and samples. The camera's distance is a multiple of the distance at which the whole
+  /// Camera, picture size and samples per pixel. The camera's distance is a multiple of the distance at which the whole
   /// scene is just in view. A camera without a target looks at the middle of the scene.
   render::SurfacePicture look;
   Backend backend;

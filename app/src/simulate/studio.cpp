@@ -19,7 +19,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr render::Color kLevelGround = {224, 226, 230};
-constexpr double kLevelGroundSide = 8;  // length of its sides, in diagonals of the box around the scene's other bodies
+constexpr double kLevelGroundSide = 8;  // side length divided by the diagonal of the box around the other bodies
 
 const physics::FieldShape* fieldShape(const btCollisionShape& shape) {
   return dynamic_cast<const physics::FieldShape*>(&shape);
@@ -126,13 +126,13 @@ render::Camera cameraOf(const render::SurfacePicture& look, const Box& domain) {
   return render::cameraOf(look.camera, domain, size.width, size.height);
 }
 
-/// Aims the camera of `look` at the points. A camera without a target gets a target at the middle of the points. The
-/// camera's distance comes in as a multiple of the distance from which all points are just in view. The function
-/// converts it to diagonals of the domain.
+/// Aims the camera of `look` at the points. If the camera has no target, the target becomes the middle of the points.
+/// On input, `look.camera.distance` is relative to the distance at which all points are just in view. On output, it is
+/// relative to the domain's diagonal.
 ///
-/// Let s be a point's coordinate along the picture's width or height, divided by half the view's extent at distance 1.
-/// Let z be the point's coordinate towards the eye. Let s_eye and z_eye be the coordinates of the eye. The point is in
-/// view if |s - s_eye| ≤ z_eye - z. With parallel rays it is in view if |s - s_eye| ≤ distance.
+/// For the picture's width, and likewise for its height, each point has coordinates (s, z): s along the width, divided
+/// by half the view's width at distance 1, and z towards the eye. The eye at (s_eye, z_eye) sees the point if
+/// |s - s_eye| ≤ z_eye - z, or, with parallel rays, if |s - s_eye| ≤ distance.
 void aim(render::SurfacePicture& look, std::span<const Vector3> points, const Box& domain) {
   constexpr double kBorder = 1.04;
   const bool parallel = look.camera.projection == render::Projection::orthographic;

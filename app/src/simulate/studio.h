@@ -20,8 +20,9 @@ namespace hpsdf::app {
 /// All other bodies are drawn as meshes, without detail below the size of a pixel.
 class Studio {
  public:
-  /// `look` is the member `look` of a `SimulationCamera`. The camera is aimed only once, at all bodies of the scene,
-  /// including those that are still to be added. Throws `Error` if no renderer is available.
+  /// Prepares pictures of the scene. `look` gives their camera, size and samples per pixel, as in `SimulationCamera`.
+  /// The camera is aimed only once, at all bodies of the scene, including those that are still to be added. Throws
+  /// `Error` if no renderer is available.
   Studio(const Scene& scene, std::string name, render::SurfacePicture look, const Backend& backend);
 
   /// Draws a picture of the present state of the scene.

@@ -36,8 +36,9 @@ class ContinuityStudy {
         uniform_(samples(0)),
         near_(samples(kNear * input_.domain.sizes().maxCoeff())) {}
 
-  /// Adds one row to `rows` for each field of the mesh. Jumps, errors and bytes are also given relative to the mesh's
-  /// first field, which is neither smoothed nor refitted with a higher degree (`BuildOptions::enrich`).
+  /// Builds the fields of the mesh and adds one row to `rows` for each. Jumps, errors and bytes are also given relative
+  /// to the first of these fields, which is neither smoothed nor refitted with a higher degree
+  /// (`BuildOptions::enrich`).
   void addRows(Json& rows) {
     for (const bool enriched : {false, true}) {
       BuildOptions options = input_.options;

@@ -35,9 +35,9 @@ constexpr std::array kCurveColors = {"#1683ab", "#d1721b", "#6b7280"};
 /// Thrown to end a construction when its field has enough coefficients.
 struct LargeEnough {};
 
-/// Returns the numbers of construction steps after which the field is inspected: 0, then a geometric sequence
-/// with the ratio `growth`. The field is inspected more often than stages of the curve are recorded, because the
-/// number of coefficients that a step adds varies.
+/// Returns the numbers of construction steps after which the field is inspected: 0, then a geometric sequence with the
+/// ratio `growth`. Not every inspection adds a point to the curve, because the number of coefficients that a step adds
+/// varies.
 std::vector<std::uint64_t> stageSteps(double growth, std::size_t mostCoefficients) {
   const double most =
       double(mostCoefficients) / double(coefficientCount(3) - coefficientCount(2));  // fewest coefficients a step adds

@@ -44,8 +44,8 @@ struct Level {
 constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree", &FieldStatistics::degreeVolume},
                                 Level{render::ColorBy::depth, "depth", "Depth", &FieldStatistics::depthVolume}};
 
-/// A picture of a slice through the middle of the domain, coloured by degree or depth, and a bar. The bar shows in the
-/// same colours the share of the volume that each degree or depth takes.
+/// A picture of a slice through the middle of the domain, coloured by degree or depth, and a bar in the same colours.
+/// The bar shows which share of the domain's volume each degree or depth takes.
 struct LevelPicture {
   std::string png = {};  ///< bytes of the slice's PNG file
   std::string svg = {};  ///< the bar as SVG text

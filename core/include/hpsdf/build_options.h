@@ -43,7 +43,8 @@ enum class NearnessKind : std::uint8_t {
 /// 1 % of the estimated RMS error and, if a maximum error is asked for, by less than 1 % of the maximum error.
 enum class CoefficientType : std::uint8_t { automatic, float32, float64 };
 
-/// The samples of Φ that are used to try a polynomial of one degree more in a cell (p-trial).
+/// The samples of the signed distance Φ to which a polynomial of one degree more is fitted on trial in a cell
+/// (p-trial).
 enum class TrialSamples : std::uint8_t {
   children,  ///< samples in the eight child cells, which the trial split takes anyway; all coefficients are refitted
   /// Additional samples in the cell itself, from which only the coefficients of the highest degree are computed, as in
@@ -54,7 +55,7 @@ enum class TrialSamples : std::uint8_t {
 
 /// The kind of quadrature rule that selects the sample points in a cell.
 enum class CubatureKind : std::uint8_t {
-  compact,  ///< up to order 13, symmetric rules with about half as many points as `product`; then `product`
+  compact,  ///< symmetric rules with about half as many points as `product`; above order 13, `product`
   product,  ///< the tensor product of Gauss rules (the paper)
 };
 
@@ -123,10 +124,10 @@ struct BuildOptions {
   NearnessKind nearnessKind = NearnessKind::polynomial;
   /// Greatest allowed error |f − Φ| of the field f, in the field's own units; 0: no such limit. Once the target error
   /// is reached, the error of every cell (of the band, if there is a band) is probed on a lattice of 512 points. A cell
-  /// is refined if its greatest probed error, plus half of the greatest difference between neighbouring points, exceeds
-  /// the limit. This is no proof; for proven bounds see `safe_distance.h`. Cells are probed without blending. The
-  /// remaining error is stored in `FieldMetadata::measuredError`; rounding and the limits of degree, depth, steps and
-  /// bytes can keep it above the limit.
+  /// is refined if its greatest probed error, plus half of the greatest difference between the errors at two
+  /// neighbouring points, exceeds the limit. This is no proof; for proven bounds see `safe_distance.h`. Cells are
+  /// probed without blending. The remaining error is stored in `FieldMetadata::measuredError`; rounding and the limits
+  /// of degree, depth, steps and bytes can keep it above the limit.
   double maxError = 0;
   /// Greatest number of bytes of the field in memory. The construction builds the best field within this limit that the
   /// other settings allow. If `maxError` is set too, the construction ends as soon as this error is reached. With a

@@ -25,8 +25,8 @@ class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 
-  /// The message becomes "SUBJECT: PROBLEM", or "PROBLEM" if the subject is empty. The subject is the file, the
-  /// option or the shape that the error is about. It is spelled as the caller wrote it, so that the caller can
+  /// Makes an error with the message "SUBJECT: PROBLEM", or "PROBLEM" if the subject is empty. The subject is the file,
+  /// the option or the shape that the error is about. It is spelled as the caller wrote it, so that the caller can
   /// recognise it in the message.
   Error(ErrorKind kind, const std::string& subject, const std::string& problem)
       : std::runtime_error(subject.empty() ? problem : subject + ": " + problem), subject_(subject), kind_(kind) {}

@@ -35,8 +35,8 @@ class Field {
   double value(const Vector3& x) const;
   ValueAndGradient valueAndGradient(const Vector3& x) const;
 
-  /// Evaluates the field at many points, with the results of single queries but several times faster. Both spans must
-  /// have the same length.
+  /// Evaluates the field at many points. The results are those of single queries, but come several times faster. Both
+  /// spans must have the same length.
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
 

@@ -60,8 +60,8 @@ inline const Jump& jumpOf(const Interface& interface, JumpKind kind) {
 /// Interfaces with equal jumps keep their order.
 std::vector<std::size_t> worstInterfaces(const Jumps& jumps, JumpKind kind, std::size_t count);
 
-/// Returns, for each node of the octree (indexed by `Cell::id`), the greatest maximum jump (`Jump::max`) on the
-/// interfaces of the node's leaf. The element is 0 for internal nodes and for leaves without an interface.
+/// Returns one number for each node of the octree (indexed by `Cell::id`): for a leaf, the greatest `Jump::max` on its
+/// interfaces; 0 for internal nodes and for leaves without an interface.
 std::vector<double> worstJumpOfCells(const Field& field, const Jumps& jumps, JumpKind kind);
 
 /// One bin of a histogram of interfaces.

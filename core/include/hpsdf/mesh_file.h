@@ -28,10 +28,10 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// coordinates near 1e6 (see `coordinateSpacing`). It also hides indices out of range: it corrects them without
 /// notice in OFF and PLY files, and drops their faces in glTF files.
 ///
-/// The file is read in the caller's process without a limit of time or memory. A damaged file can crash assimp:
-/// a deeply nested glTF file overflows the stack, and other files trigger asserts, which are enabled in Debian's
-/// package of assimp. A file can also keep assimp busy for minutes, or the triangulation of a polygon with very
-/// many corners. Read untrusted files in a subprocess, as the program `hpsdf` does.
+/// The file is read in the caller's process without a limit of time or memory. A damaged file can crash assimp: a
+/// deeply nested glTF file overflows the stack, and other files trigger asserts, which are enabled in Debian's package
+/// of assimp. Some files keep assimp busy for minutes; the triangulation of a polygon with very many corners can take
+/// minutes too. Read untrusted files in a subprocess, as the program `hpsdf` does.
 ///
 /// Throws `Error` (of the kind `file` or `mesh`, with the subject `file`) for a file that is missing, a folder,
 /// unreadable, empty or not a mesh. Also throws `Error` for a mesh that exceeds the range of float, is too small

@@ -24,8 +24,8 @@ struct RepairedMesh {
 ///    its volume exceeds a hundredth of its box's volume; otherwise it stays unchanged. If there is only one body,
 ///    or none is oriented inward, the volumes decide and the algorithm ends here.
 /// 4. Cavities. A cavity is oriented inward on purpose. Therefore the winding number of the imported mesh is
-///    probed close to both sides of each body's surface, at points spread over its area. A body is decided if at
-///    least three quarters of its points show one of two patterns:
+///    probed close to both sides of each body's surface, at points spread over its area. The orientation of a
+///    body is decided if at least three quarters of its points show one of two patterns:
 ///    - Winding number at most 0 in front of the surface and at least 1 behind: the body is oriented correctly
 ///      and stays unchanged. A cavity is an example.
 ///    - Winding number at most −1 in front of the surface and at least 0 behind: the body would be correct if the

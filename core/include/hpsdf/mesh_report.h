@@ -1,5 +1,5 @@
 #pragma once
-// Counts and measures of a mesh, and the defects that keep the mesh from being the surface of a solid.
+// Statistics of a mesh, and the defects that keep the mesh from being the surface of a solid.
 
 #include <array>
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 namespace hpsdf {
 
-/// Counts and measures of a mesh after import. Edges are undirected: an edge counts once, no matter how many triangles
-/// share it.
+/// Statistics of a mesh after import: counts, volume, area and bounding box. Edges are undirected: an edge counts once,
+/// no matter how many triangles share it.
 struct MeshReport {
   std::size_t vertices = 0;    ///< vertices after welding that at least one triangle uses
   std::size_t faces = 0;       ///< number of triangles in the mesh
@@ -45,8 +45,8 @@ struct MeshReport {
   bool closed() const { return faces > 0 && boundaryEdges == 0 && nonManifoldEdges == 0 && inconsistentEdges == 0; }
 };
 
-/// Returns the counts and measures of a mesh without changing it. The counts of items that cleaning removes are 0.
-/// Throws `Error` (of the kind `mesh`) for indices out of range.
+/// Returns the statistics of a mesh without changing it. The counts of items that cleaning removes are 0. Throws
+/// `Error` (of the kind `mesh`) for indices out of range.
 MeshReport inspect(const TriangleMesh& mesh);
 
 /// A mesh after import, together with the report on this mesh.
@@ -85,7 +85,7 @@ struct Defect {
 };
 
 struct MeshDefects {
-  std::vector<Defect> found;  ///< sorted by kind; edges and vertices by vertex index, crossings by triangle index
+  std::vector<Defect> found;  ///< sorted by kind, then edges and vertices by vertex index, crossings by triangle index
   std::array<std::size_t, kDefectKinds> counts = {};
   bool allCrossings = true;  ///< false when the search for crossings stopped at its limit
   /// Number of crossings between two triangles of the same component, at which the surface passes through itself. Walls

@@ -32,13 +32,13 @@ struct Shape {
 /// marble-run, structured-bowl.
 std::span<const Shape> catalogue();
 
-/// The mesh of a shape: closed, triangles facing outward, centred at the origin.
+/// Returns the mesh of a built-in shape. It is closed and centred at the origin, and its triangles face outward.
 ///
 /// @param spec `NAME` or `NAME,parameter=value,…`, with or without a leading `builtin:`, such as
 ///   "torus,major=0.7,minor=0.3".
 ///
 /// Throws `Error` (of the kind `option`, with the subject `spec`) for a value out of range and for an unknown name or
-/// parameter; in this case the message suggests the most similar known name.
+/// parameter. For an unknown name, the message suggests the most similar known name or lists all names.
 TriangleMesh mesh(std::string_view spec);
 
 /// Returns the signed distance of a built-in shape in closed form, with the shape's name and box as its

@@ -25,8 +25,8 @@ struct ErrorFigures {
   std::map<double, double> percentiles = {};  ///< percentiles of the error; the keys are 50, 90, 99 and 99.9
 };
 
-/// Counts sign mismatches: samples at which the field f and the exact distance Φ have different signs. Mismatches are
-/// inevitable between the zero sets of f and Φ. They are defects only if |Φ| exceeds the field's error.
+/// Statistics of sign mismatches: samples at which the field f and the exact distance Φ have different signs.
+/// Mismatches are inevitable between the zero sets of f and Φ. They are defects only if |Φ| exceeds the field's error.
 struct SignFigures {
   std::size_t mismatches = 0;
   double farthest = 0;      ///< largest |Φ| of a mismatch
@@ -52,8 +52,8 @@ struct SampleFigures {
   GradientFigures gradient;
 };
 
-/// Compares the proven bounds of cells (`CellBound`) with the errors and gradients at samples. Cells that contain no
-/// sample do not count.
+/// Comparison of the proven bounds of cells (`CellBound`) with the errors and gradients at samples. Cells that contain
+/// no sample do not count.
 struct BoundFigures {
   std::size_t violations = 0;  ///< number of samples whose error or gradient exceeds the bound of their cell
   std::size_t cells = 0;
@@ -76,7 +76,7 @@ struct WorstPoint {
 struct VerifyOptions {
   std::size_t points = 1'000'000;     ///< number of samples, half uniform, half near the surface; at least 2
   std::uint64_t seed = 1;             ///< seed of the random points
-  double near = 0;                    ///< greatest distance of samples near the surface; 0: 1 % of its longest side
+  double near = 0;                    ///< greatest distance of near samples; 0: 1 % of the surface's longest side
   double band = 0;                    ///< greatest |Φ| of samples; 0: samples of the whole domain
   double signBound = 0;               ///< `SignFigures::threshold`; 0: ten times the RMS error of the near samples
   std::size_t worst = 10;             ///< number of points with the largest errors, each in a different cell

@@ -69,15 +69,16 @@ class Projection {
   int degree_;
 };
 
-/// Returns an L2 projection from samples at the tensor product of a one-dimensional rule. It contracts one axis after
-/// another.
+/// Returns an object that computes L2 projections from samples at the tensor product of a one-dimensional quadrature
+/// rule. It contracts the samples along one axis after another.
 std::unique_ptr<const Projection> productProjection(const QuadratureRule& axis, int degree);
 
-/// Returns an L2 projection from samples at the points of any cubature. It multiplies the samples by one matrix.
+/// Returns an object that computes L2 projections from samples at the points of any cubature. It multiplies the samples
+/// by one matrix.
 std::unique_ptr<const Projection> matrixProjection(const Cubature& cubature, int degree);
 
 /// Returns coefficients of degree p+1: the terms up to total degree p come from `lower`, the terms of total degree p+1
-/// from `raised`. The two fit together because raising the degree of an L2 projection does not change the lower
+/// from `raised`. The terms fit together because raising the degree of an L2 projection does not change the lower
 /// coefficients (Koschier et al. 2016, sec. 3.3).
 std::vector<double> appendTopDegree(std::span<const double> lower, std::span<const double> raised, int raisedDegree);
 

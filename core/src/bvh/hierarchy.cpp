@@ -17,8 +17,8 @@ namespace {
 
 using Corners = std::array<std::uint32_t, 3>;
 
-/// Lists of a tree's branches (inner nodes) and of its blocks of triangles, in depth-first order. `nodes[i]` is the
-/// branch that becomes node i; `blocks[i]` becomes block i.
+/// The branches (inner nodes) and the triangle blocks of a tree, both in depth-first order. `nodes[i]` is the branch
+/// that becomes node i; `blocks[i]` becomes block i.
 struct Numbered {
   std::vector<const Branch*> nodes;
   std::vector<std::array<std::uint32_t, kWidth>> children;  ///< `Node::child` of each node
@@ -111,9 +111,9 @@ class BoxFitter {
     return orientedBox.area() < alignedBox.area() ? orientedBox : alignedBox;
   }
 
-  /// Returns the axes of a box for the triangles of `child`: their mean normal, the direction of greatest
-  /// variance perpendicular to the normal, and the direction perpendicular to both. They are computed from at
-  /// most kSamples triangles.
+  /// Returns the axes of a box for the triangles of `child`: their mean normal, the direction of greatest variance
+  /// perpendicular to the normal, and the direction perpendicular to both. A sample of at most kSamples triangles
+  /// determines the axes.
   Eigen::Matrix3d axesOf(const Branch::Child& child) const {
     const std::uint32_t step = 1 + (child.end - child.begin) / kSamples;
     const Eigen::Vector4f reference = points_[triangles_[child.begin][0]];

@@ -14,8 +14,8 @@
 
 namespace hpsdf::bvh {
 
-/// Throws `Error` of kind `mesh` unless the mesh has at least one and at most `Hierarchy::kMaxTriangles`
-/// triangles, all their vertices exist, and all coordinates are finite.
+/// Throws `Error` of kind `mesh` unless the mesh has from 1 to `Hierarchy::kMaxTriangles` triangles, valid vertex
+/// indices, and finite coordinates.
 void requireSurface(const TriangleMesh& mesh);
 
 /// The triangle of a mesh that is nearest to a query point.
@@ -38,8 +38,8 @@ struct alignas(64) Node {
 constexpr std::uint32_t kBlockBit = 0x80000000;
 constexpr std::uint32_t kEmpty = 0x7fffffff;
 
-/// A number greater than every squared distance to the mesh that a search computes in single precision. The squared
-/// distances to the boxes of unused children are even greater than this number.
+/// The limit of squared distances when a search in single precision begins. All squared distances to the mesh are below
+/// this limit; the squared distances to the boxes of unused children are above it.
 constexpr float kOutOfReach = 1e33f;
 
 /// Up to four triangles in single precision and local coordinates, with the fields of `TriangleFrame` except the
@@ -61,8 +61,8 @@ struct alignas(32) Block {
   std::uint32_t count;
 };
 
-/// An array with uninitialised elements. The threads that fill it are the first to touch its memory pages.
-/// Therefore the system places each page near its thread, and no single thread has to clear the array first.
+/// An array with uninitialised elements. The threads that fill it are the first to touch its memory pages. The
+/// operating system therefore places each page in the memory closest to its thread. The array is not cleared first.
 template <typename T>
 class Array {
  public:
@@ -108,8 +108,8 @@ class Hierarchy {
     return blocks_[triangleRef / kWidth].first + triangleRef % kWidth;
   }
 
-  // The arrays of frames and triangles are in the order of the hierarchy, so that most triangles that are close
-  // to each other on the surface are close in memory.
+  // Frames and triangles are sorted in the order of the hierarchy. Therefore, neighbouring triangles on the surface are
+  // usually close in memory.
   std::span<const TriangleFrame> frames() const { return frames_; }
   std::span<const Triangle> triangles() const { return triangles_; }  ///< three indices into `vertices()` each
   std::span<const Vector3> vertices() const { return vertices_; }     ///< vertices in use, in the order of first use

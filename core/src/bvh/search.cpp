@@ -170,8 +170,8 @@ HWY_INLINE void settle(Search<Lanes>& s) {
   s.count = 0;
 }
 
-/// Finds the nearest triangles of points that are too far away for single precision: measures all triangles in
-/// double precision.
+/// Finds the nearest triangles of points that are too far away for single precision. Computes the distances to all
+/// triangles in double precision.
 template <int Lanes>
 void tryAll(Search<Lanes>& s) {
   const auto& blocks = s.hierarchy.blocks();
@@ -221,9 +221,8 @@ class Stack {
   std::size_t top_ = 0;
 };
 
-/// Returns the ranks of a node's four children by descending distance. `key` holds the distances; it is negative for
-/// children too far away to matter, which thus come last. All pairs of keys are compared without branches, because the
-/// processor would mispredict most branches.
+/// Returns the ranks 0 to 3 of a node's four children by descending distance. `key[i]` is the squared distance of child
+/// i, or -1 if the child is to be skipped. The comparisons need no branches, most of which would be mispredicted.
 HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   static_assert(kWidth == 4);
   const bool over10 = key[1] > key[0], over20 = key[2] > key[0], over30 = key[3] > key[0], over21 = key[2] > key[1],
@@ -231,8 +230,9 @@ HWY_INLINE std::array<int, kWidth> ranksOf(const float* key) {
   return {over10 + over20 + over30, !over10 + over21 + over31, !over20 + !over21 + over32, !over30 + !over31 + !over32};
 }
 
-/// Traverses the hierarchy. Visits the seed blocks first. Then pops nodes and blocks from the stack, and visits each
-/// one that may still contain the nearest triangle of a point. At the end, measures the remaining candidates.
+/// Traverses the hierarchy. Visits the blocks of the seed triangles first. Then pops nodes and blocks from the stack,
+/// and visits each one that may still contain the nearest triangle of a point. At the end, computes the exact distances
+/// of the remaining candidates.
 template <int Lanes, class Entry, class VisitNode, class VisitBlock, class InReach>
 HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode& visitNode,
                          const VisitBlock& visitBlock, const InReach& inReach) {
@@ -252,7 +252,8 @@ HWY_INLINE void traverse(Search<Lanes>& s, Stack<Entry>& stack, const VisitNode&
   }
 }
 
-/// A node or block on the stack, and a lower bound of the squared distance from the query point to its box.
+/// A node or block on the stack. `lower` is a lower bound of the squared distance from the query point to the box of
+/// the node or block.
 struct Pending {
   float lower;
   std::uint32_t child;
@@ -302,13 +303,14 @@ void runOne(Search<1>& s) {
 using PacketTag = hn::CappedTag<float, kPacket>;
 constexpr std::size_t kLanes = hn::MaxLanes(PacketTag());
 
-/// A node or block on the stack, and lower bounds of the squared distances from a packet's points to its box.
+/// A node or block on the stack. `lower` holds lower bounds of the squared distances from a packet's points to the box
+/// of the node or block.
 struct PendingOfPacket {
   alignas(32) float lower[kPacket];
   std::uint32_t child;
 };
 
-/// Returns the least among the lower bounds that do not exceed the limit of their lane, or -1 if all exceed it.
+/// Returns the least of the values `lower[i]` that are at most `limit[i]`, or -1 if there is none.
 HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limit) {
   const auto none = hn::Set(d, kOutOfReach);
   auto all = none;

@@ -44,12 +44,12 @@ using sign::Pseudonormals;
 using sign::WindingSign;
 
 constexpr int kLattice = 16;  // number of lattice points along each axis
-/// If two triangles are closer to each other than this, their distances from a point may round to the same number. The
-/// constant holds for a mesh that is scaled to coordinates of about 1.
+/// Distance between two triangles below which their distances from a point may round to the same number. It holds for a
+/// mesh that is scaled to coordinates of about 1.
 constexpr double kTooNear = 0x1p-44;
 /// Least length that the pseudonormal of an edge or vertex must have to decide a sign. At a sharp edge, the length is
-/// about the angle between the edge's two faces. The sign near the edge is the sign of a dot product that is half the
-/// square of this angle; the dot product must be far above rounding errors.
+/// about the angle between the edge's two faces. Near the edge, a dot product of half this angle's square decides the
+/// sign. This dot product must be far above rounding errors.
 constexpr double kSharp = 1e-6;
 
 /// Returns true if any point of a lattice around an open mesh is inside by the winding number. The lattice extends

@@ -99,8 +99,8 @@ template <auto kMember, typename M = Member<std::remove_reference_t<decltype(std
 constexpr Access member = {M::isChecked, [](const BuildOptions& options) { return M::get(options.*kMember); },
                            [](BuildOptions& options, Values numbers) { M::set(options.*kMember, numbers); }};
 
-/// Returns the value as the only number of a list, or an empty list if the value is 0, which stands for an unset
-/// setting.
+/// Returns a list with the value as its only number, or an empty list if the value is 0. The value 0 stands for an
+/// unset setting.
 Numbers unlessZero(double value) { return value == 0 ? Numbers{} : Numbers{value}; }
 
 /// Functions that read and change a member of `BuildOptions` that is unset if it is 0.

@@ -35,8 +35,8 @@ struct CellError {
   bool near = false;  ///< the cell may hold points within `NearFarError::nearDistance` of the surface
 };
 
-/// Sums over all leaves: of the weighted errors, and of the squared errors and volumes near the surface and far
-/// from it.
+/// Sums of errors and volumes over all leaves. Squared errors and volumes are summed separately for the leaves near the
+/// surface and the leaves far from it.
 struct ErrorTotals {
   double weighted = 0;
   double nearSquared = 0, nearVolume = 0;
@@ -52,7 +52,7 @@ struct ErrorTotals {
 /// The errors at which the construction ends. Lengths are in the units of the field.
 struct ErrorGoal {
   double weighted = 0;  ///< τ: bound of `ErrorTotals::weighted`; 0 if near and far errors are the goal
-  double nearSquare = 0, farSquare = 0;  ///< mean squared errors to reach near the surface and far from it; 0: none
+  double nearSquare = 0, farSquare = 0;  ///< goals of the mean squared errors near and far from the surface; 0: none
 
   bool byDistance() const { return nearSquare > 0; }
   bool nearReached(const ErrorTotals& totals) const { return totals.nearSquared <= nearSquare * totals.nearVolume; }

@@ -67,9 +67,9 @@ Groups groupsOf(std::span<const Triangle> triangles) {
   return groups;
 }
 
-/// Calls visit(set, directed edges) for each undirected edge of a chosen group of duplicates, that is, a group g with
-/// chosen[g] = 1. `set` is the index of the set that contains the first chosen group at the edge. The second argument
-/// lists all directed edges along the undirected edge.
+/// Calls visit(set, directed edges) for each undirected edge of the chosen groups of duplicates: the groups g with
+/// chosen[g] = 1. The first argument is the index of the set that contains the first chosen group at the edge. The
+/// second argument lists all directed edges along the undirected edge.
 template <typename Visit>
 void forEachEdgeOf(const Groups& groups, const std::vector<char>& chosen, DisjointSets& sets, const Visit& visit) {
   forEachEdge(groups.edges, [&](std::span<const DirectedEdge> edge) {
@@ -95,8 +95,8 @@ int direction(const DirectedEdge& edge) { return edge.rising ? 1 : -1; }
 
 /// Returns 1 for each group in a wall that two bodies share, else 0. A shared wall is a connected set of groups that
 /// have both orientations. Other triangles must adjoin the set, and equally many of them must run along each edge of
-/// the set in both directions. Duplicates among these other triangles are counted once or all; one of these two ways of
-/// counting must balance all edges.
+/// the set in both directions. It suffices if this holds with duplicates among the other triangles counted only once,
+/// or with all of them counted.
 std::vector<char> wallsOf(const Groups& groups) {
   std::vector<char> both(groups.all.size());
   for (std::size_t g = 0; g < both.size(); ++g) both[g] = groups.all[g].hasBothOrientations();

@@ -7,8 +7,8 @@
 namespace hpsdf::mesh {
 
 /// Returns true if the sign of a surface's signed volume reliably tells whether its faces are oriented outward.
-/// `volume` is the sum of the signed tetrahedra between the faces and an apex, and `box` is the surface's
-/// bounding box.
+/// `volume` is the sum of the signed volumes of the tetrahedra between the faces and an apex, and `box` is the
+/// surface's bounding box.
 ///
 /// For an open surface the volume depends on the apex, so that its sign is arbitrary for a nearly flat sheet. The
 /// sign of an open surface's volume is therefore trusted only if the volume is at least a hundredth of the box's

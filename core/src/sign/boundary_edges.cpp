@@ -19,7 +19,7 @@ constexpr double kCoarsestRatio = 0.25;  // greatest ratio of a cluster's radius
 
 double cube(double x) { return x * x * x; }
 
-/// Returns the vector ε_ijk M_jk of a matrix M. For M = a⊗b this vector is a × b.
+/// Returns the vector ε_ijk M_jk of a matrix M, where ε is the Levi-Civita symbol. For M = a⊗b this vector is a × b.
 Vector3 axial(const Eigen::Matrix3d& m) { return {m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0)}; }
 
 }  // namespace

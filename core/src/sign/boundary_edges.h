@@ -29,8 +29,8 @@ class BoundaryEdges {
  public:
   BoundaryEdges() = default;
   explicit BoundaryEdges(const bvh::Hierarchy& hierarchy);
-  /// `sides` are the directed edges of all triangles of the hierarchy, as `mesh::directedEdgesOf` returns
-  /// them.
+  /// Finds the unbalanced edges of the hierarchy's triangles. `sides` are the directed edges of all these triangles, as
+  /// `mesh::directedEdgesOf` returns them.
   BoundaryEdges(const bvh::Hierarchy& hierarchy, const std::vector<mesh::DirectedEdge>& sides);
 
   bool empty() const { return edges_.empty(); }
@@ -56,7 +56,7 @@ class BoundaryEdges {
     Vector3 from, to;
     double multiplicity;  ///< triangles that run from `from` to `to`, minus triangles that run back
 
-    /// Adds 4π times the contribution of this edge to the gradient, and to its bounds, at the point `local`.
+    /// Adds this edge's contributions to the gradient at the point `local` and to the gradient's bounds, each times 4π.
     void addTo(Gradient& sum, const Vector3& local) const;
   };
 

@@ -88,8 +88,8 @@ class VertexVisitor {
   std::span<const Triangle> triangles_;
   std::span<const Vector3> vertices_;
   std::vector<std::uint32_t>& nextSide_;
-  /// Keys that group the sides at the current vertex by edge when sorted. The high half of a key is the other
-  /// vertex of the side, the low half is the side's index in `numbers_`.
+  /// Sort keys that group the triangle sides at the current vertex by edge. The high half of a key is the other vertex
+  /// of the side, the low half is the side's index in `numbers_`.
   std::vector<std::uint64_t> sides_;
   std::vector<std::uint32_t> numbers_;  ///< numbers 3·slot + k of the sides at the current vertex
 };

@@ -20,13 +20,15 @@ namespace hpsdf::sign {
 ///
 ///   A/(4πR²) · (1/(1−t)² − 1 − 2t − 3t²)  with t = r/R and A = ∫ (|d|/r)³ dS.
 ///
-/// This bound holds because the integrand is a derivative of 1/|q − x|, whose term of degree l in d is a solid
-/// harmonic with a gradient of at most l |d|^(l−1)/R^(l+1). The series contains the terms up to l = 3.
+/// This bound holds because the integrand is a derivative of 1/|q − x|. In the Taylor series of 1/|q − x|, the term of
+/// degree l in d is a solid harmonic, and the length of its gradient is at most l |d|^(l−1)/R^(l+1). The series
+/// contains the terms up to l = 3.
 class WindingNumber {
  public:
   WindingNumber() = default;
 
-  /// Keeps a pointer to the hierarchy, which must not be moved or destroyed before this object.
+  /// Computes the moments of all clusters. Keeps a pointer to the hierarchy, which must not be moved or destroyed
+  /// before this object.
   explicit WindingNumber(const bvh::Hierarchy& hierarchy);
 
   struct Estimate {
@@ -47,8 +49,8 @@ class WindingNumber {
   /// Returns the winding number as the exact sum over all triangles, in the hierarchy's order.
   double exact(const Vector3& x) const;
 
-  /// Returns the estimate of the coarsest level whose error is at most `error` or whose estimate satisfies
-  /// `isEnough(estimate)`. If no level does, returns the exact sum.
+  /// Returns the first estimate, from the coarsest accuracy level on, whose error is at most `error` or that satisfies
+  /// `isEnough(estimate)`. If there is none, returns the exact sum.
   template <typename Enough>
   Estimate estimateWithin(const Vector3& x, double error, Enough isEnough) const {
     for (int level = 0; level < kLevels; ++level)

@@ -11,9 +11,9 @@
 namespace hpsdf::sign {
 namespace {
 
-constexpr std::size_t kBatch = 512;  // number of points in a batch; their signs may be derived from each other
-/// Tolerated error of a winding number that serves to compute the distance to a surface that closes a hole. A greater
-/// error would add noise to the distance, and the refinement of the field would try to resolve the noise.
+constexpr std::size_t kBatch = 512;  // number of points whose signs may be derived from each other
+/// Tolerated error of a winding number from which the distance to a surface that closes a hole is computed. A greater
+/// error would add noise to this distance, and the refinement of the field would try to resolve the noise.
 constexpr double kExact = 2e-3;
 /// Tolerated errors of the winding number's gradient, multiplied by the distance to the triangles. `kRoughChange`
 /// usually suffices to show that the surface which closes a hole is farther away than the triangles. `kExactChange` is
@@ -47,8 +47,8 @@ struct WindingSign::Sample {
   double derivative = 0;    ///< upper bound of the derivative of ∇w in any direction
   double edgeDistance = 0;  ///< lower bound of the distance to the unbalanced edges, at least `clearance`
 
-  /// Returns the sample for a point x with known distances, derived from this sample. If x is too far away,
-  /// the margin of the new sample is 0, which means unknown.
+  /// Derives the sample for a point x, whose distances are known, from this sample. If x is too far away, the new
+  /// sample has margin 0, which means that the side of x is unknown.
   Sample movedTo(const Vector3& x, double itsClearance, double itsDistance) const {
     const double squaredStep = (x - position).squaredNorm();
     if (!(squaredStep < 0.998 * clearance * clearance)) return {x, itsClearance, itsDistance, inside};
@@ -66,9 +66,9 @@ struct WindingSign::Sample {
   bool isCertain() const { return margin > 2 * kExact + 1.01 * gradient * distance; }
 
  private:
-  /// Returns the sample for a point x at the distance `step`. From x, every unbalanced edge is at least (1 −
-  /// step/edgeDistance) times as far away as from this sample. The bound of the gradient's derivative grows at most by
-  /// the inverse cube of this factor.
+  /// Returns the sample for a point x at the distance `step` from this sample. The distance to an unbalanced edge
+  /// shrinks at most by the factor 1 − step/edgeDistance. Therefore the bound of the gradient's derivative grows at
+  /// most by the inverse cube of this factor.
   Sample movedBy(double step, const Vector3& x, double itsClearance, double itsDistance) const {
     const double nearer = 1 - step / edgeDistance;
     const double changes = derivative / (nearer * nearer * nearer), steepest = gradient + changes * step;

@@ -8,8 +8,8 @@
 
 namespace hpsdf::sign {
 
-/// Returns a distance from a triangle at which a point in front of the triangle and a point behind it can be probed.
-/// The distance exceeds the rounding errors of coordinates in a mesh with the bounding box `box`.
+/// Returns a distance from a triangle at which points in front of the triangle and behind it can be tested. The
+/// distance exceeds the rounding errors of coordinates in a mesh with the bounding box `box`.
 double probeDistance(const Box& box);
 
 /// The sign of distances to a mesh by the winding number: a point is inside if its winding number is above
@@ -34,8 +34,8 @@ class WindingSign {
 
   /// Replaces unsigned distances by signed distances for a mesh in which some triangles do not count as surface.
   /// `distances` are the distances to the nearest triangle that counts, `clearances` the distances to the nearest of
-  /// all triangles. For points outside, the clearance is a valid distance, because other triangles hide those with the
-  /// inside on both sides.
+  /// all triangles. For points outside, the clearance is a valid distance, because other triangles hide the triangles
+  /// that have the inside on both sides.
   void applyTo(std::span<double> distances, std::span<const Vector3> points, std::span<const double> clearances) const;
 
   /// Returns true if the triangle in `slot` has the outside in front of its centroid and the inside behind it. At the

@@ -41,8 +41,8 @@ bool isWithinPatch(const mesh::Patches& patches, std::span<const mesh::DirectedE
          patches.patchOf[edge[0].face] == patches.patchOf[edge[1].face];
 }
 
-/// Among the directed edges along one undirected edge, cancels pairs of opposite directions in the same patch. Returns
-/// the remaining directed edges. The order of the faces determines which ones cancel.
+/// Returns the directed edges along one undirected edge that remain after pairs of opposite directions in the same
+/// patch cancel. The order of the faces determines which edges cancel.
 std::vector<mesh::DirectedEdge> unbalanced(const mesh::Patches& patches, std::span<const mesh::DirectedEdge> edge) {
   std::vector<mesh::DirectedEdge> sides(edge.begin(), edge.end());
   std::ranges::stable_sort(sides, {}, [&](const mesh::DirectedEdge& side) { return patches.patchOf[side.face]; });
@@ -107,7 +107,7 @@ std::vector<RadialFace> radialFaces(const TriangleMesh& mesh, const mesh::Patche
 using Wedge = std::array<RadialFace, 2>;
 
 /// Matches each face that begins a solid with the face that ends the same solid, like opening and closing parentheses,
-/// in two passes around the edge. Equally many faces must begin a solid and end one.
+/// in two passes around the edge. The number of faces that begin a solid must equal the number of faces that end one.
 std::vector<Wedge> wedgesOf(std::vector<RadialFace> faces, bool begins) {
   sortAround(faces, begins);
   std::vector<Wedge> wedges;

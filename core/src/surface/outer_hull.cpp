@@ -22,8 +22,8 @@
 namespace hpsdf::surface {
 namespace {
 
-/// The length of the smallest pieces of subdivided triangles, divided by the longest side of the mesh. It starts at
-/// `kFinest` and is doubled, up to `kCoarsest`, while there are too many pieces.
+/// Limits of the length of the smallest pieces of subdivided triangles, divided by the longest side of the mesh. This
+/// length starts at `kFinest` and is doubled, up to `kCoarsest`, while there are too many pieces.
 constexpr double kFinest = 1.0 / 512, kCoarsest = 1.0 / 32;
 /// Near holes of the mesh, the smallest pieces are longer by this factor than at intersections, because holes do
 /// not merit as many pieces.

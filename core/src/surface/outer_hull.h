@@ -13,7 +13,7 @@ namespace hpsdf::surface {
 /// such as the inner walls of bodies that overlap.
 ///
 /// A triangle that other triangles intersect is subdivided into quarters, recursively. The subdivision of a piece ends
-/// when no triangle intersects the piece, or when its length is at most 1/512 of the mesh's size. This limit is
+/// when no triangle intersects the piece, or when its longest side is at most 1/512 of the mesh's size. This limit is
 /// doubled, up to 1/32, while more than 250,000 additional pieces are needed. A piece that no triangle intersects is
 /// dropped if the points directly in front of its centroid and behind it are inside. An intersected piece is dropped if
 /// all test points in front of it, behind it and around it are inside. Near holes of the mesh, the winding number

@@ -97,7 +97,8 @@ struct FileKind {
 /// ends too early or contains an impossible value.
 class CheckedReader {
  public:
-  /// Throws `Error` (of the kind `file`) for a file that is missing, not a regular file, or cannot be opened.
+  /// Opens a file. Throws `Error` (of the kind `file`) for a file that is missing, not a regular file, or cannot be
+  /// opened.
   CheckedReader(const std::filesystem::path& file, const FileKind& kind);
 
   template <typename T>

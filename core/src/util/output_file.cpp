@@ -26,9 +26,9 @@ std::string reason(int error) { return std::generic_category().message(error); }
 
 constexpr std::string_view kTemporary = ".part-";  ///< followed in file names by a process id, "-" and a number
 
-/// Returns the text with which the names of all temporary files of `file` begin: the name of `file` and `kTemporary`.
-/// If the name of `file` is too long for a suffix, only its first characters (whole UTF-8 characters) and a hash of the
-/// name are used.
+/// Returns the common beginning of the names of all temporary files of `file`: the name of `file`, followed by
+/// `kTemporary`. A name that is too long for a suffix is replaced by its first characters (whole UTF-8 characters) and
+/// a hash of the name.
 std::string beginningOfTemporaries(const std::filesystem::path& file) {
   constexpr std::size_t kLongest = 100, kKept = 60;
   std::string name = file.filename();
@@ -87,8 +87,8 @@ bool isOurs(const std::filesystem::path& name) {
   });
 }
 
-/// If `name` is the name of a temporary file of `file`, returns the process id that `name` contains: the id of the
-/// process that wrote the temporary file. Returns std::nullopt for any other name.
+/// Returns the id of the process that wrote the temporary file `name`; the id is part of this name. Returns
+/// std::nullopt if `name` is not the name of a temporary file of `file`.
 std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
   const std::string text = name.filename(), before = beginningOfTemporaries(file);
   if (!text.starts_with(before)) return std::nullopt;

@@ -34,9 +34,8 @@ double sizeOf(const btCollisionObject& object) {
   return radius;
 }
 
-/// Returns the first sampled point, on a node's path during one step, whose distance from the field's body is
-/// less than `near`. Returns the end of the path if there is no such point. Sampling the path keeps nodes from
-/// passing through thin bodies.
+/// Samples the path of a soft body's node during one step. Returns the first sample at which the field is less than
+/// `near`, or the end of the path if there is none. The samples keep nodes from passing through thin bodies.
 Vector3 firstContact(const Field& field, const Vector3& from, const Vector3& to, double near) {
   // Choose the number of pieces of the path. A path whose length is NaN or too great gets the maximum number.
   const int pieces = int(std::min(double(kPieces - 1), (to - from).norm() / near)) + 1;

@@ -70,8 +70,8 @@ bool isFlat(const ViewBuffers& buffers, std::size_t i) {
 // therefore as crisp as the samples allow, and two neighbouring cells never both draw their common edge.
 class CellOutlines {
  public:
-  /// If `inScene` is true, outlines are drawn only on sections and planes of a scene. Otherwise the buffers
-  /// are those of a slice.
+  /// Prepares the outlines of the cells in the buffers. If `inScene` is true, only sections and planes of a
+  /// scene have outlines. Otherwise the buffers are those of a slice.
   CellOutlines(const ViewBuffers& buffers, const Sampling& sampling, bool inScene)
       : buffers_(buffers), inScene_(inScene), cell_(buffers.cell), width_(sampling.lineWidth * sampling.samples) {
     if (inScene) {
@@ -152,7 +152,7 @@ class Contours {
   /// The zero line is where the value equals `zero`.
   explicit Contours(const ViewBuffers& buffers, double zero = 0) : buffers_(buffers), zero_(zero) {}
 
-  /// Change of the value from one sample to the next, at least kFlattestSlope times the spacing of samples.
+  /// Returns the change of the value from one sample to the next, but at least kFlattestSlope · sampleSize.
   double slope(int x, int y, double sampleSize) const {
     const std::size_t i = index(x, y);
     const double dx = derivative(i, 1, x > 0, x + 1 < buffers_.width);

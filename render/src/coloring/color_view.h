@@ -12,8 +12,8 @@
 
 namespace hpsdf::render {
 
-/// The sampling of a view. Its buffers hold samples × samples points for each pixel of the picture. The colours of
-/// these points are averaged in linear light.
+/// The sampling of a view. The view's buffers hold samples × samples points for each pixel of the picture. The colours
+/// of these points are averaged in linear light.
 struct Sampling {
   int samples = 1;
   double lineWidth = 1;   ///< width of thin lines, pixels of the finished picture
@@ -29,12 +29,12 @@ SampleColor levelColors(const ViewBuffers& buffers, LevelMap map, ColorBy color)
 /// Returns a function that colours each sample by its value of a quantity.
 SampleColor quantityColors(std::vector<float> quantity, ColorScale scale);
 
-/// Colours the samples of a slice. Draws thin outlines of the cells over them, and the field's surface as a
-/// white line.
+/// Colours the samples of a slice. Draws thin outlines of the cells over the colours, and the field's surface
+/// as a white line.
 Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling);
 
-/// Colours the distances of a slice with the diverging colour map. Draws iso-lines over them, and a bold
-/// line at distance zero.
+/// Colours the distances of a slice with the diverging colour map. Draws iso-lines over the colours, and a
+/// bold line at distance zero.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
 /// Colours a view of a surface in front of the backdrop. The surface and boxes have soft shading and the colours that

@@ -43,8 +43,8 @@ struct Weighted {
   double value, weight;
 };
 
-/// The smallest and the largest positive value, without the lowest 1 % and the highest 0.1 % of the total weight.
-/// Otherwise a few outliers could stretch a colour scale so far that all other values have one colour.
+/// Returns the range of the positive values without outliers, which are the lowest 1 % and the highest 0.1 % of the
+/// total weight. Otherwise a few outliers could stretch a colour scale so far that all other values have one colour.
 std::array<double, 2> rangeWithoutOutliers(std::vector<Weighted> values) {
   std::erase_if(values, [](const Weighted& v) { return !(v.value > 0) || !std::isfinite(v.value); });
   if (values.empty()) return {0, 0};
@@ -60,8 +60,8 @@ std::array<double, 2> rangeWithoutOutliers(std::vector<Weighted> values) {
   return {quantile(0.01), quantile(0.999)};
 }
 
-/// Weights each cell's value by the volume of the cell, so that many tiny cells in a corner do not decide the
-/// scale.
+/// Returns the values of the cells, each weighted by the volume of its cell. Many tiny cells in a corner then do not
+/// decide the scale.
 std::vector<Weighted> weighted(const Field& field, const std::vector<double>& ofCells) {
   std::vector<Weighted> values;
   field.forEachCell([&](const Cell& cell) { values.push_back({ofCells[cell.id], cell.box.volume()}); });

@@ -104,8 +104,8 @@ class SurfaceShader {
   SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const std::function<LinearColor(std::size_t)>& color,
                 std::span<const LinearColor> bodies)
       : buffers_(buffers), frame_(buffers, camera), color_(color), bodies_(bodies) {
-    // Arrange the neighbours that ambient occlusion samples (the taps) in rings, each rotated against the next smaller
-    // one. All pixels use the same pattern, so that the picture has no noise.
+    // Arrange the taps (the neighbours of a pixel that ambient occlusion reads) in rings. Each ring is rotated against
+    // the next smaller one. All pixels use the same pattern, so that the picture has no noise.
     for (int ring = 1; ring <= kRings; ++ring)
       for (int i = 0; i < kTapsInRing; ++i) {
         const double angle = 2 * std::numbers::pi * (i + ring * 0.381966) / kTapsInRing;

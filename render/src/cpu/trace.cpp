@@ -9,11 +9,10 @@ namespace {
 
 // The following lengths are in units of the domain's diagonal unless noted. The shaders use the same kNudge, kPastFace
 // and kGrain.
-constexpr double kNudge = 1e-6;  // overshoot of a step across a cell's face; also the shortest step
-constexpr double kPastFace =
-    4e-7;  // distance behind a face at which a ray leaves a node, as a share of the domain's extent
+constexpr double kNudge = 1e-6;      // overshoot of a step across a cell's face; also the shortest step
+constexpr double kPastFace = 4e-7;   // lengthToExit ends this far behind a face, as a share of the domain's extent
 constexpr double kConverged = 1e-8;  // the refinement of a root ends when an iteration changes the root by less
-constexpr double kGrain = 0.25;  // step in a blend zone where no bound excludes a root, as a share of the blend extent
+constexpr double kGrain = 0.25;      // least length of a step in a blend zone, as a share of the blend extent
 constexpr int kStepLimit = 1 << 16;
 constexpr int kMostRefinements = 24;
 
@@ -61,7 +60,7 @@ Sample evaluate(const T* c, int degree, const Vector3& local) {
 Vector3 localFromFraction(const Vector3& fraction) { return 2 * fraction - Vector3::Ones(); }
 
 /// The length along the ray, in world units, from a point to just behind the face where the ray leaves the point's
-/// node. A length that ended on the face could, by rounding, keep a ray along the face in the same node at every step.
+/// node. If it ended on the face itself, rounding could keep a ray that grazes the face in the same node at every step.
 /// With a margin, the node is first shrunk on every side by `margin` times its edge length.
 double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3& grid, double margin = 0) {
   double exit = std::numeric_limits<double>::infinity();
@@ -74,8 +73,8 @@ double lengthToExit(const CellPoint& at, const Vector3& direction, const Vector3
   return exit;
 }
 
-/// Length of a step along the ray over which `height` is guaranteed to stay positive, if its slope along the ray is at
-/// least `steepest`.
+/// Returns the length of a step along the ray over which `height` is certain to stay positive. `steepest` is a lower
+/// bound of the height's slope along the ray.
 double certainlyAbove(double height, double steepest) {
   if (!(height > 0)) return 0;
   return steepest < 0 ? height / -steepest : std::numeric_limits<double>::infinity();
@@ -323,8 +322,8 @@ class TraceField::March {
   }
 
   /// Takes a step where the leaf's polynomial alone is the field. Second derivatives along the ray are at most `curve`.
-  /// Over a step of a given length, the height therefore sags below its chord by at most curve · length² / 8. It is
-  /// monotone if it falls by more than curve · length² / 2.
+  /// Over a step of a given length, the height therefore sags below its chord by at most curve · length² / 8. The
+  /// height is monotone if it falls by more than curve · length² / 2.
   std::optional<Hit> stepInLeaf(const LeafPoint& leaf) {
     const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
     const bool falling = leaf.shallowest < 0;  // the height decreases in the whole leaf: it has at most one root

@@ -1,8 +1,8 @@
 #pragma once
-// Lookup, evaluation and ray tracing of a field in double precision: the reference for tests of the shaders. Tests also
-// compare this code with the queries of `Field`. To share no faults with these queries, it has its own lookup and
-// evaluation. To share no faults with the shaders, its march uses fewer bounds than theirs and starts every ray where
-// the ray enters the domain.
+// Lookup, evaluation and ray tracing of a field in double precision. Tests compare this code with the shaders and with
+// the queries of `Field`. It has its own lookup and evaluation, to share no faults with these queries. Its march is
+// simpler than the march of the shaders, to share no faults with them: it uses fewer bounds, and every ray starts where
+// it enters the domain.
 
 #include <optional>
 #include <vector>

@@ -38,8 +38,8 @@ bool isSoftware(std::string_view renderer) {
   return false;
 }
 
-/// Names the OpenGL libraries that are missing, or returns an empty text. libepoxy ends the program if it does not find
-/// them.
+/// Returns a message that names the missing OpenGL library, or an empty text if none is missing. libepoxy ends the
+/// program if it does not find a library.
 std::string missingLibraries() {
   const auto opens = [](const char* name) {
     void* library = dlopen(name, RTLD_LAZY | RTLD_LOCAL);

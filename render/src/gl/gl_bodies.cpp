@@ -32,10 +32,10 @@ struct Instance {
   std::uint32_t body;
 };
 
-/// The transform from points relative to the eye to a tile's clip space. Rows run downwards, and nearer points have
-/// greater clip-space depths. In perspective, the clip-space depth of a point is the least visible depth divided by the
-/// point's depth, because floats represent this ratio near and far with the same relative precision. For parallel rays,
-/// the clip-space depth falls linearly with the distance.
+/// Returns the transform from points relative to the eye to a tile's clip space. Pixel rows run downwards, and nearer
+/// points have greater clip-space depths. In perspective, the clip-space depth of a point is the least visible depth
+/// divided by the point's depth, because floats represent this ratio near and far with the same relative precision. For
+/// parallel rays, the clip-space depth falls linearly with the distance.
 Eigen::Matrix4d targetFromEye(const Camera& camera, const Tile& tile, int width, int height, double farthest) {
   const bool parallel = camera.projection == Projection::orthographic;
   const Eigen::RowVector4d right =
@@ -223,7 +223,7 @@ class GlBodyRenderer final : public BodyRenderer {
                             nullptr, static_cast<GLsizei>(instances.size()));
   }
 
-  /// Writes the data of the triangle that pixel (x, y) shows, with normal and distance, to the buffers.
+  /// Writes the body, triangle, normal and distance of the point that pixel (x, y) shows to the buffers.
   void show(const Camera& camera, std::span<const Body> bodies, const BodyTriangle& seen, int x, int y,
             BodyBuffers& buffers) const {
     const Body& body = bodies[seen[0]];

@@ -36,7 +36,7 @@ void checkLog(GLint ok, const std::string& what, const GetLog& getLog, GLuint na
 GlShader compile(GLenum stage, std::initializer_list<std::string_view> files) {
   std::string text = "#version 450 core\n";
   int number = 1;
-  // Number the files in the order of the list, because the compiler's messages name lines as NUMBER:LINE.
+  // Give each file a number, in the order of the list. The compiler's messages name lines as NUMBER:LINE.
   for (const std::string_view file : files) {
     text += "#line 1 " + std::to_string(number++) + "\n";
     text += shaderText(file);

@@ -68,8 +68,8 @@ using GlVertexArray = GlObject<VertexArrayKind>;
 using GlQuery = GlObject<QueryKind>;
 using GlProgram = GlObject<ProgramKind>;
 
-/// Links a program of a vertex shader and a fragment shader, each concatenated from files in shaders/. Throws `Error`
-/// with the compiler's log.
+/// Compiles and links a program of a vertex shader and a fragment shader, each concatenated from files in shaders/.
+/// Throws `Error` with the compiler's log.
 GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
                         std::initializer_list<std::string_view> fragmentFiles);
 

@@ -210,7 +210,7 @@ class GlRenderer final : public Renderer {
 
  private:
   void setTile(const Tile& tile) const {
-    // Extend the viewport to whole blocks: a block is drawn as a point, and OpenGL omits points with centres outside.
+    // Extend the viewport to whole blocks. A block is drawn as a point, and OpenGL omits points with centres outside.
     const auto wholeBlocks = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
     glViewport(0, 0, wholeBlocks(tile.width), wholeBlocks(tile.height));
     for (const GlProgram* program : {&resources_->march, &resources_->hit}) {

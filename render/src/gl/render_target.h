@@ -44,8 +44,8 @@ void forEachPixel(const Tile& tile, const F& f) {
 /// A render target that holds one tile of a view at a time. Each pixel has integers, and either four floats or a depth.
 class RenderTarget {
  public:
-  /// `integers` is the OpenGL format of the integers, `other` is the format of the floats or depths. Throws `Error` if
-  /// the device cannot draw into these formats.
+  /// Makes a target for each tile of `part`. `integers` is the OpenGL format of the integers, `other` is the format of
+  /// the floats or depths. Throws `Error` if the device cannot draw into these formats.
   RenderTarget(const Tile& part, GLenum integers, GLenum other) : hasDepth_(other == GL_DEPTH_COMPONENT32F) {
     const int width = std::min(part.width, kTile), height = std::min(part.height, kTile);
     glTextureStorage2D(integers_.name(), 1, integers, width, height);
@@ -80,7 +80,7 @@ class RenderTarget {
     glBindTextureUnit(3, other_.name());
   }
 
-  /// Reads the integers or the floats, depending on the type of `out`, of all pixels of a tile.
+  /// Reads all pixels of a tile to `out`: the integers or the floats, depending on the type of `out`.
   template <typename Channel, std::size_t channels>
   void read(const Tile& tile, std::vector<std::array<Channel, channels>>& out) const {
     constexpr bool kIntegers = std::is_integral_v<Channel>;

@@ -31,8 +31,8 @@ static_assert(sizeof(Color) == 3, "rows of Color are handed to stb as packed byt
 constexpr int kSmallestSize = 16;
 constexpr int kLargestSize = 16384;
 constexpr int kMostSamples = 8;
-// Limits the memory of a picture. Each sample of a surface takes 27 bytes in the buffers, and 27 more while it is
-// rendered. Bodies add 28 bytes per sample, and 12 more while they are drawn.
+// Greatest number of samples of a picture, to limit its memory. Each sample of a surface takes 27 bytes in the buffers,
+// and 27 more while it is rendered. Bodies add 28 bytes per sample, and 12 more while they are drawn.
 constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
 std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }

@@ -22,9 +22,9 @@ struct Arrow {
   std::function<float(double t, int x, int y)> strength = {};
 };
 
-/// Arrows that show the gradient, projected onto the plane of the slice. They are centred on every `spacing`-th
-/// pixel along both axes, where the pixel shows the field. No arrow is longer than the spacing, so that arrows
-/// do not overlap.
+/// Arrows that show the gradient, projected onto the plane of the slice. An arrow is centred on every `spacing`-th
+/// pixel along both axes if this pixel shows the field. No arrow is longer than the spacing, so that arrows do not
+/// overlap.
 std::vector<Arrow> gradientArrows(const Field& field, const SliceView& view, const ViewBuffers& buffers, int samples,
                                   int spacing);
 

@@ -8,7 +8,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// Marks the samples that are at most `radius` samples away from a crack along both axes.
+/// Returns 1 for each sample that is at most `radius` samples away from a crack along both axes, else 0.
 std::vector<std::uint8_t> dilated(const ViewBuffers& buffers, int radius) {
   const int width = buffers.width, height = buffers.height;
   std::vector<std::uint8_t> result(buffers.crack.size());

@@ -17,7 +17,7 @@ namespace {
 constexpr Color kMarkCasing = {24, 22, 34};
 constexpr float kMarkCasingStrength = 0.7F;
 constexpr float kHiddenMark =
-    0.7F;  // opacity of hidden marks; dashes show that they are hidden, so that they can keep strong hues
+    0.7F;  // opacity of hidden marks; it can be high, because dashes show that the marks are hidden
 // The following lengths of a mark's parts are in multiples of the width of a thin line.
 constexpr double kDash = 4;  // length of a dash, and of the gap after it
 constexpr double kLineWidth = 1.8;

@@ -34,7 +34,7 @@ std::string describeLevels(const std::map<int, double>& shares);
 /// A number of bytes as text, as in "12.3 kB".
 std::string describeBytes(std::size_t bytes);
 
-/// The greatest of the values that are not NaN as text, as in "up to 0.01".
+/// Returns the greatest value as text, as in "up to 0.01". Ignores values that are NaN.
 std::string describeGreatest(const std::vector<float>& values);
 
 }  // namespace hpsdf::render

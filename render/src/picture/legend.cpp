@@ -11,8 +11,8 @@ namespace {
 
 constexpr Color kShareBar = {206, 209, 218};
 
-// The text size for a picture: 15 pixels at 1280 × 720. It grows in proportion to larger pictures, and shrinks less
-// than in proportion to smaller ones.
+// The text size for a picture: 15 pixels at 1280 × 720. It is proportional to the size of larger pictures, and shrinks
+// less than in proportion for smaller ones.
 double textSizeFor(int width, int height) {
   const double size = std::min<double>(height, width * 9.0 / 16);
   return size >= 720 ? 15 * size / 720 : std::max(9.0, 15 - (720 - size) * 5 / 480);
@@ -108,8 +108,8 @@ void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, dou
                            middle + half, kShareBar});
 }
 
-// Adds one row per level where rows are too low for a text in each. The swatches touch, and only some of them have the
-// level's number beside them.
+// Adds one row per level, for a legend of so many levels that the rows are too low for a text in each row. The swatches
+// touch, and only some of them have the level's number beside them.
 void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<LevelRow>& rows, const LevelMap& map) {
   const double left = std::round(column.left), swatch = std::round(0.35 * column.width());
   const double size = std::min(kSmallestText + 1, 1.1 * kSmallestText);

@@ -30,7 +30,7 @@ constexpr Color kBorder = {176, 179, 190};
 struct Series {
   std::vector<std::string> names;  // the longest first; the legend shows the first that fits
   Color color;
-  bool broad = false;  // drawn as a broad band, which stays visible under a curve of equal values
+  bool broad = false;  // drawn as a broad line, which stays visible under a curve of equal values
   std::vector<Points> curves;
 };
 
@@ -181,8 +181,8 @@ class Plotter {
       for (PixelRect& row : *rows) row.x0 = left_, row.x1 = right_;
   }
 
-  // Stacks charts and bands from top to bottom. If the charts would be too low to read, first the bands are left out,
-  // then charts from the last one on.
+  // Stacks charts and bands from top to bottom. If the charts would be too low to read, omits the bands. If that is not
+  // enough, also omits charts, the last one first.
   void layOutRows(int top, int bottom) {
     const int gap = std::max(1, int(std::lround(0.9 * em_))), bandGap = std::max(1, int(std::lround(0.35 * em_)));
     const int band = int(std::lround(1.5 * em_)), least = int(std::lround(2.6 * em_));

@@ -168,7 +168,7 @@ std::vector<LinearColor> materialsOf(const ShownBodies& shown) {
   return materials;
 }
 
-/// Adds the caption's details about the contents of a surface's picture, except its colours and marks.
+/// Adds details to the caption of a surface's picture: about bodies, plane, drawn cells, camera and clipping plane.
 void addSceneDetails(const SurfacePicture& picture, std::vector<std::string>& details) {
   if (picture.bodies.renderer) {
     if (!picture.bodies.note.empty()) details.push_back(picture.bodies.note);

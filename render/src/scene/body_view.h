@@ -12,8 +12,8 @@ void checkBodyView(const Camera& camera, int width, int height);
 /// lies in front of the eye.
 double farthestDepth(const Camera& camera, const Box& box);
 
-/// The least visible depth, as `BodyRenderer::view` defines it, if the farthest depth of the bodies is
-/// `farthest`.
+/// The depth below which a view of bodies shows nothing (see `BodyRenderer::view`). `farthest` is the greatest depth of
+/// the bodies.
 double leastDepth(const Camera& camera, double farthest);
 
 /// Buffers in which no pixel shows a body.

@@ -118,7 +118,7 @@ class EdgePainter {
     return middle + half > nearDepth_ && pixelsAt(box.sizes().maxCoeff(), middle - half) > kGoneLength * width_;
   }
 
-  /// Projects the part of a segment in front of the eye to the picture, and sets the strength of its line.
+  /// Projects a segment to the picture, without the part behind the eye, and sets the strength of its line.
   Edge projected(Segment segment) const {
     const auto toPicture = [&](const Vector3& p) { return project(camera_, p, buffers_.width, buffers_.height); };
     Edge edge{segment, toPicture(segment.a), toPicture(segment.b)};

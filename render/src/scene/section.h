@@ -12,7 +12,7 @@ namespace hpsdf::render {
 void addSection(const Field& field, const SurfaceView& view, ViewBuffers& buffers);
 
 /// Shows the section of the domain with the plane of the slice `plane`, in pixels where this section is nearer to the
-/// eye than the point that the buffers show. Leaves out the part that the view's clipping plane removes. Each point of
+/// eye than the point that the buffers show. Omits the part that the view's clipping plane removes. Each point of
 /// the section shows the same cell as in a picture of the slice.
 void addPlane(const Field& field, const SurfaceView& view, const SliceView& plane, ViewBuffers& buffers);
 

@@ -10,7 +10,7 @@
 namespace hpsdf::render {
 namespace {
 
-/// A node and its box. The origin is the domain's lower corner, the unit is the edge of the smallest possible cell.
+/// A node and its box. Coordinates are from the domain's lower corner, in edges of the smallest possible cell.
 struct NodeBox {
   std::uint32_t node;
   int depth;
@@ -111,8 +111,8 @@ class Polynomial {
     return sum;
   }
 
-  /// An upper bound of the length of the polynomial's gradient on the box. The gradient is with respect to coordinates
-  /// in which one unit along an axis is `perUnit` units of the box's local coordinates.
+  /// Returns an upper bound, on the box, of the length of the polynomial's gradient with respect to other coordinates.
+  /// `perUnit` holds, for each axis, the derivative of the box's local coordinate with respect to the other coordinate.
   double gradientBound(const Vector3& perUnit) {
     Vector3 gradient = Vector3::Zero();
     for (int i = 0; i < size_; ++i)

@@ -43,7 +43,7 @@ struct SliceGeometry {
 /// The cells that a section shows are looked up at the same distance behind the plane.
 constexpr double kClipNudge = 1e-6;
 
-/// Returns true if the camera looks at a clipping plane from the side of greater coordinates, which the plane removes.
+/// Returns true if the eye is on a clipping plane's side of greater coordinates. The plane then removes this side.
 bool eyeAbove(const Camera& camera, const ClipPlane& clip);
 
 /// The rays of a camera. For pixel (x, y) of w × h pixels, let across = right · (2x+1−w) · stepX + up · (h−2y−1) ·

@@ -20,8 +20,8 @@ Field scaled(const Field& field, double factor) {
   return Field(std::move(data));
 }
 
-/// Passes views on to the renderer `inner`, whose unit of length is `unit` world units, and converts the buffers of
-/// `inner` to world units.
+/// Renders with the renderer `inner`, whose unit of length is `unit` world units. Views are converted to this unit for
+/// `inner`, and its buffers are converted back to world units.
 class ScaledRenderer final : public Renderer {
  public:
   ScaledRenderer(std::unique_ptr<Renderer> inner, double unit) : inner_(std::move(inner)), unit_(unit) {}

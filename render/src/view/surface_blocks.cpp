@@ -66,7 +66,7 @@ class BlockFinder {
     return 0.5 * (double(bounds_[node].lo) + bounds_[node].hi) >= offset_ ? 1 : -1;
   }
 
-  /// Marks the blocks whose rays may reach parts of a node in which the sign of f − offset may differ from `side_`.
+  /// Marks the blocks whose rays may reach parts of a node where f − offset may have another sign than `side_`.
   void markBlocks(std::uint32_t node, const Vector3& lo, double size) {
     const bool above = bounds_[node].lo > offset_;
     const bool below = bounds_[node].hi < offset_;

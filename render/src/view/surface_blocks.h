@@ -13,7 +13,7 @@ constexpr int kBlock = 8;  // pixels along each side of a block
 
 struct Block {
   float x, y;   ///< upper left pixel of the block
-  float start;  ///< distance along all rays of the block, world units, up to which f − offset has the sign `side`
+  float start;  ///< on all rays of the block, f − offset has the sign `side` up to this distance; world units
 };
 
 struct SurfaceBlocks {

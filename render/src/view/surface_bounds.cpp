@@ -47,7 +47,7 @@ SurfaceBounds leafBounds(const T* c, int degree) {
   const auto widened = [&](double bound) { return static_cast<float>(bound * (1 + kFloatRounding) + rounding); };
   const double mean = c[0];
   const double range = sum - std::abs(mean) + rounding;
-  // Bound the spectral norm of the Hessian by the Frobenius norm of the matrix of bounds of its entries.
+  // Bound the Hessian's spectral norm by the Frobenius norm of a matrix of upper bounds of the Hessian's entries.
   const double hessian = std::sqrt(pure.squaredNorm() + 2 * mixed.squaredNorm());
   return {.lo = static_cast<float>(mean - range),
           .hi = static_cast<float>(mean + range),

@@ -113,8 +113,8 @@ SliceView planeSlice(const Box& domain, const Vector3& point, const Vector3& nor
     return Error("the slice plane through (" + text(point.x()) + ", " + text(point.y()) + ", " + text(point.z()) +
                  ") misses the domain: give a point within it");
   };
-  // Treat a plane that is perpendicular to an axis without rounding, so that a plane on a face between cells stays on
-  // it.
+  // Treat a plane perpendicular to an axis separately, without rounding errors. If it lies on faces between cells, it
+  // stays exactly on these faces.
   for (int axis = 0; axis < 3; ++axis) {
     if (normal[(axis + 1) % 3] != 0 || normal[(axis + 2) % 3] != 0) continue;
     if (!(point[axis] >= domain.min()[axis] && point[axis] <= domain.max()[axis])) throw misses();

@@ -46,7 +46,7 @@ struct BuildSetting {
   std::vector<double> fallback = {};         ///< default of a setting that `BuildOptions` leaves unset
   Ending ending = Ending::none;
   std::string_view exclusive = {};  ///< name of a setting that cannot be given together with this one
-  std::string_view owner = {};      ///< setting and word on which the effect of this setting depends: "continuity weak"
+  std::string_view owner = {};      ///< the option without which this setting has no effect, such as "continuity weak"
   bool (*hasOwner)(const BuildOptions&) = nullptr;
   int storedAt = 0;           ///< position among the settings in a field's file; 0: not stored
   bool decides = true;        ///< the finished field depends on the value of this setting
@@ -72,7 +72,8 @@ std::string settingText(const BuildSetting& setting, const BuildOptions& options
 /// Returns the default value of a setting, as users write it.
 std::string defaultText(const BuildSetting& setting);
 
-/// Returns a copy of `options`. Settings that field files do not store get their values from a default `FieldMetadata`.
+/// Returns a copy of `options` in which every setting that field files do not store has its value from a default
+/// `FieldMetadata`.
 BuildOptions storedSettings(const BuildOptions& options);
 
 /// Returns options with which `build` makes a field like `field`. These options combine the settings in the field's

@@ -26,10 +26,9 @@ using GridResolution = std::array<std::uint32_t, 3>;
 struct CubicGrid {
   Box domain;
   GridResolution resolution = {1, 1, 1};
-  /// Distances at the nodes in the field's units, negative inside. The corners of the cells come first, x
-  /// fastest; then follow the nodes on edges along x, along y and along z. Among the edges along axis a, the
-  /// coordinate a is fastest, then a+1, then a+2 (cyclic). The two nodes of an edge are adjacent; the node with
-  /// the lower coordinate is first.
+  /// Distances at the nodes in the field's units, negative inside. The corners of the cells come first, x fastest; then
+  /// follow the nodes on edges along x, along y and along z. Among the edges along axis a, coordinate a varies fastest,
+  /// then a+1, then a+2 (cyclic). The two nodes of an edge are adjacent; the node with the lower coordinate is first.
   std::vector<double> nodes;
 
   Vector3 cellSize() const {

@@ -28,8 +28,9 @@ struct FieldMetadata {
   /// std::nullopt if the number is unknown, as in files of version 1.
   std::optional<std::uint64_t> steps = {};
   double roundingRms = 0;  ///< RMS change of the field by rounding its coefficients to float; 0 for double
-  /// Greatest error |f − Φ| that the construction found at points in the cells, without blending; 0 if no maximum error
-  /// was asked for. The effect of rounding is included if it exceeds a hundredth of the maximum error.
+  /// Estimate of the greatest error |f − Φ| of the field f without blending, from points that the construction probed
+  /// in the cells; 0 if no maximum error was asked for. The effect of rounding is included if it exceeds a hundredth of
+  /// the maximum error.
   double measuredError = 0;
 
   /// Returns the estimated RMS error of the field over the domain, at the end of the construction: √(ε·(L/2)^5 / V)
@@ -79,11 +80,11 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
 
-/// Packs the blend extents at the six faces of a leaf into 32 bits. Across a face, the leaf's blending weight grows
-/// from 0 outside the leaf to 1 inside; the blend extent is the distance from the face at which it reaches these
-/// values. The blend extent is `FieldData::blend` times the edge of the smallest leaf that touches the face. Each face
-/// takes 5 bits, which hold the depth of this smallest leaf, or `kDomainFace` if the face lies on the boundary of the
-/// domain.
+/// Packs the blend extents at the six faces of a leaf into 32 bits. Near a face, the leaf's blending weight grows from
+/// 0 outside the leaf to 1 inside. The blend extent is the distance on either side of the face up to which the weight
+/// is between 0 and 1. The blend extent is `FieldData::blend` times the edge of the smallest leaf that touches the
+/// face. Each face takes 5 bits: the depth of this smallest leaf, or `kDomainFace` if the face lies on the boundary of
+/// the domain.
 namespace blend_extent {
 constexpr int kDomainFace = 31;
 constexpr std::uint32_t packed(int axis, bool upper, int depth) {

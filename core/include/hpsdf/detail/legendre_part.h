@@ -10,8 +10,8 @@
 
 namespace hpsdf::detail {
 
-/// Coefficients that express Legendre polynomials of shifted and scaled arguments: L_i(shift + scale·t) = Σ_a row[i][a]
-/// L_a(t), with a ≤ i. Elements with i above the highest degree needed are not set.
+/// The coefficients row[i][a] that express Legendre polynomials L_i of a shifted and scaled argument: for each i,
+/// L_i(shift + scale·t) = Σ_a row[i][a] L_a(t) over a ≤ i. Rows above the highest degree needed are not set.
 using LegendreRows = std::array<std::array<double, kMaxDegree + 2>, kMaxDegree + 2>;
 
 inline LegendreRows legendreOfPart(double shift, double scale, int degree) {

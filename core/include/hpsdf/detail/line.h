@@ -45,9 +45,9 @@ struct Line {
 };
 
 /// Samples a field at `count` ≥ 2 evenly spaced points of a segment, including its ends, and at both ends of every
-/// piece of the segment. Within the domain, a sample holds the limits of value and gradient from the leaf that contains
-/// its piece. Outside the domain, it holds the values of the field's continuation. Throws `Error` as `piecesAlong`
-/// does.
+/// piece of the segment. Within the domain, the value and the gradient of a sample are limits from the leaf that
+/// contains the sample's piece of the segment. Outside the domain, they come from the field's continuation. Throws
+/// `Error` as `piecesAlong` does.
 Line sampleLine(const Field& field, const Vector3& from, const Vector3& to, int count);
 
 /// The jump of a field f at the point where a segment crosses from one leaf to the next leaf.

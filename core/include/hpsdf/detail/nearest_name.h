@@ -57,8 +57,8 @@ inline std::string nearestName(std::string_view wanted, std::span<const std::str
   return best;
 }
 
-/// Returns the end of an error message about the unknown name `wanted`. If a known name NAME is near, this is
-/// "did you mean 'NAME'?" with `prefix` before NAME; else it is `otherwise`.
+/// Returns the end of an error message about the unknown name `wanted`: "did you mean 'NAME'?", where NAME is `prefix`
+/// and the most similar known name, or `otherwise` if no known name is similar.
 inline std::string didYouMean(std::string_view wanted, std::span<const std::string> known, std::string_view otherwise,
                               std::string_view prefix = "") {
   const std::string name = nearestName(wanted, known);

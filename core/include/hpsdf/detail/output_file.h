@@ -13,8 +13,8 @@ namespace hpsdf {
 /// destructor removes the temporary file.
 class OutputFile {
  public:
-  /// Throws `Error` (of the kind `file`) if the folder of `file` does not exist or cannot be written, or if `file`
-  /// exists and is not a regular file.
+  /// Creates the temporary file. Throws `Error` (of the kind `file`) if the folder of `file` does not exist or cannot
+  /// be written, or if `file` exists and is not a regular file.
   explicit OutputFile(const std::filesystem::path& file);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;

@@ -169,8 +169,8 @@ class Growth {
     }
   }
 
-  /// Takes the leaves with the greatest errors from the queue. Puts a leaf near the surface aside if the near
-  /// error has reached its goal, and a leaf far from the surface if the far error has.
+  /// Takes the leaves with the greatest errors from the queue. Sets aside the leaves near the surface if the near error
+  /// has reached its goal, and the leaves far from the surface if the far error has reached its goal.
   std::vector<std::uint32_t> worstLeaves() {
     constexpr std::size_t kRound = 32;  // few leaves at a time, because the paper refines cells one by one
     std::vector<std::uint32_t> worst;
@@ -218,8 +218,8 @@ class Growth {
     return setup_.goal.byDistance() && (cell.near ? goal.nearReached(state_.totals) : goal.farReached(state_.totals));
   }
 
-  /// Moves leaves that were put aside back to the queue: near leaves if the near error no longer meets its goal, and
-  /// far leaves if the far error no longer does. Returns false if the queue stays empty.
+  /// Puts leaves that were set aside back into the queue: near leaves if the near error no longer meets its goal, and
+  /// far leaves if the far error no longer meets its goal. Returns false if the queue stays empty.
   bool enqueueDeferred() {
     for (const std::uint32_t leaf : std::exchange(state_.deferred, {})) {
       if (isExactEnough(state_.tree.nodes[leaf].fit.error))

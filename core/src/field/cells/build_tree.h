@@ -14,8 +14,8 @@ struct BuildNode {
   std::uint32_t firstChild = 0;  ///< 0 for a leaf
   std::uint32_t depth = 0;
   std::array<std::uint32_t, 3> cellIndex{};  ///< position, in cells of its depth, from the domain's lower corner
-  /// The polynomial of a leaf with its error. If pruning follows, an internal node also has a fit, the one that
-  /// it would have as a leaf. Otherwise the fit of an internal node is empty.
+  /// The polynomial of a leaf with its error. If pruning follows, an internal node also has the polynomial and the
+  /// error that it would have as a leaf. Otherwise the fit of an internal node is empty.
   Fit fit;
 };
 

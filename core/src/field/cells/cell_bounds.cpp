@@ -53,8 +53,8 @@ struct Halves {
   LegendreRows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
 };
 
-/// Adds the term coefficient · L_i(x) L_j(y) L_k(z) of Legendre polynomials to a part, with (i, j, k) = `order`. The
-/// bounds use |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
+/// Adds the term coefficient · L_i(x) L_j(y) L_k(z) to a part. L_i is the Legendre polynomial of degree i; `order`
+/// holds i, j and k. The bounds use |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
 void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
   const int total = order[0] + order[1] + order[2];
   if (total == 0) part.value = coefficient;

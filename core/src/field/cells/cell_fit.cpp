@@ -139,13 +139,13 @@ double CellFitter::squaredError(const Fit& fit, double meanSquare) const {
 
   // The paper's estimate is the squared norm of the coefficients of the top degree. If Φ is even or odd about the
   // cell's centre, the coefficients of every other degree vanish, and the estimate may vanish too. The residual, ∫Φ²
-  // minus the squared norm of the fit, then replaces the estimate. It must be far greater than the estimate, so that
-  // the paper's estimate decides everywhere else.
+  // minus the squared norm of the fit, replaces the estimate where it is far greater. Everywhere else the paper's
+  // estimate decides.
   const double shell = basis::topDegreeError(fit.coefficients.data(), fit.degree, 1.0);
   return residual > 1000 * shell && residual > 1e-12 * meanSquare ? residual : shell;
 }
 
-/// Sets the error of a fit from `squared`, the squared error per volume.
+/// Sets the error of a fit from `squared`, its mean squared error: the integral divided by the cell's volume.
 void CellFitter::rate(Fit& fit, double squared, const Box& cell) const {
   const double mean = fit.coefficients[0];  // the constant coefficient is the mean
   if (fit.outsideBand) return;

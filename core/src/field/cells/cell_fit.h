@@ -48,8 +48,9 @@ enum class Refinement : std::uint8_t { degree, octree, either };
 /// Samples the exact distance and fits polynomials to it. Thread-safe: cells are fitted in parallel.
 class CellFitter {
  public:
-  /// Keeps references to its arguments. `nearness` may be changed between two fits. A cell counts as near the surface
-  /// if the mean of the field in the cell is in magnitude at most `nearDistance` plus half of the cell's diagonal.
+  /// Makes a fitter that keeps references to the objects given. `nearness` may be changed between two fits. A cell
+  /// counts as near the surface if the mean of the field in the cell is in magnitude at most `nearDistance` plus half
+  /// of the cell's diagonal.
   CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
              double nearDistance, const Progress& progress);
 

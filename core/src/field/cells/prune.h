@@ -19,9 +19,10 @@ struct PruneLimits {
 };
 
 /// Prunes a tree: turns internal nodes into leaves and lowers degrees. The pruned tree minimizes error + λ·bytes, as in
-/// classification and source coding (Breiman et al. 1984; Chou, Lookabaugh, Gray 1989). λ is the greatest value with
-/// which the tree keeps the error goal. The error of a node is the residual of its projection at the chosen degree: ∫Φ²
-/// minus the projection's squared norm. `Fit::cached` of every node must hold the projection.
+/// classification and source coding (Breiman et al. 1984; Chou, Lookabaugh, Gray 1989). λ is the greatest value that
+/// keeps the error goal or, if greater, the least value that keeps the limit of bytes. The error of a node is the
+/// residual of its projection at the chosen degree: ∫Φ² minus the projection's squared norm. `Fit::cached` of every
+/// node must hold the projection.
 void prune(BuildTree& tree, const Nearness& nearness, const PruneLimits& limits);
 
 }  // namespace hpsdf::detail

@@ -40,7 +40,8 @@ void report(const Progress& progress, double fraction) {
 }
 
 /// Solves (M + λI)d = −Mx₀ by conjugate gradients with the matrix's diagonal as preconditioner. x₀ holds the
-/// coefficients of a field, d is their change, M of `FaceCoupling` measures jumps, and λ is the weight of the change.
+/// coefficients of a field, and d is their change. The matrix M measures jumps, see `FaceCoupling`. λ is the weight of
+/// the change.
 class ConjugateGradients {
  public:
   ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
@@ -121,8 +122,9 @@ class ConjugateGradients {
   std::vector<double> change_, residual_, direction_, product_;
 };
 
-/// Returns the weighted squared change Σ_e κ_e ∫(f − f₀)² of a field from f₀ to f. The cells e are all cells, or those
-/// in the narrow band. κ_e weights a cell by its nearness to the surface. The unit is distance² · volume.
+/// Returns the weighted squared change Σ_e κ_e ∫(f − f₀)² of a field from f₀ to f. The sum is over all cells e or, for
+/// a field with a narrow band, over the cells in the band. The weight κ_e depends on the cell's nearness to the
+/// surface. The unit is distance² · volume.
 double weightedChange(const FieldData& field, std::span<const double> x0, std::span<const double> change) {
   const BuildOptions& settings = field.metadata.settings;
   const double volume = field.domain.sizes().prod();

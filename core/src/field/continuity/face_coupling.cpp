@@ -17,16 +17,15 @@ namespace {
 
 constexpr std::size_t kLeavesPerTask = 256;
 
-/// Returns the number of coefficients of a polynomial on a face, that is, in two variables, of the given total degree.
+/// Returns the number of coefficients of a polynomial in two variables with the given total degree.
 constexpr std::size_t faceCoefficientCount(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
-/// Returns the index, among the coefficients on a face, of the product of Legendre polynomials of degrees a and b
-/// along the two axes of the face.
+/// Returns the index of a coefficient on a face. Its basis function is the product of the Legendre polynomials of
+/// degrees a and b along the face's two axes.
 constexpr std::size_t faceIndex(int a, int b) { return std::size_t(a + b) * (a + b + 1) / 2 + b; }
 constexpr std::size_t kMaxFaceCoefficients = faceCoefficientCount(kMaxDegree);
 
-/// Restricts a polynomial on a face to a quarter of the face. In one dimension: on the lower or upper half of an
-/// interval, the interval's orthonormal polynomial i equals Σ_a share_[half][i][a] times the half's orthonormal
-/// polynomial a.
+/// Restricts a polynomial on a face to a quarter of the face. In one dimension, P_i = Σ_a share_[h][i][a] Q_a on half h
+/// of an interval. P_i and Q_a are the orthonormal Legendre polynomials of the interval and of the half.
 class QuarterRestriction {
  public:
   QuarterRestriction() {
@@ -108,8 +107,8 @@ struct KnownTrace {
     for (std::size_t a = 0; a < sums.size(); ++a) face[a] = sums[a];
   }
 
-  /// Multiplies the coefficients `face` by the transpose of the linear map in `apply` and by `scale`, and adds
-  /// the result to `out`.
+  /// Adds scale·Tᵀ·face to `out`. The matrix T maps the coefficients of a leaf to the coefficients on a face, see
+  /// `apply`.
   static void addTransposed(const double* ends, double scale, const double* face, double* out) {
     std::array<double, faceCoefficientCount(P)> scaled;
     for (std::size_t a = 0; a < scaled.size(); ++a) scaled[a] = scale * face[a];
@@ -266,8 +265,8 @@ void FaceCoupling::restrictToFace(const Link& link, std::uint32_t leaf, int side
   for (std::size_t c = 0; c < trace.faceIndex.size(); ++c) face[trace.faceIndex[c]] += trace.factor[side][c] * x[c];
 }
 
-/// Multiplies `face` by the transpose of the linear map in `restrictToFace` and by `scale`, and adds the result
-/// to the leaf's part of `out`.
+/// Adds scale·Tᵀ·face to the leaf's part of `out`. The matrix T maps the coefficients of the leaf to the coefficients
+/// on the face, see `restrictToFace`.
 void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, double scale, const double* face,
                                double* out) const {
   out += start_[leaf];
@@ -279,10 +278,10 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
     out[c] += scale * trace.factor[side][c] * face[trace.faceIndex[c]];
 }
 
-/// Computes the jump across the face of link n: the difference of the two leaves' polynomials, as coefficients on the
-/// small leaf's face. The jump is scaled so that its squared coefficients sum to the face's part of xᵀMx. The unknowns
-/// of a leaf contain the square root of the leaf's volume. `scale` converts the large leaf's unknowns to the volume of
-/// the small leaf.
+/// Computes the jump across the face of link n: the small leaf's polynomial minus the large leaf's polynomial, as
+/// coefficients on the small leaf's face. The coefficients are scaled so that their squares sum to the face's part of
+/// xᵀMx. The numbers in x contain the square root of their leaf's volume as a factor; `scale` replaces the large leaf's
+/// volume by the small leaf's volume.
 void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
   std::array<double, kMaxFaceCoefficients> large;
@@ -300,8 +299,8 @@ void FaceCoupling::computeJump(std::size_t n, const double* x) {
   for (std::size_t c = 0; c < largeCount; ++c) jump[c] -= scale * large[c];
 }
 
-/// Adds the contribution of link n to the product Mx, for one of the two leaves at the link: the jump times the
-/// transpose of the linear map in `computeJump`.
+/// Adds the leaf's part of Jᵀ(Jx) to `out`. The matrix J maps the vector x to the jump Jx across the face of link n,
+/// see `computeJump`. The sum over all links is the product Mx.
 void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const {
   const Link& link = links_[n];
   const double* face = &jumps_[jumpStart_[n]];

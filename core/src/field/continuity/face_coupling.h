@@ -29,7 +29,8 @@ class FaceCoupling {
   /// Returns the vector x of scaled coefficients of a field. The field must have the same octree as the field
   /// given to the constructor, and its coefficients must be double.
   std::vector<double> toUnknowns(const FieldData& field) const;
-  /// Sets the coefficients of a field from the vector x, and stores them in the order of x.
+  /// Sets the coefficients of a field from the vector x. The field then stores the coefficients of its leaves in octree
+  /// order, like x.
   void fromUnknowns(std::span<const double> x, FieldData& field) const;
 
   /// Computes out = Mx + weight·x and returns xᵀ·out.
@@ -66,7 +67,7 @@ class FaceCoupling {
 
   std::vector<query::OctreeNode> leaves_;
   std::vector<std::uint8_t> degree_;           ///< polynomial degree of each leaf
-  std::vector<std::size_t> start_;             ///< index of each leaf's first entry in x; at the end the length of x
+  std::vector<std::size_t> start_;             ///< index of each leaf's first entry in x; last, the length of x
   std::vector<double> scale_;                  ///< √(leaf volume V / domain volume |Ω|), by depth in the octree
   std::vector<Link> links_;                    ///< the faces, in the order of their small leaves
   std::vector<double> jumps_;                  ///< face coefficients of the jumps for the x given to `apply` last

@@ -78,7 +78,7 @@ class Numbering {
 
  private:
   GridIndex cells_;
-  std::array<std::uint64_t, 4> first_{};  ///< by axis: number of the first node on edges along it; then the node count
+  std::array<std::uint64_t, 4> first_{};  ///< number of the first node on edges along x, y and z; last, the node count
 };
 
 /// Returns the n-th node of the cell with the lower corner `corner`. Nodes 0 to 7 are the cell's corners, n = x +

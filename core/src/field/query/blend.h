@@ -15,7 +15,7 @@
 
 namespace hpsdf::query {
 
-/// Returns a bit mask of axes, with bit 0 for x. A set bit means that the point is near one of its leaf's two faces
+/// Returns a bit mask of axes, with bit 0 for x. A set bit means that the point is near a face of its leaf
 /// perpendicular to that axis, where other leaves may have a weight too. Returns 0 for a field without blending.
 inline unsigned blendZoneAxes(const FieldData& field, const std::array<double, 3>& local) {
   if (!(field.blend > 0)) return 0;
@@ -124,7 +124,7 @@ OpenNodes visitFirstDepth(const FieldData& field, const LookupGrid& lookupGrid,
     CellIndex leaf;
     for (int axis = 0; axis < 3; ++axis) {
       leaf[axis] = cell[axis] >> levels;
-      // A large leaf covers several entries of the lookup grid. Skip it at all but the first of its candidate entries.
+      // A large leaf may cover several candidate cells. Visit it only at the first of these cells.
       if (cell[axis] > open.cells.first[axis] && leaf[axis] << levels != cell[axis]) return;
     }
     visit(leafPoint(bits, depth - levels, (byLookupGrid ? field.nodes.size() : 0) + entry, leaf, gridCoordinates));
@@ -156,11 +156,11 @@ OpenNodes visitNextDepth(const FieldData& field, const GridFrame& frame, const s
 }
 
 /// Calls visit(LeafPoint) once for every leaf that may have a weight at a point of the domain. `ownDepth` is the depth
-/// of the leaf that holds the point. The search proceeds depth by depth. Only children of candidates can be candidates,
-/// at most eight at each depth: relative to its own edge, a child is not nearer to the point than its parent is
-/// relative to the parent's edge. The search starts in the lookup grid. If the leaf that holds the point is larger than
-/// a cell of the lookup grid, the search starts at the base cells instead, because grid cells near the point may not
-/// show all leaves.
+/// of the leaf that holds the point. The search proceeds depth by depth from candidate cells to their children. There
+/// are at most eight candidates at each depth. No candidate is missed: (distance from the point to the cell) / (edge of
+/// the cell) is not greater for a parent than for its child. The search starts in the lookup grid. If the leaf that
+/// holds the point is larger than a cell of the lookup grid, the search starts at the base cells instead, because the
+/// candidates in the lookup grid may then miss leaves.
 template <typename Visit>
 void visitOverlapping(const FieldData& field, const LookupGrid& lookupGrid,
                       const std::array<double, 3>& gridCoordinates, int ownDepth, Visit&& visit) {

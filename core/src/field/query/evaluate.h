@@ -243,8 +243,8 @@ inline Vector3 closestInDomain(const GridFrame& domain, const Vector3& x) {
 /// of GCC 12 would not propagate NaN and infinity.
 inline double length(const Vector3& v) { return std::hypot(std::hypot(v.x(), v.y()), v.z()); }
 
-/// Continues the field to a point x outside the domain: changes f(q) at the closest point q of the domain to
-/// f(q) + |x − q|. `offset` is x − q.
+/// Continues the field to a point x outside the domain: adds |x − q| to the field's value at q, the point of the domain
+/// closest to x. `offset` is x − q.
 inline void continueOutside(const Vector3& offset, double& value) { value += length(offset); }
 
 inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {

@@ -58,9 +58,8 @@ constexpr int kMinVectorDegree = 2, kMaxVectorDegree = 4;
 /// all other degrees.
 constexpr std::size_t kLists = kMaxVectorDegree - kMinVectorDegree + 2;
 
-/// A point in the local coordinates of its leaf, and the leaf's node with its depth as packed in
-/// `LookupGrid::entry`. The bits of the node are stored as a double so that all four numbers can be loaded at
-/// once.
+/// A point in the local coordinates of its leaf. `bits` is the 64-bit word from `LookupGrid::entry`, which contains the
+/// leaf's node and depth. It is declared as a double so that all four numbers can be loaded at once.
 struct PackedLeafPoint {
   double local[3];
   double bits;
@@ -90,7 +89,7 @@ HWY_INLINE hn::Vec<Unsigned> toUnsigned(Vec integers) {
                  hn::Set(Unsigned(), kImplicit - 1));
 }
 
-/// Returns 2^depth for nodes that are packed together with their depth.
+/// Returns 2^depth for nodes whose depth is stored in the same 64-bit word.
 HWY_INLINE Vec depthScale(hn::Vec<Unsigned> bits) {
   const auto depth = hn::And(hn::ShiftRight<40>(bits), hn::Set(Unsigned(), 0xff));
   return hn::BitCast(Tag(), hn::ShiftLeft<52>(depth + hn::Set(Unsigned(), 1023)));
@@ -158,8 +157,8 @@ void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch)
   for (std::size_t i = batch.count; i % kLanes != 0; ++i) batch.bits[i] = batch.bits[i - 1];
 }
 
-/// Lists the points of a batch by the degree of their leaves and prefetches the coefficients. No branch depends
-/// on the degree.
+/// Groups the points of a batch by the degree of their leaves, and prefetches the leaves' coefficients. No branch
+/// depends on the degree.
 template <typename T>
 void listByDegree(const T* coefficients, Batch& batch) {
   std::array<std::size_t, kLists> counts{};
@@ -318,7 +317,7 @@ struct BlendZonePoints {
   }
 };
 
-/// Points that are near one face of their leaf, as a batch for the evaluation in the leaves on the other side.
+/// A batch of points that are each near one face of their leaf, to be evaluated in the leaf on the other side.
 struct AcrossFaces {
   Batch batch;
   std::uint8_t point[kBatch];  ///< index of the point in the original batch

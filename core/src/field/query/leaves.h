@@ -68,9 +68,9 @@ void forEachNeighbour(const FieldData& field, const OctreeNode& leaf, const F& f
           if (const auto neighbour = equalOrLargerNeighbour(field, leaf, {x, y, z})) f(*neighbour);
 }
 
-/// Calls f(axis, step, neighbour) for the faces of `leaf` towards larger leaves, and for its upper faces towards
-/// leaves of equal size. Called for all leaves, it visits each face that two leaves share exactly once. The step
-/// is −1 for a face at the lower end of the axis and 1 for a face at the upper end.
+/// Calls f(axis, step, neighbour) for the faces of `leaf` towards larger leaves, and for its upper faces towards leaves
+/// of equal size. If the function is called for all leaves, it visits each face between two leaves exactly once. The
+/// step is −1 for a face at the lower end of the axis and 1 for a face at the upper end.
 template <typename F>
 void forEachInterface(const FieldData& field, const OctreeNode& leaf, const F& f) {
   for (int axis = 0; axis < 3; ++axis)

@@ -1,6 +1,6 @@
-// Evaluation of polynomials at single points and at batches of points. It is generic in `Number`, which is double
-// or a SIMD vector of doubles. Like legendre-inl.h, it is included inside a namespace, once for each instruction
-// set. Coefficients may also be float.
+// Evaluation of polynomials at single points and at batches of points. The template parameter `Number` is double or a
+// SIMD vector of doubles; the coefficients are double or float. Like legendre-inl.h, this file is included inside a
+// namespace, once for each instruction set.
 
 /// Calls f(0) to f(last).
 template <typename F>

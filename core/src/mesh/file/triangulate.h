@@ -9,9 +9,9 @@
 
 namespace hpsdf::mesh {
 
-/// Triangulates a simple, nearly flat polygon of n corners into n - 2 triangles with the polygon's orientation.
-/// The triangles consist of indices into `polygon`. Corners along a straight side get triangles with an area
-/// where the polygon allows it.
+/// Triangulates a simple, nearly flat polygon of n corners into n - 2 triangles with the polygon's orientation. The
+/// triangles consist of indices into `polygon`. Where the polygon allows it, even the triangles at corners along a
+/// straight side have an area above 0.
 ///
 /// The triangulation in assimp 5.2 is not used, because its triangles extend beyond concave polygons.
 std::vector<Triangle> triangulate(std::span<const Vector3> polygon);

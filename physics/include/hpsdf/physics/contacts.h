@@ -15,9 +15,8 @@ namespace hpsdf::physics {
 
 struct ContactOptions {
   double margin = 0;  ///< samples up to this distance outside the body are contacts too; world units, 0 or more
-  /// The maximum number of contacts. The deepest contacts are kept, the deepest first; among equal depths the
-  /// contact with the lower sample index comes first. If this is empty, all contacts are returned in the
-  /// order of the samples.
+  /// The maximum number of contacts. The deepest contacts are kept, the deepest first; among equal depths the contact
+  /// with the lower sample index comes first. Without a maximum, all contacts are returned in the order of the samples.
   std::optional<std::size_t> deepest = {};
 };
 
@@ -65,7 +64,7 @@ class ContactQuery {
   friend void findContacts(std::span<const BodyPair> pairs, const ContactOptions& options, PairContacts& out);
 
   void clear();
-  /// Appends the contacts of a valid pair to the stored contacts, and adds the cost of the query.
+  /// Appends the contacts of a valid pair to `contacts_`, and adds the work of the query to `cost_`.
   void append(const BodyPair& pair, const ContactOptions& options);
 
   std::vector<Contact> contacts_;

@@ -10,9 +10,9 @@
 namespace hpsdf::physics {
 
 /// A node of the hierarchy. Its sphere surrounds the points at the positions `begin` to `end` (exclusive) in
-/// `SphereTree::order`. The nodes are stored in depth-first order. `next` is the index of the first node after
-/// this node's subtree, at which a search continues if it skips this node. If a node has no children, `next` is
-/// the index directly after it.
+/// `SphereTree::order`. The nodes are stored in depth-first order. `next` is the index of the first node after this
+/// node's subtree. A search that skips this node continues there. A node has no children if `next` is its own index
+/// plus 1.
 struct Sphere {
   Vector3 center;
   double radius;  ///< no point is farther from the centre, in spite of rounding

@@ -30,9 +30,9 @@ struct Body {
   Color color = bodyColor(0);
 };
 
-/// The body that each pixel of a view shows, in rows from top to bottom. `distance` is measured as in `ViewBuffers`:
-/// the nearer one of a body and a field's surface hides the other. For a pixel that shows no body, `body` is kNoBody
-/// and the other buffers are 0.
+/// The body that each pixel of a view shows, in rows from top to bottom. `distance` is measured as in `ViewBuffers`, so
+/// that bodies and a field's surface can hide each other. For a pixel that shows no body, `body` is kNoBody and the
+/// other buffers are 0.
 struct BodyBuffers {
   int width = 0;
   int height = 0;

@@ -23,8 +23,8 @@ struct Image {
   const Color& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
 };
 
-/// Writes the picture to a temporary file and then renames this file to `file`. Throws `hpsdf::Error`,
-/// which names the file.
+/// Writes the picture to a temporary file and then renames this file to `file`. If that fails, throws
+/// `hpsdf::Error`, which names the file.
 void savePng(const Image& image, const std::filesystem::path& file);
 
 /// Loads a picture from a PNG file. Throws `hpsdf::Error`, which names the file.

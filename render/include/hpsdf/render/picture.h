@@ -81,7 +81,7 @@ struct ViewSize {
 };
 ViewSize viewSize(const SurfacePicture& picture);
 
-/// Returns the view of the plane that `draw` renders. At the size that `viewSize` returns, the view has square pixels.
+/// Returns the view of the plane that `draw` renders. It has square pixels at the size of the view in the picture.
 SliceView sliceView(const Field& field, const SlicePicture& picture);
 
 /// Returns a view of the picture's plane, framed for `width` × `height` square pixels, for an export of field values.
