@@ -49,7 +49,8 @@ bool wantsNormalized(const Arguments& arguments);
 /// Returns the field's domain, as the arguments specify it. `surface` is the bounding box of the surface.
 Box domainFrom(const Arguments& arguments, const Box& surface);
 
-/// Throws `Error` if the arguments of `buildParameters` are invalid or contradict each other, whatever the surface.
+/// Throws `Error` if the arguments of `buildParameters` are invalid or contradict each other. The check does not depend
+/// on the surface.
 void requireConsistent(const Arguments& arguments);
 
 /// Throws `Error` if the option `name` is given but the option `owner` is not. Without `owner`, `name` has no effect.

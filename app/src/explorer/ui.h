@@ -66,7 +66,7 @@ class Ui {
   /// passed on after the frame has been completed.
   void frame(int width, int height, const Input* input, const std::function<void()>& widgets);
 
-  /// Paints the widgets of the last frame over a picture of the same size.
+  /// Paints the widgets of the last frame over a picture that has the size of this frame.
   void paint(render::Image& image) const;
 
   /// Returns the widgets of the last frame by their paths, such as "bar/undo".

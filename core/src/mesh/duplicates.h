@@ -14,9 +14,9 @@ bool haveSameCorners(const Triangle& one, const Triangle& other);
 /// that share their three corners with another triangle. An edge is balanced if equally many triangles run along
 /// it in both directions.
 ///
-/// If all triangles with the same corners have the same orientation, one of them is kept. If several bodies share the
-/// triangles, dropping all but one could leave more edges unbalanced. In this case only duplicates that unbalance edges
-/// are dropped.
+/// If all triangles with the same corners have the same orientation, one of them is kept. An exception are triangles
+/// that several bodies share: if keeping only one would leave more edges unbalanced, duplicates are dropped one by one,
+/// and only while this reduces the number of unbalanced edges.
 ///
 /// Triangles with the same corners and both orientations form sets that are connected by edges. Each set is one
 /// of two things:

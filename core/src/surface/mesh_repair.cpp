@@ -293,9 +293,9 @@ std::vector<Vector3> pointsBeside(const TriangleMesh& mesh, const Body& body, do
 
 enum class Orientation { undecided, outward, inward };
 
-/// Returns the orientation of a body according to the winding numbers of the imported mesh on both sides of the
-/// body (step 4 in the documentation of `repaired`). `before` and `behind` are points in front of the body's
-/// faces and behind them. `byVolume` is the orientation according to the sign of the body's own volume.
+/// Returns the orientation of a body according to the winding numbers of the imported mesh in front of the body's
+/// faces and behind them, at the points `before` and `behind` (step 4 in the documentation of `repaired`). `byVolume`,
+/// the orientation according to the sign of the body's own volume, decides where these allow both orientations.
 Orientation importedOrientation(const BodyWinding& imported, const std::vector<Vector3>& before,
                                 const std::vector<Vector3>& behind, Orientation byVolume) {
   std::ptrdiff_t outward = 0, inward = 0, left = std::ssize(before), all = left;

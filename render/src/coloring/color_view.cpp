@@ -152,7 +152,7 @@ class Contours {
   /// The zero line is where the value equals `zero`.
   explicit Contours(const ViewBuffers& buffers, double zero = 0) : buffers_(buffers), zero_(zero) {}
 
-  /// Returns the change of the value from one sample to the next, but at least kFlattestSlope · sampleSize.
+  /// Returns the length of the value's gradient per sample, by differences, but at least kFlattestSlope · sampleSize.
   double slope(int x, int y, double sampleSize) const {
     const std::size_t i = index(x, y);
     const double dx = derivative(i, 1, x > 0, x + 1 < buffers_.width);

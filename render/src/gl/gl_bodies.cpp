@@ -131,8 +131,9 @@ struct BodyResources {
   std::vector<MeshUpload> meshes;
 };
 
-/// The point where a pixel's ray meets a triangle, in the mesh's frame. OpenGL rounds corners, so that the ray may pass
-/// slightly beside the triangle. The ray's intersection with the triangle's plane is then moved into the triangle.
+/// The point where a pixel's ray meets a triangle, in the mesh's frame. OpenGL rounds the coordinates of corners, so
+/// that the ray may pass slightly beside the triangle. The ray's intersection with the triangle's plane is then moved
+/// into the triangle.
 BodyPoint pointOn(const std::array<Vector3, 3>& corners, const Vector3& start, const Vector3& direction,
                   const BodyTriangle& seen) {
   const Vector3 toB = corners[1] - corners[0], toC = corners[2] - corners[0];

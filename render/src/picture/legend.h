@@ -75,9 +75,9 @@ void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& s
 /// even steps.
 void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, const ColorScale& scale);
 
-/// Adds two arrows with the names of the axes that point to the right and up. The arrows lie left of or below the
-/// section's lower left corner if the view is empty there, else in this corner on a plate. A section that is too small
-/// gets no arrows.
+/// Adds two arrows with the names of the axes that point to the right and up. If the picture is empty beside or below
+/// the section's lower left corner, the arrows lie there. Otherwise they lie within the section, on a plain rectangle
+/// in this corner. A section that is too small gets no arrows.
 void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, char right, char up);
 
 /// Adds a row to the panel for each fact, which is a name and a value, as many as fit.
