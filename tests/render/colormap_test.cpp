@@ -12,8 +12,8 @@
 namespace hpsdf::render {
 namespace colormap_test {
 
-// How dichromats see a colour: the missing cone's response is replaced by a combination of the other two cones that
-// keeps white and one more colour unchanged (after Viénot, Brettel & Mollon 1999).
+// The colour vision that a test simulates. For a dichromat, the missing cone's response is replaced by a combination of
+// the other two cones that keeps white and one more colour unchanged (after Viénot, Brettel & Mollon 1999).
 enum class Vision { normal, protan, deutan, tritan };
 
 Eigen::Matrix3d coneFromLinear() {

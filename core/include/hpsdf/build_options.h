@@ -15,8 +15,8 @@
 
 namespace hpsdf {
 
-/// How the octree is refined: `hp` raises the polynomial degree of leaves or splits them; `h1` and `h2` only split
-/// leaves, whose degree is always 1 or 2, and serve for comparison.
+/// The strategy by which the octree is refined. `hp` raises the polynomial degree of leaves or splits them. `h1` and
+/// `h2` only split leaves, whose degree is always 1 or 2, and serve for comparison.
 enum class Strategy : std::uint8_t { hp, h1, h2 };
 
 /// The method that estimates the squared L2 error of a cell, before the error is weighted by its distance from the

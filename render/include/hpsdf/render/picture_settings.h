@@ -42,7 +42,7 @@ struct ColorMode {
   ColorBy color;
   std::string name;                      ///< the mode's name in commands, such as "value-jump"
   std::string explanation = {};          ///< words for the mode in help texts that list the quantities
-  std::vector<std::string> titles = {};  ///< titles of a quantity's colour bar, from the longest to the shortest
+  std::vector<std::string> titles = {};  ///< titles of the legend, from the longest to the shortest
 };
 
 /// Returns all colour modes, in the order of `ColorBy`.
