@@ -203,7 +203,8 @@ TEST(BodyNormals, ignoreDegenerateTriangles) {
 // --- The oracle
 // ---------------------------------------------------------------------------------------------------------
 
-/// Where a ray enters a box around the origin, and how far it is from missing the box.
+/// The entry of a ray into a box around the origin. `margin` is the length of the ray within the box, which is small if
+/// the ray nearly misses the box.
 struct Entry {
   double distance;
   int axis;

@@ -81,8 +81,8 @@ std::vector<Weighted> weighted(const std::vector<float>& ofSamples) {
 std::span<const ColorMode> colorModes() {
   static const std::vector<ColorMode> modes = {
       {ColorBy::normal, "normal"},
-      {ColorBy::degree, "degree"},
-      {ColorBy::depth, "depth"},
+      {ColorBy::degree, "degree", "", {"polynomial degree", "degree"}},
+      {ColorBy::depth, "depth", "", {"octree depth", "depth"}},
       {ColorBy::distance, "distance"},
       {ColorBy::valueJump,
        "value-jump",
@@ -105,7 +105,7 @@ std::span<const ColorMode> colorModes() {
   return modes;
 }
 
-std::span<const std::string> titlesOf(ColorBy quantity) { return colorModes()[std::size_t(quantity)].titles; }
+std::span<const std::string> titlesOf(ColorBy color) { return colorModes()[std::size_t(color)].titles; }
 
 void requireReferenceData(ColorBy color, const ReferenceData& reference) {
   if ((color == ColorBy::valueJump || color == ColorBy::gradientJump) && reference.jumps == nullptr)

@@ -11,9 +11,9 @@
 
 namespace hpsdf::render {
 
-/// The titles of a quantity, from the longest to the shortest. The first one that fits stands above the colour bar,
+/// The titles of a colour's legend, from the longest to the shortest. The first one that fits stands above the legend,
 /// the last one is for captions.
-std::span<const std::string> titlesOf(ColorBy quantity);
+std::span<const std::string> titlesOf(ColorBy color);
 
 /// Throws `Error` if `reference` lacks the data that colouring by `color` needs.
 void requireReferenceData(ColorBy color, const ReferenceData& reference);

@@ -43,11 +43,8 @@ ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field,
 
 ColorKey keyOfLevels(Overlay& overlay, const Frame& frame, const FieldStatistics& figures, const ViewBuffers& buffers,
                      ColorBy color, const ScaleOptions& options) {
-  const bool degree = color == ColorBy::degree;
-  static const std::string degreeTitles[] = {"polynomial degree", "degree"};
-  static const std::string depthTitles[] = {"octree depth", "depth"};
-  const std::span<const std::string> titles = degree ? degreeTitles : depthTitles;
-  std::map<int, double> shares = degree ? figures.degreeVolume : figures.depthVolume;
+  const std::span<const std::string> titles = titlesOf(color);
+  std::map<int, double> shares = color == ColorBy::degree ? figures.degreeVolume : figures.depthVolume;
   for (const int level : options.levels) shares.try_emplace(level, 0.0);
 
   ColorKey key{.color = {}, .legend = {.title = titles.front()}, .scale = options, .name = titles.back(), .range = {}};
