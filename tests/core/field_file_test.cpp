@@ -178,10 +178,12 @@ std::string withChecksum(std::string bytes) {
   return bytes;
 }
 
-constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8;  // bytes that versions 3 and 4 added
+constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8,
+                      kSinceVersion5 = 8 + 4 + 4 + 4 * 8;  // bytes that versions 3, 4 and 5 added
 
-/// Older files end their headers earlier: version 3 before the inside test, version 2 before the settings that follow
-/// the number of steps, and version 1 before the number of steps.
+/// Older files end their headers earlier: version 4 before the settings and sizes of exact leaves, version 3 before the
+/// inside test, version 2 before the settings that follow the number of steps, and version 1 before the number of
+/// steps.
 TEST(FieldFile, filesOfOlderVersionsAreRead) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "old.hpsdf";
@@ -192,11 +194,15 @@ TEST(FieldFile, filesOfOlderVersionsAreRead) {
   std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
+  bytes[8] = 4;
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion5, kSinceVersion5)));
+  EXPECT_EQ(load(file).metadata().source.insideTest, field.metadata().source.insideTest);
+  EXPECT_EQ(load(file).data().nodes, field.data().nodes);
   bytes[8] = 3;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion4, kSinceVersion4)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion5 - kSinceVersion4, kSinceVersion4)));
   EXPECT_EQ(load(file).metadata().measuredError, field.metadata().measuredError);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
-  const std::size_t sinceSteps = nodes - kSinceVersion4 - kSinceVersion3;
+  const std::size_t sinceSteps = nodes - kSinceVersion5 - kSinceVersion4 - kSinceVersion3;
   bytes[8] = 2;
   writeAll(file, withChecksum(bytes.erase(sinceSteps, kSinceVersion3)));
   EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
@@ -255,7 +261,7 @@ TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   const std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(data.coefficients).size(), count = data.nodes.size();
   const std::size_t bounds = bytes.size() - 8 - 8 * count,
-                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4;
+                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion5;
   const auto refused = [&](std::size_t at, auto value) {
     std::string forged = bytes;
     std::memcpy(&forged[at], &value, sizeof(value));

@@ -22,7 +22,7 @@ namespace {
 using namespace hpsdf;
 
 constexpr std::size_t kVersionAt = 8;
-constexpr std::uint8_t kVersion = 4;  // fields of older versions are saved with more data
+constexpr std::uint8_t kVersion = 5;  // fields of older versions are saved with more data
 
 /// Returns points within the domain, on its sides and around it, and points that are infinite or NaN.
 std::vector<Vector3> placesOf(const Box& domain) {

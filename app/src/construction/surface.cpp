@@ -59,6 +59,7 @@ struct SharedDistance {
 
   void operator()(std::span<const Vector3> points, std::span<double> out) const { (*exact)(points, out); }
   std::size_t bytes() const { return exact->bytes(); }
+  const TriangleSearch& triangleSearch() const { return exact->triangleSearch(); }
 };
 
 /// Reports which inside test (method to tell inside from outside) was chosen. A closed mesh without self-intersections

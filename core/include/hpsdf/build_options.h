@@ -17,7 +17,13 @@ namespace hpsdf {
 
 /// The strategy by which the octree is refined. `hp` raises the polynomial degree of leaves or splits them. `h1` and
 /// `h2` only split leaves, whose degree is always 1 or 2, and serve for comparison.
-enum class Strategy : std::uint8_t { hp, h1, h2 };
+/// `hpx` refines like `hp`, but first makes leaves exact: wherever the surface may be within
+/// `BuildOptions::exactWithin`, a leaf keeps the triangles that are nearest to its points (`ExactTriangles`) or, if
+/// these lie in one plane, the linear polynomial of their distance. It needs a distance to triangles; for other
+/// distances it equals `hp`.
+enum class Strategy : std::uint8_t { hp, h1, h2, hpx };
+
+constexpr bool isHp(Strategy strategy) { return strategy == Strategy::hp || strategy == Strategy::hpx; }
 
 /// The method that estimates the squared L2 error of a cell, before the error is weighted by its distance from the
 /// surface.
@@ -138,6 +144,12 @@ struct BuildOptions {
   int maxDegree = 30;  ///< highest polynomial degree p of a leaf, 1 to 30
   int maxDepth = 10;   ///< greatest number of levels below a base cell, 0 to 20
   Strategy strategy = Strategy::hp;
+  /// For `Strategy::hpx`: greatest distance from the surface up to which the field is exact, as a share of L (see
+  /// `targetError`), 0 to 1.
+  double exactWithin = 0.005;
+  /// For `Strategy::hpx`: greatest number of triangles of an exact leaf, 1 to 4096. A leaf of the greatest depth may
+  /// have more.
+  int exactTriangles = 64;
   int quadrature = 3;  ///< order of the quadrature as a multiple of the degree p, 2 to 8; the paper uses 4
   CubatureKind cubature = CubatureKind::compact;
   TrialSamples trialSamples = TrialSamples::children;

@@ -16,6 +16,8 @@
 
 namespace hpsdf {
 
+class TriangleSearch;
+
 /// The test that decides whether a point is inside.
 enum class InsideTest : std::uint8_t {
   automatic,     ///< `pseudonormal` if it is certain to be right for the mesh, else `winding`
@@ -64,11 +66,14 @@ class DistanceFunction {
   template <typename F>
   DistanceFunction(F&& f, Source source) : source_(std::move(source)), bytes_(bytesOf(f)) {
     using Callable = std::remove_cvref_t<F>;
-    if constexpr (std::is_lvalue_reference_v<F>)
+    if constexpr (std::is_lvalue_reference_v<F>) {
       evaluate_ = adapt<Callable>([&f]() -> const Callable& { return f; });
-    else
-      evaluate_ = adapt<Callable>(
-          [owned = std::make_shared<const Callable>(std::forward<F>(f))]() -> const Callable& { return *owned; });
+      triangleSearch_ = triangleSearchOf(f);
+    } else {
+      auto owned = std::make_shared<const Callable>(std::forward<F>(f));
+      triangleSearch_ = triangleSearchOf(*owned);
+      evaluate_ = adapt<Callable>([owned = std::move(owned)]() -> const Callable& { return *owned; });
+    }
   }
 
   /// Evaluates out[i] = Φ(points[i]) for all i. Both spans must have the same length.
@@ -82,6 +87,10 @@ class DistanceFunction {
   /// Returns the number of bytes that the callable holds, as told by its member `std::size_t bytes() const`, or 0
   /// if it has no such member.
   std::size_t bytes() const { return bytes_; }
+
+  /// Returns the search for triangles that the callable offers by its member `const TriangleSearch& triangleSearch()
+  /// const`, or nullptr if it has no such member. Fields of such distances can have exact leaves.
+  const TriangleSearch* triangleSearch() const { return triangleSearch_; }
 
  private:
   template <typename F>
@@ -104,6 +113,16 @@ class DistanceFunction {
       return {};
   }
 
+  template <typename F>
+  static const TriangleSearch* triangleSearchOf(const F& f) {
+    if constexpr (requires {
+                    { f.triangleSearch() } -> std::convertible_to<const TriangleSearch&>;
+                  })
+      return &f.triangleSearch();
+    else
+      return nullptr;
+  }
+
   using Batch = std::function<void(std::span<const Vector3>, std::span<double>)>;
 
   template <typename Callable, typename Get>
@@ -122,6 +141,7 @@ class DistanceFunction {
   Batch evaluate_;
   Source source_;
   std::size_t bytes_;
+  const TriangleSearch* triangleSearch_ = nullptr;
 };
 
 }  // namespace hpsdf

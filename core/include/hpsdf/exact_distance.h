@@ -16,6 +16,8 @@
 
 namespace hpsdf {
 
+class TriangleSearch;
+
 /// The part of a triangle on which the closest point to a query lies.
 enum class Feature : std::uint8_t { face, edge, vertex };
 
@@ -92,6 +94,9 @@ class ExactDistance {
 
   /// Returns the description of the mesh: its name, fingerprint, counts, box and inside test.
   const Source& source() const;
+
+  /// Returns the search from which the construction of a field makes exact leaves. It refers to this object.
+  const TriangleSearch& triangleSearch() const;
 
   /// Returns the bytes held by this object: triangles, hierarchy, pseudonormals, and moments of the winding
   /// number.

@@ -16,7 +16,8 @@ namespace hpsdf {
 /// A hierarchical hp-adaptive signed distance field (Koschier, Deul, Bender 2016). Fields are immutable; every query
 /// is const, thread-safe and allocation-free.
 ///
-/// Inside the domain the value is the polynomial of the leaf that holds the point. Leaves are half-open, so that every
+/// Inside the domain the value is the polynomial of the leaf that holds the point or, in an exact leaf, the distance
+/// to the nearest of the leaf's triangles. Leaves are half-open, so that every
 /// point lies in exactly one leaf. The field jumps slightly from leaf to leaf unless it is blended
 /// (`FieldData::blend`). A blended field is f = Σ wₙ fₙ / Σ wₙ over the leaves n that have a weight at the point. Here
 /// fₙ is the polynomial of leaf n, continued beyond the box of the leaf, and wₙ is a product of smooth steps across the
@@ -58,7 +59,8 @@ class Field {
   /// Returns the grid in which queries start their descent of the octree, for uploads to a GPU and tests.
   const LookupGrid& lookupGrid() const { return lookupGrid_; }
 
-  /// Returns the bytes that the field takes: its nodes, coefficients, lookup grid and, if it has them, bounds.
+  /// Returns the bytes that the field takes: its nodes, coefficients, lookup grid and, if it has them, bounds and the
+  /// triangles and lists of exact leaves.
   std::size_t bytes() const;
 
  private:
@@ -71,9 +73,10 @@ struct FieldStatistics {
   std::size_t leaves = 0;
   std::size_t nodes = 0;
   std::size_t coefficients = 0;
-  std::size_t bytes = 0;               ///< memory that the field takes (`Field::bytes`)
-  std::map<int, double> degreeVolume;  ///< fraction of the domain's volume, by degree of the leaves
-  std::map<int, double> depthVolume;   ///< fraction of the domain's volume, by depth of the leaves
+  std::size_t bytes = 0;  ///< memory that the field takes (`Field::bytes`)
+  std::map<int, double>
+      degreeVolume;  ///< fraction of the domain's volume, by degree of the leaves; `kExactDegree` for exact ones
+  std::map<int, double> depthVolume;  ///< fraction of the domain's volume, by depth of the leaves
   std::map<int, std::size_t> degreeLeaves;
   std::map<int, std::size_t> depthLeaves;
 };

@@ -20,7 +20,9 @@ struct Normalization {
 };
 
 constexpr int kMaxDegree = 30;  ///< highest total degree of a leaf's polynomial
-constexpr int kMaxDepth = 20;   ///< greatest depth of a leaf; local coordinates then keep 32 of a double's 52 bits
+/// Stands in place of the degree of an exact leaf, which has no polynomial but a list of triangles.
+constexpr int kExactDegree = kMaxDegree + 1;
+constexpr int kMaxDepth = 20;  ///< greatest depth of a leaf; local coordinates then keep 32 of a double's 52 bits
 
 /// Greatest width of the zones in which neighbouring leaves are blended (`FieldData::blend`). With a greater width, the
 /// zones at opposite faces of a cell could meet.

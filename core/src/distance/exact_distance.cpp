@@ -14,6 +14,7 @@
 #include "bvh/hierarchy.h"
 #include "bvh/search.h"
 #include "bvh/triangle_frame.h"
+#include "distance/candidate_search.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "mesh/connectivity.h"
@@ -200,6 +201,8 @@ struct ExactDistance::Data {
       reduceToOuterHull(mesh, progress);
     }
     source.insideTest = inside.choice.insideTest;
+    candidates.emplace(hierarchy, source.thickness / 2,
+                       [this](const Box&, std::span<const std::uint32_t>) { return signOfExactLeaves(); });
   }
 
   void reduceToOuterHull(const TriangleMesh& mesh, const Progress& progress) {
@@ -274,8 +277,17 @@ struct ExactDistance::Data {
   Hierarchy wholeMesh;                     ///< all triangles; only for an outer hull
   std::vector<std::uint32_t> hullSources;  ///< mesh triangle that each hull triangle comes from; only for an outer hull
   ChosenInsideTest inside;
+  std::optional<distance::CandidateSearch> candidates;
 
  private:
+  /// Returns how the sign follows from the triangles that are nearest to the points of a box, or std::nullopt if they
+  /// do not suffice.
+  std::optional<ExactSign> signOfExactLeaves() const {
+    if (inside.choice.insideTest == InsideTest::pseudonormal) return ExactSign::pseudonormal;
+    if (inside.choice.insideTest == InsideTest::shell) return ExactSign::positive;
+    return std::nullopt;
+  }
+
   Vector3 normalOfVertex(std::uint32_t vertex) const {
     return inside.choice.insideTest == InsideTest::pseudonormal ? inside.normals.ofVertex(vertex) : Vector3::Zero();
   }
@@ -331,6 +343,8 @@ Crossings ExactDistance::crossings(std::size_t limit, const Progress& progress) 
 }
 
 std::string_view instructionSet() { return bvh::instructionSet(); }
+
+const TriangleSearch& ExactDistance::triangleSearch() const { return *data_->candidates; }
 
 const Source& ExactDistance::source() const { return data_->source; }
 

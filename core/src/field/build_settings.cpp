@@ -209,8 +209,17 @@ const std::vector<Row> kRows = {
      member<&BuildOptions::maxSteps>,
      "End after so many steps of the refinement, each of which raises one cell's degree or halves it along each axis, "
      "though the target has not been reached: 0 for the base cells alone. When left out, no limit."},
-    {"strategy", kMethod, choice({"hp", "h1", "h2"}).stored(6).advanced(), member<&BuildOptions::strategy>,
-     "hp refines degree and depth; h1 and h2 are octrees of degree 1 or 2, for comparison."},
+    {"strategy", kMethod, choice({"hp", "h1", "h2", "hpx"}).stored(6).advanced(), member<&BuildOptions::strategy>,
+     "hp refines degree and depth; hpx also makes cells exact near the surface, which keep the triangles nearest to "
+     "them; h1 and h2 are octrees of degree 1 or 2, for comparison."},
+    {"exact-within", kResult, number().within(0, 1).in("share of the mesh's longest side").stored(14).advanced(),
+     member<&BuildOptions::exactWithin>,
+     "Distance from the surface up to which a field of strategy hpx is exact, as a share of the mesh's longest side."},
+    {"exact-triangles", kMethod, wholeNumber().within(1, 4096).stored(15).advanced(),
+     member<&BuildOptions::exactTriangles>,
+     "Greatest number of triangles that an exact cell of strategy hpx keeps, unless it cannot be divided further: more "
+     "make a smaller "
+     "field, fewer a faster one."},
     {"coefficients", kResult, choice({"auto", "float", "double"}).advanced(), member<&BuildOptions::coefficients>,
      "Precision of the coefficients. auto takes float where that changes the error by less than 1 %."},
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,
@@ -264,7 +273,7 @@ const std::vector<Row> kRows = {
 /// a name to the list of members here.
 [[maybe_unused]] void requireAllMembers(const BuildOptions& options) {
   [[maybe_unused]] const auto& [m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18, m19,
-                                m20, m21, m22, m23] = options;
+                                m20, m21, m22, m23, m24, m25] = options;
 }
 
 std::string numberText(double number) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hpsdf/build_options.h"
+#include "hpsdf/detail/exact_triangles.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/types.h"
 
@@ -45,8 +46,10 @@ struct CellBound {
 };
 
 /// The finished octree as arrays. The first nodes are the base cells, x fastest, then y, then z. A node is either
-///   internal: bit 63 is clear, the low 32 bits are the index of its first child (child number x + 2y + 4z); or
-///   a leaf:   bit 63 is set, bits 32..39 are the degree p, the low 32 bits the offset of its n(p) coefficients.
+///   internal:       bit 63 is clear, the low 32 bits are the index of its first child (child number x + 2y + 4z); or
+///   a polynomial:   bit 63 is set, bits 32..39 are the degree p, the low 32 bits the offset of its n(p) coefficients;
+///   or an exact leaf:  bit 63 is set, bits 32..39 are `kExactDegree`, bits 48..49 the `ExactSign`, the low 32 bits the
+///                   offset of its list in `ExactTriangles::lists`.
 /// All other bits are 0.
 ///
 /// The polynomial of a leaf is Σ c_ijk L_i(u) L_j(v) L_k(w) over i+j+k ≤ p. Here u, v, w are local coordinates from −1
@@ -57,6 +60,7 @@ struct FieldData {
   std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< number of base cells along each axis
   std::vector<std::uint64_t> nodes;
   std::variant<std::vector<double>, std::vector<float>> coefficients;
+  ExactTriangles exact = {};  ///< the triangles of exact leaves; empty if the field has none
   /// Width of the zones along the faces of a leaf in which the leaf is blended with its neighbours, as a fraction of
   /// the leaf's edge: from 0 (no blending) to `kMaxBlend`.
   double blend = 0;
@@ -74,8 +78,15 @@ constexpr int degree(std::uint64_t n) { return static_cast<int>((n >> 32) & 0xff
 constexpr std::uint64_t leaf(int degree, std::uint32_t offset) {
   return kLeafBit | (std::uint64_t(degree) << 32) | offset;
 }
+constexpr std::uint64_t exactLeaf(ExactSign sign, std::uint32_t offset) {
+  return leaf(kExactDegree, offset) | std::uint64_t(sign) << 48;
+}
+constexpr bool isExact(std::uint64_t n) { return isLeaf(n) && degree(n) == kExactDegree; }
+constexpr ExactSign exactSign(std::uint64_t n) { return static_cast<ExactSign>(n >> 48 & 3); }
 constexpr bool hasOnlyKnownBits(std::uint64_t n) {
-  return (n & ~(isLeaf(n) ? leaf(0xff, 0xffffffff) : 0xffffffff)) == 0;
+  if (!isLeaf(n)) return n <= 0xffffffff;
+  if (isExact(n)) return exactSign(n) <= ExactSign::negative && n == exactLeaf(exactSign(n), offset(n));
+  return n == leaf(degree(n), offset(n));
 }
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
@@ -99,9 +110,10 @@ constexpr int depth(std::uint32_t extents, int axis, bool upper) {
 struct Cell {
   std::uint32_t id;  ///< index of its node, which identifies the cell within its field
   Box box;           ///< half-open [min, max) up to rounding
-  int degree;
-  int depth;     ///< 0 for a base cell
-  double error;  ///< squared L2 error, estimated by the coefficients of the highest degree (ε_e; paper, eq. 6)
+  int degree;        ///< `kExactDegree` for an exact leaf
+  int depth;         ///< 0 for a base cell
+  double
+      error;  ///< squared L2 error, estimated by the coefficients of the highest degree (ε_e; paper, eq. 6); 0 if exact
 };
 
 struct ValueAndGradient {

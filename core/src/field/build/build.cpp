@@ -34,6 +34,12 @@ double nearDistance(const BuildOptions& options, double referenceLength) {
   return asked > 0 ? asked : 0.01 * referenceLength;
 }
 
+std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, const Box& domain) {
+  if (options.strategy != Strategy::hpx || distance.triangleSearch() == nullptr) return std::nullopt;
+  return ExactCells(*distance.triangleSearch(), options.exactWithin * referenceLength(distance.source(), domain),
+                    static_cast<std::size_t>(options.exactTriangles));
+}
+
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.
 class Construction {
  public:
@@ -46,7 +52,8 @@ class Construction {
                .referenceLength = referenceLength(distance.source(), domain),
                .goal = errorGoal(options, referenceLength(distance.source(), domain)),
                .growthGoal = growthGoal(options, errorGoal(options, referenceLength(distance.source(), domain))),
-               .budget = budget_},
+               .budget = budget_,
+               .exactCells = exactCells(distance, options, domain)},
         fitter_(distance, options, state_.nearness, nearDistance(options, setup_.referenceLength), progress),
         refiner_{setup_, fitter_, state_, observer_} {
     state_.nearness = nearnessOf(options, domain);
@@ -90,7 +97,7 @@ class Construction {
     if (options.criterion == Criterion::optimal) prune(tree);
     if (options.enrich) enrich(tree);
     FieldMetadata built = metadata(sumOfErrors(tree));
-    FieldData field = layOut(std::move(tree), std::move(built));
+    FieldData field = layOut(std::move(tree), std::move(built), setup_.distance.triangleSearch());
 
     // Reduce the jumps between cells in double precision, then round the coefficients. The coefficients are then final.
     if (options.continuityWeight)
@@ -108,6 +115,7 @@ class Construction {
     const BuildOptions& options = setup_.options;
     PruneLimits limits{.goal = setup_.goal, .nodeBytes = budget_.nodeBytes()};
     for (int degree = 0; degree <= kMaxDegree; ++degree) limits.leafBytes[degree] = budget_.leafBytes(degree);
+    limits.leafBytes[kExactDegree] = budget_.bytes(1, 0);
     // If the refinement missed its goal for another reason than the limit of bytes, relax the goal of pruning, so
     // that pruning can still undo refinements.
     if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)
@@ -124,7 +132,7 @@ class Construction {
     constexpr std::size_t kChunk = 4096;
     std::size_t coefficients = 0;
     for (const BuildNode& node : tree.nodes)
-      if (node.firstChild == 0) coefficients += budget_.finalCoefficients(node.fit.degree);
+      if (node.firstChild == 0) coefficients += budget_.finalCoefficients(node.fit);
     requireMemory({.nodes = tree.nodes.size(), .coefficients = coefficients, .fixedBytes = setup_.distance.bytes()},
                   setup_.options);
     for (std::size_t begin = 0; begin < tree.nodes.size(); begin += kChunk) {
@@ -132,7 +140,7 @@ class Construction {
       tbb::parallel_for(begin, std::min(begin + kChunk, tree.nodes.size()), [&](std::size_t n) {
         BuildNode& node = tree.nodes[n];
         const int degree = budget_.finalDegree(node.fit.degree);
-        if (node.firstChild != 0 || node.fit.degree >= degree) return;
+        if (node.firstChild != 0 || node.fit.isFinal || node.fit.degree >= degree) return;
         node.fit = fitter_.fit(tree.boxOf(node), degree);
         node.fit.cached = {};
       });
@@ -147,9 +155,8 @@ class Construction {
     if (setup_.goal.byDistance()) metadata.settings.targetError = totals.weighted / scale;
     metadata.settings.nearness = state_.nearness.exponent;
     metadata.settings.nearnessKind = state_.nearness.kind;
-    metadata.settings.maxDegree = setup_.options.strategy == Strategy::hp
-                                      ? setup_.options.maxDegree
-                                      : budget_.finalDegree(startDegree(setup_.options));
+    metadata.settings.maxDegree =
+        isHp(setup_.options.strategy) ? setup_.options.maxDegree : budget_.finalDegree(startDegree(setup_.options));
     metadata.totalError = totals.weighted / scale;
     metadata.referenceLength = setup_.referenceLength;
     metadata.measuredError = state_.measuredError;

@@ -105,8 +105,9 @@ void checkTimes(const Checkpoint& checkpoint) {
 }
 
 /// Bits that describe a cell in the checkpoint file: kFitted and kCached tell whether its polynomial and its
-/// cached projection follow; kOutsideBand and kNear tell where the cell lies.
-enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kAllBits = 15 };
+/// cached projection follow; kOutsideBand and kNear tell where the cell lies; kFinal and kExact tell that the cell is
+/// without error, and that its triangles follow.
+enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kFinal = 16, kExact = 32, kAllBits = 63 };
 
 // The functions named …Item and …Items work in both directions. With a `CheckedWriter` they write the state and
 // do not change it; with a `CheckedReader` they read and check it.
@@ -129,14 +130,27 @@ void coefficientItems(Stream& stream, int& degree, std::vector<double>& coeffici
 }
 
 template <typename Stream>
+void exactItems(Stream& stream, Fit& fit) {
+  fit.degree = kExactDegree;
+  stream.item(fit.sign);
+  stream.require(fit.sign <= ExactSign::negative, "a cell's sign is unknown");
+  finiteItem(stream, fit.error.volume);
+  stream.list(fit.triangles);
+  stream.require(!fit.triangles.empty(), "an exact cell has no triangles");
+}
+
+template <typename Stream>
 void fitItems(Stream& stream, Fit& fit, int mostDegree) {
   const auto bit = [](bool set, std::uint8_t value) { return set ? value : std::uint8_t{0}; };
   auto parts = static_cast<std::uint8_t>(bit(!fit.coefficients.empty(), kFitted) | bit(fit.outsideBand, kOutsideBand) |
-                                         bit(fit.error.near, kNear) | bit(!fit.cached.coefficients.empty(), kCached));
+                                         bit(fit.error.near, kNear) | bit(!fit.cached.coefficients.empty(), kCached) |
+                                         bit(fit.isFinal, kFinal) | bit(fit.isExact(), kExact));
   stream.item(parts);
   stream.require(parts <= kAllBits, "a cell's bits are unknown");
   fit.outsideBand = (parts & kOutsideBand) != 0;
   fit.error.near = (parts & kNear) != 0;
+  fit.isFinal = (parts & kFinal) != 0;
+  if ((parts & kExact) != 0) exactItems(stream, fit);
   if ((parts & kFitted) != 0) {
     finiteItem(stream, fit.error.weighted);
     finiteItem(stream, fit.error.squared);
@@ -174,40 +188,44 @@ void setCellIndices(const CheckedReader& reader, BuildTree& tree, int maxDepth) 
 }
 
 /// Throws `Error` if a cell lacks a polynomial that the construction needs, or has one that it cannot have.
-void checkFits(const CheckedReader& reader, const BuildTree& tree, std::uint64_t fittedBaseCells, bool keepsAll) {
+void checkFits(const CheckedReader& reader, const ConstructionState& state, bool keepsAll) {
+  const BuildTree& tree = state.tree;
+  const bool isFitting = state.stage == ConstructionState::Stage::fitFirstCells;
   for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
     const BuildNode& node = tree.nodes[n];
     const bool isFitted = !node.fit.coefficients.empty(), isCached = !node.fit.cached.coefficients.empty();
-    const bool isUnfitted = n < tree.baseCells() && n >= fittedBaseCells;
-    const bool needsFit = !isUnfitted && (node.firstChild == 0 || keepsAll);
-    const bool isSuperfluous = isUnfitted && (isFitted || node.firstChild != 0);
-    reader.require(!(needsFit && !isFitted) && !isSuperfluous && isCached == (isFitted && keepsAll),
+    const bool isUnfitted = isFitting && n >= state.fittedCells && !node.fit.isFinal;
+    const bool needsFit =
+        node.firstChild == 0 ? !isUnfitted && !node.fit.isExact() : keepsAll && n >= state.fittedCells;
+    const bool isSuperfluous = (isUnfitted || node.fit.isExact()) && isFitted;
+    const bool needsCached = isFitted && keepsAll && !node.fit.isFinal;
+    reader.require(!(needsFit && !isFitted) && !isSuperfluous && isCached == needsCached,
                    "a cell lacks its polynomial or has one too many");
   }
 }
 
-void readTree(CheckedReader& reader, BuildTree& tree, std::uint64_t fittedBaseCells, const BuildOptions& options) {
+void readTree(CheckedReader& reader, ConstructionState& state, const BuildOptions& options) {
+  BuildTree& tree = state.tree;
   constexpr std::uint64_t kLeastBytes = sizeof(std::uint32_t) + 1;  // least size of a node in the file
   const std::uint64_t base = tree.baseCells();
   std::uint64_t count = 0;
   reader.item(count);
   reader.require(count >= base && (count - base) % 8 == 0 && count <= 0xffffffffu &&
-                     count <= reader.remaining() / kLeastBytes && fittedBaseCells <= base &&
-                     (fittedBaseCells == base || count == base),
+                     count <= reader.remaining() / kLeastBytes && state.fittedCells <= count,
                  "it has a number of cells that cannot be");
   requireMemory({.nodes = count, .coefficients = reader.remaining() / sizeof(double)}, options);
   tree.addBaseCells();
   tree.nodes.resize(count);
   nodeItems(reader, tree, options.maxDegree);
   setCellIndices(reader, tree, options.maxDepth);
-  checkFits(reader, tree, fittedBaseCells, options.criterion == Criterion::optimal);
+  checkFits(reader, state, options.criterion == Criterion::optimal);
 }
 
 /// Writes or reads every scalar of the construction state, in the order of the file.
 template <typename Stream>
 void scalarItems(Stream& stream, ConstructionState& state, std::uint64_t& evaluations) {
   stream.item(state.stage);
-  stream.item(state.fittedBaseCells);
+  stream.item(state.fittedCells);
   stream.item(state.steps);
   stream.item(evaluations);
   stream.item(state.nearness.kind);
@@ -297,19 +315,18 @@ std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const Bui
   scalarItems(reader, state, evaluations);
   reader.require(state.stage <= ConstructionState::Stage::probe && state.nearness.kind <= NearnessKind::exponential,
                  "it is at an unknown stage");
-  readTree(reader, state.tree, state.fittedBaseCells, options);
+  readTree(reader, state, options);
   reader.list(state.deferred);
   reader.list(state.pending);
   reader.finish();
-  const bool isFitting = state.stage == ConstructionState::Stage::fitBaseCells;
-  reader.require(
-      (isFitting || state.fittedBaseCells >= state.tree.baseCells()) && state.processed <= state.pending.size(),
-      "its numbers do not belong together");
+  const bool isFitting = state.stage == ConstructionState::Stage::fitFirstCells;
+  reader.require((isFitting || state.fittedCells >= state.tree.baseCells()) && state.processed <= state.pending.size(),
+                 "its numbers do not belong together");
   requireLeaves(reader, state.tree, state.deferred);
   requireLeaves(reader, state.tree, std::span(state.pending).subspan(state.processed));
   if (isFitting) return evaluations;
   for (const BuildNode& node : state.tree.nodes)
-    if (node.firstChild == 0) state.coefficients += budget.finalCoefficients(node.fit.degree);
+    if (node.firstChild == 0) state.coefficients += budget.finalCoefficients(node.fit);
   return evaluations;
 }
 

@@ -77,7 +77,7 @@ class Growth {
   }
 
   void run() {
-    if (state_.stage == Stage::fitBaseCells) fitBaseCells();
+    if (state_.stage == Stage::fitFirstCells) fitFirstCells();
     if (refiner_.observer.afterStep) refiner_.observer.afterStep(state_.steps);
     if (state_.stage == Stage::refine && growsByErrors()) refineWorstCells();
   }
@@ -92,32 +92,40 @@ class Growth {
   /// Returns true if the errors are small enough to end the refinement.
   bool reachedGoal() const { return setup_.growthGoal.reached(state_.totals); }
 
-  void fitBaseCells() {
+  void fitFirstCells() {
     constexpr std::size_t kChunk = 4096;
     BuildTree& tree = state_.tree;
-    const std::size_t count = tree.baseCells();
-    if (tree.nodes.empty()) tree.addBaseCells();
+    if (tree.nodes.empty()) {
+      tree.addBaseCells();
+      if (setup_.exactCells) placeExactLeaves(tree, *setup_.exactCells, setup_.options.maxDepth, setup_.progress);
+    }
+    const std::size_t count = tree.nodes.size();
     const int degree = startDegree(setup_.options);
-    while (state_.fittedBaseCells < count) {
-      const auto begin = std::size_t(state_.fittedBaseCells);
-      setup_.progress.update("fitting base cells", double(begin) / double(count));
+    while (state_.fittedCells < count) {
+      const auto begin = std::size_t(state_.fittedCells);
+      setup_.progress.update("fitting first cells", double(begin) / double(count));
       const std::size_t end = std::min(begin + kChunk, count);
-      tbb::parallel_for(begin, end,
-                        [&](std::size_t n) { tree.nodes[n].fit = fitter_.fit(tree.boxOf(tree.nodes[n]), degree); });
-      state_.fittedBaseCells = end;
+      tbb::parallel_for(begin, end, [&](std::size_t n) {
+        BuildNode& node = tree.nodes[n];
+        if (node.firstChild == 0 && !node.fit.isFinal) node.fit = fitter_.fit(tree.boxOf(node), degree);
+      });
+      state_.fittedCells = end;
       refiner_.observer.atWholeState();
     }
-    state_.coefficients = count * setup_.budget.finalCoefficients(degree);
+    for (const BuildNode& node : tree.nodes)
+      if (node.firstChild == 0) state_.coefficients += setup_.budget.finalCoefficients(node.fit);
     if (setup_.goal.byDistance()) chooseNearness();
     refiner_.sumTotals();
     requireRoomForBaseGrid();
-    for (std::size_t n = 0; n < count; ++n) enqueue(static_cast<std::uint32_t>(n));
+    for (std::size_t n = 0; n < count; ++n)
+      if (tree.nodes[n].firstChild == 0) enqueue(static_cast<std::uint32_t>(n));
     state_.stage = Stage::refine;
   }
 
   void requireRoomForBaseGrid() const {
     double least = 0;
     for (const BuildNode& node : state_.tree.nodes) {
+      if (node.firstChild != 0 || node.fit.isFinal) continue;
       const bool mayLower = setup_.options.criterion == Criterion::optimal && !node.fit.outsideBand;
       least += setup_.budget.leafBytes(mayLower ? leastDegree(setup_.options) : node.fit.degree);
     }
@@ -129,7 +137,7 @@ class Growth {
   void chooseNearness() {
     double distance = 0, volume = 0;
     for (const BuildNode& node : state_.tree.nodes) {
-      if (node.fit.error.near) continue;
+      if (node.firstChild != 0 || node.fit.isFinal || node.fit.error.near) continue;
       distance += node.fit.error.volume * std::abs(node.fit.coefficients[0]);
       volume += node.fit.error.volume;
     }
@@ -139,7 +147,8 @@ class Growth {
     nearness.exponent =
         distance > 0 ? std::log(goal.farSquare / goal.nearSquare) * nearness.diagonal * volume / distance : 0;
     for (BuildNode& node : state_.tree.nodes)
-      node.fit.error.weighted = nearness.weight(node.fit.coefficients[0]) * node.fit.error.squared;
+      if (node.firstChild == 0 && !node.fit.isFinal)
+        node.fit.error.weighted = nearness.weight(node.fit.coefficients[0]) * node.fit.error.squared;
   }
 
   /// Returns false if the goal of the construction is a maximum error alone. Refinement by the integrated errors

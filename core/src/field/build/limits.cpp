@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string>
 
+#include "field/cells/exact_lists.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
 #include "util/refuse.h"
@@ -108,14 +109,14 @@ ErrorGoal errorGoal(const BuildOptions& options, double referenceLength) {
 }
 
 int startDegree(const BuildOptions& options) {
-  if (options.strategy == Strategy::hp) return std::min(2, options.maxDegree);
+  if (isHp(options.strategy)) return std::min(2, options.maxDegree);
   return options.strategy == Strategy::h1 ? 1 : 2;
 }
 
-int leastDegree(const BuildOptions& options) { return options.strategy == Strategy::hp ? 1 : startDegree(options); }
+int leastDegree(const BuildOptions& options) { return isHp(options.strategy) ? 1 : startDegree(options); }
 
 int mostDegree(const BuildOptions& options) {
-  return options.strategy == Strategy::hp ? options.maxDegree : startDegree(options);
+  return isHp(options.strategy) ? options.maxDegree : startDegree(options);
 }
 
 static void requireGridMemory(const BuildOptions& options) {
@@ -133,6 +134,12 @@ static void requireGridMemory(const BuildOptions& options) {
        << " allowed: ";
   if (byMemory < 1) refuse(grid.str(), "allow more memory");
   refuse(grid.str(), "take at most ", std::floor(std::cbrt(byMemory)), " an axis, or allow more memory");
+}
+
+std::size_t ByteBudget::finalCoefficients(const Fit& fit) const {
+  if (!fit.isFinal) return finalCoefficients(fit.degree);
+  const auto listed = static_cast<std::size_t>(fit.isExact() ? listBytes(fit.triangles) / sizeof(float) : 0);
+  return fit.coefficients.size() + listed;
 }
 
 void requireMemory(const MemoryNeed& need, const BuildOptions& options) {

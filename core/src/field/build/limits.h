@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "field/cells/cell_fit.h"
 #include "field/nearness.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/distance_function.h"
@@ -51,6 +52,9 @@ class ByteBudget {
   }
   /// Returns the number of coefficients that a leaf of degree `degree` has in the finished field.
   std::size_t finalCoefficients(int degree) const { return std::size_t(coefficientCount(finalDegree(degree))); }
+  /// Returns the number of coefficients that a leaf with this fit has in the finished field. Each run of an exact
+  /// leaf's list counts as one coefficient.
+  std::size_t finalCoefficients(const Fit& fit) const;
   /// Returns the bytes of a node, including those for blending and for error bounds if the field has them.
   double nodeBytes() const;
   double leafBytes(int degree) const { return bytes(1, double(finalCoefficients(degree))); }

@@ -135,7 +135,7 @@ class MaxErrorPass {
 
   Candidate evaluateCandidate(const BuildNode& leaf) const {
     Candidate candidate;
-    if (leaf.fit.outsideBand) return candidate;
+    if (leaf.fit.outsideBand || leaf.fit.isFinal) return candidate;
     const double most = setup_.options.maxError;
     const std::optional<Refinement> found = refiner_.allowed(leaf);
     const bool mayRefine = refiner_.mayStep() && found;

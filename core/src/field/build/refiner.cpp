@@ -27,7 +27,8 @@ ErrorTotals sumOfErrors(const BuildTree& tree) {
 
 std::optional<Refinement> Refiner::allowed(const BuildNode& leaf) const {
   const BuildOptions& options = setup.options;
-  const bool mayRaise = options.strategy == Strategy::hp && leaf.fit.degree < options.maxDegree;
+  if (leaf.fit.isFinal) return std::nullopt;
+  const bool mayRaise = isHp(options.strategy) && leaf.fit.degree < options.maxDegree;
   const bool maySplit = int(leaf.depth) < options.maxDepth;
   if (mayRaise && maySplit) return Refinement::either;
   if (mayRaise) return Refinement::degree;

@@ -8,17 +8,18 @@
 
 #include "field/build/limits.h"
 #include "field/cells/build_tree.h"
+#include "field/cells/exact_leaves.h"
 
 namespace hpsdf::detail {
 
 /// The state of a construction: all that must be kept so that another process can continue it.
 struct ConstructionState {
   /// The stage of a construction that runs next. All earlier stages are done.
-  enum class Stage : std::uint8_t { fitBaseCells, refine, probe };
+  enum class Stage : std::uint8_t { fitFirstCells, refine, probe };
 
-  Stage stage = Stage::fitBaseCells;
-  std::uint64_t fittedBaseCells = 0;
-  std::uint64_t steps = 0;  ///< refinements so far: leaves whose degree was raised, or that were split
+  Stage stage = Stage::fitFirstCells;
+  std::uint64_t fittedCells = 0;  ///< number of nodes, in their order, whose first fits are done
+  std::uint64_t steps = 0;        ///< refinements so far: leaves whose degree was raised, or that were split
   Nearness nearness;
   ErrorTotals totals;           ///< sums of errors over all leaves, updated with each step
   double lastSum = 0;           ///< `totals.weighted` when it was last summed anew from all leaves
@@ -40,6 +41,7 @@ struct ConstructionSetup {
   ErrorGoal goal;
   ErrorGoal growthGoal;  ///< goal before pruning: a smaller error than `goal` if pruning follows
   const ByteBudget& budget;
+  std::optional<ExactCells> exactCells = {};  ///< makes exact leaves; only for `Strategy::hpx`
 };
 
 /// Callbacks during the refinement of the octree.

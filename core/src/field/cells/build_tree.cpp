@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "field/cells/exact_lists.h"
 #include "field/query/float_coefficients.h"
 #include "hpsdf/error.h"
 
@@ -55,13 +56,25 @@ static std::size_t countCoefficients(const BuildTree& tree) {
   return count;
 }
 
-FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {
+/// Returns a packer that knows which triangles the exact leaves use, or std::nullopt if there are no exact leaves.
+static std::optional<ExactListPacker> makePacker(const BuildTree& tree, const TriangleSearch* search) {
+  std::optional<ExactListPacker> packer;
+  for (const BuildNode& node : tree.nodes) {
+    if (node.firstChild != 0 || !node.fit.isExact()) continue;
+    if (!packer) packer.emplace(*search);
+    packer->mark(node.fit.triangles);
+  }
+  return packer;
+}
+
+FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search) {
   FieldData data;
   data.domain = tree.domain;
   data.grid = tree.grid;
   data.nodes.resize(tree.nodes.size());
   std::vector<double> coefficients;
   coefficients.reserve(countCoefficients(tree));
+  std::optional<ExactListPacker> packer = makePacker(tree, search);
 
   const std::size_t baseCells = tree.baseCells();
   auto nextGroup = static_cast<std::uint32_t>(baseCells);
@@ -75,6 +88,11 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {
       const Pair pair = stack.back();
       stack.pop_back();
       BuildNode& node = tree.nodes[pair.from];
+      if (node.firstChild == 0 && node.fit.isExact()) {
+        data.nodes[pair.to] = node::exactLeaf(node.fit.sign, packer->pack(node.fit.triangles));
+        node.fit = Fit{};
+        continue;
+      }
       if (node.firstChild == 0) {
         data.nodes[pair.to] = node::leaf(node.fit.degree, static_cast<std::uint32_t>(coefficients.size()));
         coefficients.insert(coefficients.end(), node.fit.coefficients.begin(), node.fit.coefficients.end());
@@ -88,18 +106,21 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata) {
   }
 
   data.coefficients = std::move(coefficients);
+  if (packer) data.exact = packer->finish();
   data.metadata = std::move(metadata);
   return data;
 }
 
 void roundCoefficients(CoefficientType type, FieldData& field) {
   constexpr double kNegligible = 0.01;
+  if (query::hasFloatVertices(field.exact)) query::roundVertices(field.exact);
   const query::Rounding rounding = query::floatRounding(field);
   FieldMetadata& metadata = field.metadata;
   const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;
   const bool isNegligible = rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
   if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isNegligible)) return;
   query::toFloat(field);
+  query::roundVertices(field.exact);
   metadata.roundingRms = rounding.rms;
   if (spoilsMaximum) metadata.measuredError += rounding.max;
 }

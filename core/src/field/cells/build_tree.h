@@ -7,6 +7,7 @@
 
 #include "field/cells/cell_fit.h"
 #include "hpsdf/detail/field_data.h"
+#include "hpsdf/detail/triangle_search.h"
 
 namespace hpsdf::detail {
 
@@ -41,9 +42,11 @@ struct BuildTree {
 
 /// Copies the nodes and coefficients into the arrays of a field, depth first, so that neighbours in space are
 /// neighbours in memory. The coefficients remain double. Destroys the tree.
-FieldData layOut(BuildTree&& tree, FieldMetadata metadata);
+/// `search` provides the triangles of exact leaves; it may be nullptr if there are none.
+FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search);
 
-/// Rounds the coefficients of a field from double to `type`. Sets `roundingRms` and `measuredError` in the
+/// Rounds the coefficients of a field, and the vertices of its exact leaves, from double to `type`. Vertices that are
+/// floats already are stored as floats in any case. Sets `roundingRms` and `measuredError` in the
 /// field's metadata.
 void roundCoefficients(CoefficientType type, FieldData& field);
 

@@ -13,6 +13,7 @@
 #include "basis/projection.h"
 #include "field/nearness.h"
 #include "hpsdf/build_options.h"
+#include "hpsdf/detail/exact_triangles.h"
 #include "hpsdf/distance_function.h"
 
 namespace hpsdf::detail {
@@ -33,7 +34,14 @@ struct Fit {
   int degree = 0;
   CellError error;
   bool outsideBand = false;
+  bool isFinal = false;     ///< without error: an exact leaf, or a polynomial that equals Φ; never refined or pruned
   CachedProjection cached;  ///< projection of at least the fit's degree; kept for pruning
+  /// For an exact leaf, whose degree is `kExactDegree`: its triangles, as `TriangleSearch::nearestTo` returns them, and
+  /// how their distance gets its sign.
+  std::vector<std::uint32_t> triangles = {};
+  ExactSign sign = ExactSign::pseudonormal;
+
+  bool isExact() const { return degree == kExactDegree; }
 };
 
 /// The fits that result from the two possible refinements of a cell: a higher degree, or a split into eight

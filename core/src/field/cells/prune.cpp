@@ -42,6 +42,7 @@ class Pruning {
         chosen_(tree.nodes.size()) {
     tbb::parallel_for(std::size_t{0}, tree.nodes.size(), [&](std::size_t n) {
       const Fit& fit = tree.nodes[n].fit;
+      if (isFixed(n)) return;
       squared_[n] = squaredErrors(fit);
       weight_[n] = fit.outsideBand ? 0 : nearness.weight(fit.coefficients[0]);
     });
@@ -63,8 +64,13 @@ class Pruning {
     double bytes = 0;
   };
 
+  /// Returns true for a leaf without error, which stays as it is, and for a node that was split before it had a fit,
+  /// which stays split.
+  bool isFixed(std::size_t n) const { return tree_.nodes[n].fit.cached.coefficients.empty(); }
+
   CellError errorAt(std::size_t n, int degree) const {
     CellError error = tree_.nodes[n].fit.error;
+    if (isFixed(n)) return error;
     error.squared = squared_[n][degree];
     error.weighted = weight_[n] * error.squared;
     return error;
@@ -80,7 +86,7 @@ class Pruning {
       if (first == 0) continue;
       double below = lambda * limits_.nodeBytes;
       for (std::uint32_t child = first; child < first + 8; ++child) below += cost[child];
-      if (below >= cost[n]) continue;
+      if (below >= cost[n] && !isFixed(n)) continue;
       cost[n] = below;
       chosen_[n] = kSplit;
     }
@@ -89,6 +95,10 @@ class Pruning {
   /// Chooses the best degree of node n as a leaf, and returns the cost of the node with this degree.
   double chooseDegree(std::size_t n, double lambda) {
     const Fit& fit = tree_.nodes[n].fit;
+    if (isFixed(n)) {
+      chosen_[n] = static_cast<std::uint8_t>(fit.degree);
+      return lambda * limits_.leafBytes[fit.degree];
+    }
     const int top = std::min<int>(limits_.mostDegree, fit.cached.degree);
     // Keep the degree of a cell outside the narrow band. Its error does not count, so that pruning would choose
     // the lowest degree.
@@ -129,7 +139,8 @@ class Pruning {
   template <typename IsBelow>
   std::pair<double, double> bracket(const IsBelow& isBelow) {
     double high = 0;
-    for (std::size_t n = 0; n < squared_.size(); ++n) high = std::max(high, weight_[n] * squared_[n].front());
+    for (std::size_t n = 0; n < squared_.size(); ++n)
+      if (!isFixed(n)) high = std::max(high, weight_[n] * squared_[n].front());
     double low = 1e-30 * high;
     for (int i = 0; i < kHalvings && low > 0; ++i) {
       const double middle = std::sqrt(low * high);
@@ -156,12 +167,14 @@ class Pruning {
   }
 
   void take(BuildTree& kept, std::size_t n) {
+    const bool wasFixed = isFixed(n);
+    const CellError error = chosen_[n] == kSplit ? CellError{} : errorAt(n, chosen_[n]);
     BuildNode node = std::move(tree_.nodes[n]);
     if (chosen_[n] == kSplit) {
       node.fit = Fit{};
-    } else {
+    } else if (!wasFixed) {
       node.firstChild = 0;
-      node.fit.error = errorAt(n, chosen_[n]);
+      node.fit.error = error;
       node.fit.degree = chosen_[n];
       node.fit.coefficients = basis::truncated(node.fit.cached.coefficients, node.fit.cached.degree, chosen_[n]);
       node.fit.cached = {};

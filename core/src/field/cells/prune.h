@@ -10,11 +10,12 @@
 namespace hpsdf::detail {
 
 struct PruneLimits {
-  ErrorGoal goal;                                     ///< errors that the pruned tree must not exceed
-  std::optional<double> mostBytes = {};               ///< limit of bytes, kept even if the error goal is missed
-  double nodeBytes = 8;                               ///< bytes of an internal node
-  std::array<double, kMaxDegree + 1> leafBytes = {};  ///< bytes of a leaf with its coefficients, by degree
-  int leastDegree = 1;                                ///< least degree of a leaf
+  ErrorGoal goal;                        ///< errors that the pruned tree must not exceed
+  std::optional<double> mostBytes = {};  ///< limit of bytes, kept even if the error goal is missed
+  double nodeBytes = 8;                  ///< bytes of an internal node
+  /// Bytes of a leaf with its coefficients, by degree. The entry of `kExactDegree` is the bytes of its node alone.
+  std::array<double, kExactDegree + 1> leafBytes = {};
+  int leastDegree = 1;  ///< least degree of a leaf
   int mostDegree = kMaxDegree;
 };
 

@@ -20,8 +20,8 @@ namespace {
 // the file was transferred as text.
 constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
-// and criteria; version 4 the inside test.
-constexpr std::uint32_t kFieldVersion = 4;
+// and criteria; version 4 the inside test; version 5 exact leaves.
+constexpr std::uint32_t kFieldVersion = 5;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
 constexpr detail::FileKind kFieldFile{"field file", "a .hpsdf file", "build or copy it again"};
@@ -31,7 +31,28 @@ struct Sizes {
   std::uint64_t coefficients = 0;
   std::uint32_t coefficientBytes = 8;
   std::uint64_t bounds = 0;
+  std::uint32_t vertexBytes = 8;  ///< bytes of one coordinate of a vertex
+  std::uint64_t vertices = 0, triangles = 0, lists = 0;
 };
+
+Sizes sizesOf(const FieldData& data) {
+  Sizes sizes{.nodes = data.nodes.size(), .bounds = data.bounds.size()};
+  std::visit(
+      [&](const auto& c) {
+        sizes.coefficients = c.size();
+        sizes.coefficientBytes = sizeof(c[0]);
+      },
+      data.coefficients);
+  std::visit(
+      [&](const auto& v) {
+        sizes.vertices = v.size();
+        sizes.vertexBytes = sizeof(v[0][0]);
+      },
+      data.exact.vertices);
+  sizes.triangles = data.exact.triangles.size();
+  sizes.lists = data.exact.lists.size();
+  return sizes;
+}
 
 /// Writes or reads the number of refinement steps. `Steps` is const for writing.
 template <typename Stream, typename Steps>
@@ -118,6 +139,22 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   if (version < 4) return;
   stream.item(m.source.insideTest);
   stream.item(m.source.thickness);
+  if (version < 5) return;
+  settingItems(stream, m.settings, 14, 15);
+  stream.item(sizes.vertexBytes);
+  stream.item(sizes.vertices);
+  stream.item(sizes.triangles);
+  stream.item(sizes.lists);
+  stream.item(data.exact.offset);
+}
+
+/// Reads an array of `size` numbers of type float or double, whose size in bytes is `bytes`, into a variant of vectors.
+template <typename Single, typename Double, typename Variant>
+void arrayOf(detail::CheckedReader& reader, std::uint32_t bytes, std::uint64_t size, Variant& out) {
+  if (bytes == sizeof(float))
+    reader.array(out.template emplace<std::vector<Single>>(), size);
+  else
+    reader.array(out.template emplace<std::vector<Double>>(), size);
 }
 
 }  // namespace
@@ -126,15 +163,15 @@ void save(const Field& field, const std::filesystem::path& file) {
   const FieldData& data = field.data();
   detail::CheckedWriter writer(file);
   writer.begin(kFieldMagic, kFieldVersion);
-  std::visit(
-      [&](const auto& coefficients) {
-        const Sizes sizes{data.nodes.size(), coefficients.size(), sizeof(coefficients[0]), data.bounds.size()};
-        header(writer, data, sizes, kFieldVersion);
-        writer.array(data.nodes, sizes.nodes);
-        writer.array(coefficients, sizes.coefficients);
-      },
-      data.coefficients);
-  writer.array(data.bounds, data.bounds.size());
+  const Sizes sizes = sizesOf(data);
+  header(writer, data, sizes, kFieldVersion);
+  const auto write = [&](const auto& array) { writer.array(array, array.size()); };
+  write(data.nodes);
+  std::visit(write, data.coefficients);
+  write(data.bounds);
+  std::visit(write, data.exact.vertices);
+  write(data.exact.triangles);
+  write(data.exact.lists);
   writer.finish();
 }
 
@@ -152,15 +189,16 @@ Field load(const std::filesystem::path& file) {
   Sizes sizes;
   header(reader, data, sizes, *version);
   reader.require(sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8, "its coefficients have an unknown type");
+  reader.require(sizes.vertexBytes == 4 || sizes.vertexBytes == 8, "its vertices have an unknown type");
   Source& source = data.metadata.source;
   reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
   if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
   reader.array(data.nodes, sizes.nodes);
-  if (sizes.coefficientBytes == 4)
-    reader.array(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);
-  else
-    reader.array(data.coefficients.emplace<std::vector<double>>(), sizes.coefficients);
+  arrayOf<float, double>(reader, sizes.coefficientBytes, sizes.coefficients, data.coefficients);
   reader.array(data.bounds, sizes.bounds);
+  arrayOf<Eigen::Vector3f, Eigen::Vector3d>(reader, sizes.vertexBytes, sizes.vertices, data.exact.vertices);
+  reader.array(data.exact.triangles, sizes.triangles);
+  reader.array(data.exact.lists, sizes.lists);
   reader.finish();
   try {
     return Field(std::move(data));

@@ -215,10 +215,16 @@ class PartitionOfUnity<ValueAndGradient> {
   Vector3 weightsGradient_ = Vector3::Zero(), sumGradient_ = Vector3::Zero();
 };
 
-/// Evaluates the polynomial of one leaf, without blending. `Result` is double or `ValueAndGradient`.
+/// Evaluates one leaf at the point with the grid coordinates `gridCoordinates`, without blending. `Result` is double or
+/// `ValueAndGradient`.
 template <typename Result>
-Result evaluateLeaf(const FieldData& field, const GridFrame& frame, const LeafPoint& leaf) {
+Result evaluateLeaf(const FieldData& field, const GridFrame& frame, const std::array<double, 3>& gridCoordinates,
+                    const LeafPoint& leaf) {
   Result result;
+  if (node::isExact(leaf.bits)) [[unlikely]] {
+    evaluateExact(field.exact, leaf.bits, worldPoint(frame, gridCoordinates), result);
+    return result;
+  }
   std::visit([&](const auto& c) { evaluateLeaf(c.data(), frame, leaf, result); }, field.coefficients);
   return result;
 }
@@ -235,7 +241,7 @@ Result blendAll(const FieldData& field, const LookupGrid& lookupGrid, const std:
       ramps[axis] = rampAlong(field, lookupGrid, leaf, axis);
       if (!(ramps[axis].value > 0)) return;
     }
-    blend.add(ramps, evaluateLeaf<Result>(field, lookupGrid.frame, leaf));
+    blend.add(ramps, evaluateLeaf<Result>(field, lookupGrid.frame, gridCoordinates, leaf));
   });
   return blend.result();
 }
@@ -257,14 +263,15 @@ Result blendInZone(const FieldData& field, const LookupGrid& lookupGrid, const s
     across.path |= pathBits(a, across.fixedPoint[a]);
   }
   if (across.fixedPoint[axis] < 0 || across.fixedPoint[axis] > frame.last[axis])
-    return evaluateLeaf<Result>(field, frame, leaf);
+    return evaluateLeaf<Result>(field, frame, gridCoordinates, leaf);
   const LeafPoint other = findLeaf(field, lookupGrid, across);
 
   // Blend the two leaves, or all leaves if a third one also has a weight at the point.
   if (!onlyTwoOverlap(field, other.local, axis))
     return blendAll<Result>(field, lookupGrid, gridCoordinates, leaf.depth);
-  return blendTwo(evaluateLeaf<Result>(field, frame, leaf), rampAlong(field, lookupGrid, leaf, axis),
-                  evaluateLeaf<Result>(field, frame, other), rampAlong(field, lookupGrid, other, axis), axis);
+  return blendTwo(evaluateLeaf<Result>(field, frame, gridCoordinates, leaf), rampAlong(field, lookupGrid, leaf, axis),
+                  evaluateLeaf<Result>(field, frame, gridCoordinates, other), rampAlong(field, lookupGrid, other, axis),
+                  axis);
 }
 
 /// Evaluates the field at a point of a leaf. If the point is on a face of the leaf, the result is the limit
@@ -274,7 +281,7 @@ Result evaluateInLeaf(const FieldData& field, const LookupGrid& lookupGrid,
                       const std::array<double, 3>& gridCoordinates, const LeafPoint& leaf) {
   if (const unsigned axes = blendZoneAxes(field, leaf.local); axes != 0)
     return blendInZone<Result>(field, lookupGrid, gridCoordinates, leaf, axes);
-  return evaluateLeaf<Result>(field, lookupGrid.frame, leaf);
+  return evaluateLeaf<Result>(field, lookupGrid.frame, gridCoordinates, leaf);
 }
 
 }  // namespace hpsdf::query

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "basis/legendre.h"
+#include "field/query/exact_leaf.h"
 #include "field/query/leaves.h"
 #include "hpsdf/detail/field_data.h"
 #include "hpsdf/detail/lookup_grid.h"
@@ -207,8 +208,8 @@ ValueAndGradient evaluateWithGradient(const T* coefficients, int degree, const s
   return {value, {x, y, z}};
 }
 
-/// Evaluates the polynomial of a leaf at a point. The overload for `ValueAndGradient` gives the gradient in
-/// world units.
+/// Evaluates the polynomial of a leaf, which is not exact, at a point. The overload for `ValueAndGradient` gives the
+/// gradient in world units.
 template <typename T>
 void evaluateLeaf(const T* coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
   value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);

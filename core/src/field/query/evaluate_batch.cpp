@@ -164,8 +164,9 @@ void listByDegree(const T* coefficients, Batch& batch) {
   std::array<std::size_t, kLists> counts{};
   for (std::size_t i = 0; i < batch.count; ++i) {
     const int degree = node::degree(batch.bits[i]);
-    const T* first = coefficients + node::offset(batch.bits[i]);
-    const std::size_t last = coefficientCount(degree) - 1;
+    const bool isExact = degree == kExactDegree;
+    const T* first = coefficients + (isExact ? 0 : node::offset(batch.bits[i]));
+    const std::size_t last = isExact ? 0 : coefficientCount(degree) - 1;
     // Prefetch the same number of cache lines for each leaf, because a varying end of the loop would be
     // mispredicted.
     for (std::size_t at = 0; at < coefficientCount(kMaxVectorDegree); at += 64 / sizeof(T))
@@ -270,13 +271,19 @@ void evaluateListed(const T* coefficients, const GridFrame& frame, const Batch& 
   }
 }
 
-/// Evaluates, at each point of a batch, the polynomial of the leaf that holds the point, without blending.
+/// Evaluates, at each point of a batch, the leaf that holds the point, without blending.
 template <typename T, typename Result>
-void evaluateLeaves(const T* coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
+void evaluateLeaves(const FieldData& field, const T* coefficients, const GridFrame& frame, const Batch& batch,
+                    Result* out) {
   forEachUpTo(Constant<kMaxVectorDegree - kMinVectorDegree>(),
               [&](auto k) { evaluateListed<kMinVectorDegree + k>(coefficients, frame, batch, out); });
   for (std::size_t n = 0; n < batch.listedCount[kLists - 1]; ++n) {
     const std::size_t i = batch.listed[kLists - 1][n];
+    if (node::isExact(batch.bits[i])) {
+      const auto& [x, y, z] = batch.coordinates;
+      evaluateExact(field.exact, batch.bits[i], worldPoint(frame, {x[i], y[i], z[i]}), out[i]);
+      continue;
+    }
     const auto& local = batch.leafPoints[i].local;
     const LeafPoint leaf{batch.bits[i], LookupGrid::depthOf(batch.bits[i]), {local[0], local[1], local[2]}, {}, 0};
     evaluateLeaf(coefficients, frame, leaf, out[i]);
@@ -373,7 +380,7 @@ void blend(const FieldData& field, const LookupGrid& lookupGrid, const T* coeffi
   listByDegree(coefficients, others);
   enterLeaves(others);
   Result acrossResults[kBatch];
-  evaluateLeaves(coefficients, lookupGrid.frame, others, acrossResults);
+  evaluateLeaves(field, coefficients, lookupGrid.frame, others, acrossResults);
 
   // Blend the two leaves of each collected point, or all leaves if a third one also has a weight at the point.
   for (std::size_t other = 0; other < others.count; ++other) {
@@ -413,7 +420,7 @@ void evaluateAll(const FieldData& field, const LookupGrid& lookupGrid, std::span
         [&](const auto& c) {
           listByDegree(c.data(), batch);
           enterLeaves(batch);
-          evaluateLeaves(c.data(), lookupGrid.frame, batch, out.data() + first);
+          evaluateLeaves(field, c.data(), lookupGrid.frame, batch, out.data() + first);
           if (field.blend > 0) blend(field, lookupGrid, c.data(), batch, out.data() + first);
           continueAllOutside(lookupGrid.frame, batch, out.data() + first);
         },

@@ -47,6 +47,10 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     if (depth[n] == kUnreached) notAField("node " + std::to_string(n) + " is no other node's child");
     if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
+    if (node::isExact(nodes[n])) {
+      if (node::offset(nodes[n]) >= data.exact.lists.size()) notAField("a cell's triangles lie beyond the end");
+      continue;
+    }
     if (node::isLeaf(nodes[n])) {
       const int degree = node::degree(nodes[n]);
       if (degree > kMaxDegree) notAField("a cell has degree " + std::to_string(degree));
@@ -61,6 +65,23 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
     if (depth[n] == kMaxDepth) notAField("it is deeper than " + std::to_string(kMaxDepth) + " levels");
     std::fill_n(depth.begin() + first, 8, std::uint8_t(depth[n] + 1));
   }
+}
+
+/// Throws `Error` unless all indices and coordinates of the exact leaves' triangles are in range.
+void checkExact(const ExactTriangles& exact) {
+  const std::size_t vertices = std::visit([](const auto& v) { return v.size(); }, exact.vertices);
+  const bool isFinite = std::visit(
+      [](const auto& v) { return std::ranges::all_of(v, [](const auto& vertex) { return vertex.allFinite(); }); },
+      exact.vertices);
+  if (!isFinite) notAField("a vertex is not finite");
+  for (const auto& triangle : exact.triangles)
+    for (const std::uint32_t vertex : triangle)
+      if (vertex >= vertices) notAField("a triangle refers to vertex " + std::to_string(vertex));
+  for (const std::uint32_t run : exact.lists)
+    if (std::size_t(triangle_run::first(run)) + triangle_run::length(run) > exact.triangles.size())
+      notAField("a list of triangles refers beyond their end");
+  if (!exact.lists.empty() && !triangle_run::isLast(exact.lists.back())) notAField("a list of triangles has no end");
+  if (!(exact.offset >= 0) || !std::isfinite(exact.offset)) notAField("the offset of its exact cells is out of range");
 }
 
 void checkBlendAndBounds(const FieldData& data) {
@@ -90,6 +111,7 @@ Cell makeCell(const FieldData& field, const GridFrame& frame, const OctreeNode& 
             .depth = leaf.depth,
             .error = 0};
   const double volume = cellSize(field, leaf.depth).prod();
+  if (node::isExact(bits)) return cell;
   cell.error = std::visit(
       [&](const auto& c) { return basis::topDegreeError(c.data() + node::offset(bits), cell.degree, volume); },
       field.coefficients);
@@ -113,14 +135,17 @@ Field::Field(FieldData data) : data_(std::move(data)) {
           if (!std::isfinite(c)) notAField("a coefficient is not finite");
       },
       data_.coefficients);
+  checkExact(data_.exact);
   checkBlendAndBounds(data_);
   lookupGrid_ = makeLookupGrid(data_);
 }
 
 std::size_t Field::bytes() const {
   const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
+  const ExactTriangles& exact = data_.exact;
   return sizeOf(data_.nodes) + sizeOf(data_.bounds) + sizeOf(lookupGrid_.entries) + sizeOf(lookupGrid_.blendExtents) +
-         std::visit(sizeOf, data_.coefficients);
+         std::visit(sizeOf, data_.coefficients) + std::visit(sizeOf, exact.vertices) + sizeOf(exact.triangles) +
+         sizeOf(exact.lists);
 }
 
 double Field::value(const Vector3& x) const { return evaluateAt<double>(data_, lookupGrid_, x); }

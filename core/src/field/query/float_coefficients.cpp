@@ -26,7 +26,7 @@ Rounding floatRounding(const FieldData& field) {
   double sum = 0;
   visitNodes(field, [&](const OctreeNode& at) {
     const std::uint64_t bits = field.nodes[at.node];
-    if (!node::isLeaf(bits)) return true;
+    if (!node::isLeaf(bits) || node::isExact(bits)) return true;
     const double* c = &coefficients[node::offset(bits)];
     double squares = 0, max = 0;
     basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
@@ -40,6 +40,20 @@ Rounding floatRounding(const FieldData& field) {
   });
   rounding.rms = std::sqrt(sum / field.domain.sizes().prod());
   return rounding;
+}
+
+bool hasFloatVertices(const ExactTriangles& exact) {
+  const auto* vertices = std::get_if<std::vector<Eigen::Vector3d>>(&exact.vertices);
+  return vertices == nullptr ||
+         std::ranges::all_of(*vertices, [](const Eigen::Vector3d& v) { return v.cast<float>().cast<double>() == v; });
+}
+
+void roundVertices(ExactTriangles& exact) {
+  const auto* vertices = std::get_if<std::vector<Eigen::Vector3d>>(&exact.vertices);
+  if (vertices == nullptr) return;
+  std::vector<Eigen::Vector3f> rounded(vertices->size());
+  std::ranges::transform(*vertices, rounded.begin(), [](const Eigen::Vector3d& v) { return v.cast<float>().eval(); });
+  exact.vertices = std::move(rounded);
 }
 
 void toFloat(FieldData& field) { convert<float, double>(field); }

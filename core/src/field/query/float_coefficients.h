@@ -20,4 +20,9 @@ Rounding floatRounding(const FieldData& field);
 void toFloat(FieldData& field);
 void toDouble(FieldData& field);
 
+/// Returns true if every vertex of the exact leaves is equal to a vertex of three floats.
+bool hasFloatVertices(const ExactTriangles& exact);
+/// Rounds the vertices of the exact leaves to float.
+void roundVertices(ExactTriangles& exact);
+
 }  // namespace hpsdf::query

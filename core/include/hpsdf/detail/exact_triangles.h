@@ -1,0 +1,50 @@
+#pragma once
+// The triangles to which the exact leaves of a field measure their distances.
+
+#include <array>
+#include <cstdint>
+#include <variant>
+#include <vector>
+
+#include "hpsdf/types.h"
+
+namespace hpsdf {
+
+/// The triangles of a field's exact leaves. An exact leaf refers to a list of triangles. The list contains every
+/// triangle that is nearest to any point of the leaf, and all triangles that share a nearest edge or vertex. In an exact
+/// leaf, the field is the exact signed distance to the listed triangles.
+///
+/// A list is a sequence of runs in `lists`, from the leaf's offset up to the first run that is marked as the last one.
+/// A run is a sequence of triangles with successive indices.
+struct ExactTriangles {
+  /// Vertices in world units: doubles, or floats where these suffice.
+  std::variant<std::vector<Eigen::Vector3d>, std::vector<Eigen::Vector3f>> vertices;
+  /// Three indices into `vertices` each, counter-clockwise as seen from outside. Triangles that are close in space are
+  /// close in this list.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<std::uint32_t> lists;  ///< runs, see `namespace triangle_run`
+  double offset = 0;                 ///< subtracted from every distance: half of the thickness of a shell
+
+  bool empty() const { return lists.empty(); }
+};
+
+/// Functions that pack and unpack a run of triangles: the index of its first triangle in bits 0 to 26, the number of its
+/// triangles minus 1 in bits 27 to 30, and in bit 31 whether it is the last run of its list.
+namespace triangle_run {
+constexpr std::uint32_t kMostTriangles = std::uint32_t{1} << 27;  ///< number of triangles that a run can refer to
+constexpr std::uint32_t kMostLength = 16;
+constexpr std::uint32_t kLast = std::uint32_t{1} << 31;
+constexpr std::uint32_t packed(std::uint32_t first, std::uint32_t length) { return (length - 1) << 27 | first; }
+constexpr std::uint32_t first(std::uint32_t run) { return run & (kMostTriangles - 1); }
+constexpr std::uint32_t length(std::uint32_t run) { return (run >> 27 & 15) + 1; }
+constexpr bool isLast(std::uint32_t run) { return (run & kLast) != 0; }
+}  // namespace triangle_run
+
+/// How the sign of the distance in an exact leaf is found.
+enum class ExactSign : std::uint8_t {
+  pseudonormal,  ///< by the angle-weighted pseudonormal of the nearest face, edge or vertex (Bærentzen & Aanæs 2005)
+  positive,      ///< the distance is positive throughout the leaf
+  negative,      ///< the distance is negative throughout the leaf
+};
+
+}  // namespace hpsdf

@@ -1,0 +1,104 @@
+#include "field/cells/exact_leaves.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace hpsdf::detail {
+namespace {
+
+/// A plane that contains triangles up to the rounding of their vertices to float.
+struct CommonPlane {
+  Vector3 origin, normal;
+};
+
+std::optional<CommonPlane> commonPlane(const TriangleSearch& search, std::span<const std::uint32_t> triangles) {
+  const auto corner = [&](std::uint32_t triangle, int k) -> const Vector3& {
+    return search.vertices()[search.triangles()[triangle][k]];
+  };
+  const auto normalOf = [&](std::uint32_t triangle) -> Vector3 {
+    return (corner(triangle, 1) - corner(triangle, 0)).cross(corner(triangle, 2) - corner(triangle, 0));
+  };
+  const std::uint32_t largest = *std::ranges::max_element(
+      triangles, {}, [&](std::uint32_t triangle) { return normalOf(triangle).squaredNorm(); });
+  if (!(normalOf(largest).norm() > 0)) return std::nullopt;
+  const CommonPlane plane{corner(largest, 0), normalOf(largest).normalized()};
+  for (const std::uint32_t triangle : triangles) {
+    if (normalOf(triangle).dot(plane.normal) < 0) return std::nullopt;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3& v = corner(triangle, k);
+      const double size = v.cwiseAbs().maxCoeff() + plane.origin.cwiseAbs().maxCoeff();
+      if (std::abs((v - plane.origin).dot(plane.normal)) > std::numeric_limits<float>::epsilon() * size)
+        return std::nullopt;
+    }
+  }
+  return plane;
+}
+
+/// Returns the fit of degree 1 that is the signed distance to a plane.
+Fit planeFit(const Box& cell, const CommonPlane& plane) {
+  Fit fit;
+  fit.degree = 1;
+  const Vector3 slope = plane.normal.cwiseProduct(cell.sizes() / 2);
+  fit.coefficients = {plane.normal.dot(cell.center() - plane.origin), slope.z(), slope.y(), slope.x()};
+  return fit;
+}
+
+}  // namespace
+
+std::optional<Fit> ExactCells::fit(const Box& cell, bool isDivisible) const {
+  constexpr std::size_t kLonger = 64;
+  auto triangles = search_.nearestTo(cell, isDivisible ? most_ : kLonger * most_);
+  if (!triangles) return std::nullopt;
+  const std::optional<ExactSign> sign = search_.signIn(cell, *triangles);
+  if (!sign) return std::nullopt;
+  Fit fit;
+  const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, *triangles) : std::nullopt;
+  if (plane) {
+    fit = planeFit(cell, *plane);
+  } else {
+    fit.degree = kExactDegree;
+    fit.triangles = std::move(*triangles);
+    fit.sign = *sign;
+  }
+  fit.isFinal = true;
+  fit.error.volume = cell.volume();
+  fit.error.near = true;
+  return fit;
+}
+
+void placeExactLeaves(BuildTree& tree, const ExactCells& cells, int maxDepth, const Progress& progress) {
+  constexpr std::size_t kChunk = 1024;
+  enum class Choice : std::uint8_t { leave, exact, split };
+  std::vector<std::uint32_t> level(tree.nodes.size());
+  for (std::uint32_t n = 0; n < level.size(); ++n) level[n] = n;
+  for (int depth = 0; !level.empty(); ++depth) {
+    std::vector<Choice> choices(level.size(), Choice::leave);
+    for (std::size_t begin = 0; begin < level.size(); begin += kChunk) {
+      progress.update("finding exact cells", double(begin) / double(level.size()));
+      tbb::parallel_for(begin, std::min(begin + kChunk, level.size()), [&](std::size_t i) {
+        BuildNode& node = tree.nodes[level[i]];
+        const Box box = tree.boxOf(node);
+        if (!cells.mustBeExact(box)) return;
+        const bool isDivisible = depth < maxDepth;
+        if (auto fit = cells.fit(box, isDivisible)) {
+          node.fit = std::move(*fit);
+          choices[i] = Choice::exact;
+        } else if (isDivisible) {
+          choices[i] = Choice::split;
+        }
+      });
+    }
+    std::vector<std::uint32_t> next;
+    for (std::size_t i = 0; i < level.size(); ++i) {
+      if (choices[i] != Choice::split) continue;
+      tree.split(level[i], {});
+      for (std::uint32_t child = 0; child < 8; ++child) next.push_back(tree.nodes[level[i]].firstChild + child);
+    }
+    level = std::move(next);
+  }
+}
+
+}  // namespace hpsdf::detail

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "hpsdf/detail/exact_triangles.h"
+#include "hpsdf/detail/triangle_search.h"
+
+namespace hpsdf::detail {
+
+/// Collects the lists of exact leaves and packs them into the arrays of a field. Equal lists are stored once. Only
+/// triangles that are in a list are stored.
+class ExactListPacker {
+ public:
+  explicit ExactListPacker(const TriangleSearch& search) : search_(search), numbers_(search.triangles().size(), kUnused) {}
+
+  /// Marks triangles as used. All lists must be marked before the first one is packed.
+  void mark(std::span<const std::uint32_t> triangles);
+  /// Packs a list and returns its offset.
+  std::uint32_t pack(std::span<const std::uint32_t> triangles);
+  /// Returns the packed lists with the triangles and vertices to which they refer. The vertices are doubles.
+  ExactTriangles finish();
+
+ private:
+  static constexpr std::uint32_t kUnused = 0xffffffff;
+
+  void number();
+
+  const TriangleSearch& search_;
+  std::vector<std::uint32_t> numbers_;  ///< for each triangle of the search, its index in the field
+  bool isNumbered_ = false;
+  std::vector<std::uint32_t> lists_;
+  std::map<std::vector<std::uint32_t>, std::uint32_t> offsets_;  ///< offsets by list of runs
+};
+
+/// Number of bytes of a list in the arrays of a field, if no other leaf has the same list.
+double listBytes(std::span<const std::uint32_t> triangles);
+
+}  // namespace hpsdf::detail

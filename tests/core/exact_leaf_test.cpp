@@ -1,0 +1,154 @@
+// Tests exact leaves: leaves that keep the triangles nearest to their points.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../support/made_meshes.h"
+#include "../support/temporary_directory.h"
+#include "../support/test_mesh.h"
+#include "hpsdf/build.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/mesh_file.h"
+#include "hpsdf/shapes.h"
+
+namespace hpsdf {
+namespace exact_leaf_test {
+
+using support::placesIn;
+
+struct Part {
+  TriangleMesh mesh;
+  DistanceOptions distance = {};
+};
+
+Part partOf(const std::string& name) {
+  if (name == "shell") return {support::openBox(), {.insideTest = InsideTest::shell, .thickness = 0.1}};
+  if (name == "fandisk") return {loadMesh(support::testMesh("cad/fandisk.obj"))};
+  return {shapes::mesh(name)};
+}
+
+BuildOptions hpx(double target = 1e-6) { return {.targetError = target, .strategy = Strategy::hpx}; }
+
+class ExactLeaf : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    if (GetParam() == "fandisk") HPSDF_SKIP_WITHOUT_MESHES();
+  }
+};
+
+TEST_P(ExactLeaf, givesTheExactDistanceAndItsGradient) {
+  const Part part = partOf(GetParam());
+  const ExactDistance exact(part.mesh, part.distance);
+  BuildOptions options = hpx();
+  options.coefficients = CoefficientType::float64;
+  const Field field = build(exact, domainAround(part.mesh), options);
+  const double size = boundingBox(part.mesh).sizes().maxCoeff();
+  int count = 0;
+  for (const Vector3& x : placesIn(field.domain(), 20000)) {
+    if (!field.domain().contains(x) || field.cellAt(x).degree != kExactDegree) continue;
+    ++count;
+    const ClosestPoint closest = exact.closestPoint(x);
+    const ValueAndGradient found = field.valueAndGradient(x);
+    ASSERT_NEAR(found.value, closest.signedDistance, 1e-12 * size) << x.transpose();
+    ASSERT_EQ(found.value, field.value(x));
+    ASSERT_NEAR(found.gradient.norm(), 1, 1e-9);
+    // the gradient leads back to a point of the surface that is as near as the closest one
+    const double unsignedDistance = found.value + part.distance.thickness / 2;
+    const Vector3 foot = x - unsignedDistance * found.gradient;
+    ASSERT_NEAR(std::abs(exact(foot) + part.distance.thickness / 2), 0, 1e-9 * size) << x.transpose();
+  }
+  EXPECT_GT(count, 50);
+}
+
+TEST_P(ExactLeaf, isExactNearTheSurface) {
+  const Part part = partOf(GetParam());
+  const ExactDistance exact(part.mesh, part.distance);
+  const BuildOptions options = hpx();
+  const Field field = build(exact, domainAround(part.mesh), options);
+  const double size = boundingBox(part.mesh).sizes().maxCoeff();
+  double greatest = 0;
+  int count = 0;
+  for (const Vector3& place : placesIn(field.domain(), 20000)) {
+    const Vector3 x = place - 0.99 * exact(place) * (place - exact.closestPoint(place).point).normalized();
+    const double distance = exact(x);
+    if (!field.domain().contains(x) || std::abs(distance) > options.exactWithin * size) continue;
+    ++count;
+    greatest = std::max(greatest, std::abs(field.value(x) - distance));
+  }
+  EXPECT_GT(count, 1000);
+  EXPECT_LT(greatest, 1e-6 * size);
+}
+
+TEST_P(ExactLeaf, isTheSameInBatches) {
+  const Part part = partOf(GetParam());
+  const ExactDistance exact(part.mesh, part.distance);
+  BuildOptions options = hpx();
+  for (const double blend : {0.0, kDefaultBlend}) {
+    options.blend = blend;
+    const Field field = build(exact, domainAround(part.mesh), options);
+    const std::vector<Vector3> points = placesIn(field.domain(), 5000);
+    std::vector<double> values(points.size());
+    std::vector<ValueAndGradient> both(points.size());
+    field.values(points, values);
+    field.valuesAndGradients(points, both);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const ValueAndGradient single = field.valueAndGradient(points[i]);
+      ASSERT_EQ(values[i], field.value(points[i]));
+      ASSERT_EQ(both[i].value, single.value);
+      ASSERT_EQ(both[i].gradient, single.gradient);
+    }
+  }
+}
+
+TEST_P(ExactLeaf, survivesAFile) {
+  const Part part = partOf(GetParam());
+  const support::TemporaryDirectory directory;
+  for (const CoefficientType type : {CoefficientType::float32, CoefficientType::float64}) {
+    BuildOptions options = hpx();
+    options.coefficients = type;
+    const Field field = build(ExactDistance(part.mesh, part.distance), domainAround(part.mesh), options);
+    save(field, directory / "field.hpsdf");
+    const Field loaded = load(directory / "field.hpsdf");
+    EXPECT_EQ(loaded.bytes(), field.bytes());
+    EXPECT_EQ(loaded.data().nodes, field.data().nodes);
+    EXPECT_EQ(loaded.data().exact.lists, field.data().exact.lists);
+    EXPECT_EQ(loaded.metadata().settings.exactTriangles, options.exactTriangles);
+    for (const Vector3& x : placesIn(field.domain(), 500)) ASSERT_EQ(loaded.value(x), field.value(x));
+  }
+}
+
+TEST_P(ExactLeaf, doesNotDependOnThreads) {
+  const Part part = partOf(GetParam());
+  const ExactDistance exact(part.mesh, part.distance);
+  BuildOptions options = hpx();
+  const Field field = build(exact, domainAround(part.mesh), options);
+  options.threads = 1;
+  const Field alone = build(exact, domainAround(part.mesh), options);
+  EXPECT_EQ(alone.data().nodes, field.data().nodes);
+  EXPECT_EQ(alone.data().coefficients, field.data().coefficients);
+  EXPECT_EQ(alone.data().exact.lists, field.data().exact.lists);
+}
+
+INSTANTIATE_TEST_SUITE_P(Parts, ExactLeaf, testing::Values("box", "gear", "shell", "fandisk"),
+                         [](const auto& part) { return part.param; });
+
+TEST(ExactLeaves, ofACubeNeedFewBytes) {
+  const TriangleMesh cube = support::boxOfTwo();
+  const Field field = build(ExactDistance(cube), domainAround(cube), hpx());
+  EXPECT_LT(field.data().exact.lists.size(), 1000U);
+  EXPECT_EQ(field.data().exact.triangles.size(), cube.triangles.size());
+}
+
+TEST(ExactLeaves, needADistanceToTriangles) {
+  const auto ball = [](const Vector3& x) { return x.norm() - 0.5; };
+  const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
+  const Field plain = build(ball, domain), asked = build(ball, domain, hpx());
+  EXPECT_EQ(asked.data().nodes, plain.data().nodes);
+  EXPECT_TRUE(asked.data().exact.empty());
+}
+
+}  // namespace exact_leaf_test
+}  // namespace hpsdf
