@@ -26,6 +26,8 @@ struct Part {
 
 Part partOf(const std::string& name) {
   if (name == "shell") return {support::openBox(), {.insideTest = InsideTest::shell, .thickness = 0.1}};
+  if (name == "overlap")  // two boxes, one of which reaches into the other
+    return {support::joined(support::boxOfTwo(), support::moved(support::boxOfTwo(), {0.7, 0.6, 0.5}))};
   if (name == "fandisk") return {loadMesh(support::testMesh("cad/fandisk.obj"))};
   return {shapes::mesh(name)};
 }
@@ -79,6 +81,7 @@ TEST_P(ExactLeaf, isExactNearTheSurface) {
     greatest = std::max(greatest, std::abs(field.value(x) - distance));
   }
   EXPECT_GT(count, 1000);
+  if (GetParam() == "overlap") return;  // cells in which triangles intersect are not exact
   EXPECT_LT(greatest, 1e-6 * size);
 }
 
@@ -132,7 +135,7 @@ TEST_P(ExactLeaf, doesNotDependOnThreads) {
   EXPECT_EQ(alone.data().exact.lists, field.data().exact.lists);
 }
 
-INSTANTIATE_TEST_SUITE_P(Parts, ExactLeaf, testing::Values("box", "gear", "shell", "fandisk"),
+INSTANTIATE_TEST_SUITE_P(Parts, ExactLeaf, testing::Values("box", "gear", "shell", "overlap", "fandisk"),
                          [](const auto& part) { return part.param; });
 
 TEST(ExactLeaves, ofACubeNeedFewBytes) {

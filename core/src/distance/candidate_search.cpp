@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "bvh/search.h"
+#include "mesh/triangle_bounds.h"
 
 namespace hpsdf::distance {
 namespace {
@@ -96,50 +98,95 @@ class Collector {
   std::vector<std::uint32_t> found_;
 };
 
-/// Finds which of some triangles can be nearest to a point of a box, by dividing the box into smaller ones.
+/// Finds which of some triangles can be nearest to a point of a box, by dividing the box into smaller ones. Works in
+/// single precision relative to the centre of the box.
 class Sifter {
  public:
-  Sifter(const Hierarchy& hierarchy, std::size_t most) : hierarchy_(hierarchy), most_(most) {}
-
-  /// Adds the triangles that can be nearest to a point of `box` to the result. Returns false as soon as the result has
-  /// more than `most` triangles.
-  bool sift(const Box& box, std::span<const std::uint32_t> triangles, int levels) {
+  Sifter(const Hierarchy& hierarchy, const Box& box, std::span<const std::uint32_t> slots, std::size_t most)
+      : most_(most), halfSize_((box.sizes() / 2).cast<float>()), found_(slots.size()), corners_(slots.size()) {
     const Vector3 centre = box.center();
-    std::vector<double> distances(triangles.size());
-    double nearest = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      distances[i] = std::sqrt(bvh::squaredDistance(hierarchy_.frames()[triangles[i]], centre));
-      nearest = std::min(nearest, distances[i]);
-    }
-    const double radius = halfDiagonal(box);
-    const double limit = (nearest + 2 * radius) * (1 + kRounding);
-    std::vector<std::uint32_t> kept;
-    bool allKnown = true;
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      if (distances[i] > limit) continue;
-      kept.push_back(triangles[i]);
-      allKnown = allKnown && std::ranges::binary_search(found_, triangles[i]);
-    }
-    if (allKnown) return true;
-    if (levels == 0) return add(kept);
-    bool fits = true;
-    forEachOctant(box, [&](const Box& part) { fits = fits && sift(part, kept, levels - 1); });
-    return fits;
+    for (std::size_t i = 0; i < slots.size(); ++i)
+      for (int k = 0; k < 3; ++k)
+        corners_[i][k] << (hierarchy.vertices()[hierarchy.triangles()[slots[i]][k]] - centre).cast<float>(), 0;
   }
 
-  std::vector<std::uint32_t>& found() { return found_; }
+  /// Returns the places, among the triangles, of those that can be nearest to a point of the box; or std::nullopt as
+  /// soon as there are more than `most`.
+  std::optional<std::vector<std::uint32_t>> sift() {
+    kept_[kLevels + 1].resize(corners_.size());
+    std::iota(kept_[kLevels + 1].begin(), kept_[kLevels + 1].end(), 0U);
+    if (!sift(Eigen::Vector3f::Zero(), kLevels)) return std::nullopt;
+    std::vector<std::uint32_t> places;
+    for (std::uint32_t i = 0; i < found_.size(); ++i)
+      if (found_[i] != 0) places.push_back(i);
+    return places;
+  }
 
  private:
-  bool add(const std::vector<std::uint32_t>& triangles) {
-    std::vector<std::uint32_t> merged;
-    std::ranges::set_union(found_, triangles, std::back_inserter(merged));
-    found_ = std::move(merged);
-    return found_.size() <= most_;
+  static constexpr int kLevels = 3;  ///< the box is divided into 8³ smaller boxes
+
+  /// Sifts the triangles that remain from the level above for the box around `centre`. Returns false as soon as more
+  /// than `most` triangles are found.
+  bool sift(const Eigen::Vector3f& centre, int level) {
+    const float part = std::ldexp(1.0F, level - kLevels);  // size of this box relative to the whole one
+    const float nearest = bound(centre, kept_[level + 1]);
+    // The last term allows for the rounding of corners relative to the centre of the whole box.
+    const float limit = (nearest + 2 * part * halfSize_.norm()) * (1 + kSingle) + kSingle * halfSize_.norm();
+    std::vector<std::uint32_t>& kept = kept_[level];
+    kept.clear();
+    bool allKnown = true;
+    for (std::size_t i = 0; i < kept_[level + 1].size(); ++i) {
+      const std::uint32_t place = kept_[level + 1][i];
+      if (lower_[i] > limit) continue;
+      kept.push_back(place);
+      allKnown = allKnown && found_[place] != 0;
+    }
+    if (allKnown) return true;
+    if (level == 0) return add(kept);
+    for (int octant = 0; octant < 8; ++octant) {
+      const Eigen::Vector3f side((octant & 1) != 0 ? 1 : -1, (octant & 2) != 0 ? 1 : -1, (octant & 4) != 0 ? 1 : -1);
+      if (!sift(centre + (part / 2 * halfSize_).cwiseProduct(side), level - 1)) return false;
+    }
+    return true;
   }
 
-  const Hierarchy& hierarchy_;
-  std::size_t most_;
-  std::vector<std::uint32_t> found_;  ///< in ascending order
+  /// Sets `lower_` to lower bounds of the distances from a point to the triangles at `places`. Returns an upper bound
+  /// of the distance to the nearest of them.
+  float bound(const Eigen::Vector3f& x, const std::vector<std::uint32_t>& places) {
+    Eigen::Vector4f point;
+    point << x, 0;
+    float nearest = std::numeric_limits<float>::infinity();
+    lower_.resize(places.size());
+    for (std::size_t first = 0; first < places.size(); first += mesh::TriangleChunk::kSize) {
+      chunk_.count = std::min(mesh::TriangleChunk::kSize, places.size() - first);
+      for (std::size_t i = 0; i < chunk_.count; ++i)
+        for (int k = 0; k < 3; ++k) chunk_.corners[k][i] = corners_[places[first + i]][k] - point;
+      findBounds(chunk_);
+      for (std::size_t i = 0; i < chunk_.count; ++i) {
+        if (chunk_.upper[i] < nearest) nearest = chunk_.upper[i];
+        lower_[first + i] = chunk_.lower[i];
+      }
+    }
+    return nearest;
+  }
+
+  bool add(const std::vector<std::uint32_t>& places) {
+    for (const std::uint32_t place : places) {
+      count_ += found_[place] == 0 ? 1 : 0;
+      found_[place] = 1;
+    }
+    return count_ <= most_;
+  }
+
+  static constexpr float kSingle = 1e-5F;  ///< bound of relative rounding errors in single precision
+
+  std::size_t most_, count_ = 0;
+  Eigen::Vector3f halfSize_;
+  std::vector<std::uint8_t> found_;                           ///< 1 for each triangle that is found
+  std::vector<std::array<Eigen::Vector4f, 3>> corners_;       ///< relative to the centre of the box
+  std::array<std::vector<std::uint32_t>, kLevels + 2> kept_;  ///< places that remain at each level
+  std::vector<float> lower_;
+  mesh::TriangleChunk chunk_;
 };
 
 bool comesWithinAt(const Hierarchy& hierarchy, const Box& box, double distance, int levels) {
@@ -155,20 +202,24 @@ bool comesWithinAt(const Hierarchy& hierarchy, const Box& box, double distance, 
 
 bool CandidateSearch::comesWithin(const Box& box, double distance) const {
   constexpr int kLevels = 2;
-  return comesWithinAt(*hierarchy_, box, distance + offset_, kLevels);
+  return comesWithinAt(hierarchy_, box, distance + offset_, kLevels);
+}
+
+std::optional<ExactSign> CandidateSearch::signIn(const Box& box, std::span<const std::uint32_t> triangles) const {
+  return signs_.find(box.center(), comesWithin(box, -offset_), triangles);
 }
 
 std::optional<std::vector<std::uint32_t>> CandidateSearch::nearestTo(const Box& box, std::size_t most) const {
-  constexpr int kLevels = 3;
   // The balls around whole boxes reach about so many times more triangles than those that are found in the end.
   constexpr std::size_t kCoarse = 32;
   const double radius = halfDiagonal(box);
-  const double reach = (distanceTo(*hierarchy_, box.center()) + 2 * radius) * (1 + kRounding);
-  const auto coarse = Collector(*hierarchy_, box.center(), reach, kCoarse * most).collect();
+  const double reach = (distanceTo(hierarchy_, box.center()) + 2 * radius) * (1 + kRounding);
+  const auto coarse = Collector(hierarchy_, box.center(), reach, kCoarse * most).collect();
   if (!coarse) return std::nullopt;
-  Sifter sifter(*hierarchy_, most);
-  if (!sifter.sift(box, *coarse, kLevels)) return std::nullopt;
-  return std::move(sifter.found());
+  auto places = Sifter(hierarchy_, box, *coarse, most).sift();
+  if (!places) return std::nullopt;
+  for (std::uint32_t& place : *places) place = (*coarse)[place];
+  return places;
 }
 
 }  // namespace hpsdf::distance

@@ -15,6 +15,7 @@
 #include "bvh/search.h"
 #include "bvh/triangle_frame.h"
 #include "distance/candidate_search.h"
+#include "distance/exact_leaf_signs.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "mesh/connectivity.h"
@@ -40,18 +41,12 @@ namespace {
 
 using bvh::Hierarchy;
 using distance::ChosenInsideTest;
+using distance::kTooNear;
 using sign::BoundaryEdges;
 using sign::Pseudonormals;
 using sign::WindingSign;
 
 constexpr int kLattice = 16;  // number of lattice points along each axis
-/// Distance between two triangles below which their distances from a point may round to the same number. It holds for a
-/// mesh that is scaled to coordinates of about 1.
-constexpr double kTooNear = 0x1p-44;
-/// Least length that the pseudonormal of an edge or vertex must have to decide a sign. At a sharp edge, the length is
-/// about the angle between the edge's two faces. Near the edge, a dot product of half this angle's square decides the
-/// sign. This dot product must be far above rounding errors.
-constexpr double kSharp = 1e-6;
 
 /// Returns true if any point of a lattice around an open mesh is inside by the winding number. The lattice extends
 /// beyond the mesh's bounding box, because the box may be flat.
@@ -100,14 +95,6 @@ std::optional<std::size_t> firstWhere(std::size_t count, const Test& test) {
   return static_cast<std::size_t>(first - holds.begin());
 }
 
-/// Returns true if the pseudonormal of a vertex or edge of a triangle is dominated by rounding errors.
-bool isSharp(const Hierarchy& hierarchy, const Pseudonormals& normals, std::uint32_t slot) {
-  bool sharp = false;
-  for (std::uint32_t k = 0; k < 3; ++k)
-    sharp |= normals.ofVertex(hierarchy.triangles()[slot][k]).norm() < kSharp ||
-             normals.ofEdge(hierarchy, slot, k).norm() < kSharp;
-  return sharp;
-}
 /// Chooses the inside test by pseudonormals if their sign certainly equals the sign by the winding number. Otherwise
 /// chooses the test by the winding number, which is more expensive.
 ///
@@ -164,7 +151,9 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
                        std::move(winding));
   }
   Pseudonormals normals(hierarchy);
-  const auto tooSharp = [&](std::size_t slot) { return isSharp(hierarchy, normals, static_cast<std::uint32_t>(slot)); };
+  const auto tooSharp = [&](std::size_t slot) {
+    return sign::isSharp(hierarchy, normals, static_cast<std::uint32_t>(slot));
+  };
   if (const auto sharp = firstWhere(frames.size(), tooSharp))
     return byWinding("an edge or corner is too sharp for normals", frames[*sharp].origin,
                      WindingSign(hierarchy, mesh, std::move(edges)));
@@ -201,8 +190,8 @@ struct ExactDistance::Data {
       reduceToOuterHull(mesh, progress);
     }
     source.insideTest = inside.choice.insideTest;
-    candidates.emplace(hierarchy, source.thickness / 2,
-                       [this](const Box&, std::span<const std::uint32_t>) { return signOfExactLeaves(); });
+    signs.emplace(hierarchy, source.insideTest, inside.winding);
+    candidates.emplace(hierarchy, *signs, source.thickness / 2);
   }
 
   void reduceToOuterHull(const TriangleMesh& mesh, const Progress& progress) {
@@ -277,17 +266,10 @@ struct ExactDistance::Data {
   Hierarchy wholeMesh;                     ///< all triangles; only for an outer hull
   std::vector<std::uint32_t> hullSources;  ///< mesh triangle that each hull triangle comes from; only for an outer hull
   ChosenInsideTest inside;
+  std::optional<distance::ExactLeafSigns> signs;
   std::optional<distance::CandidateSearch> candidates;
 
  private:
-  /// Returns how the sign follows from the triangles that are nearest to the points of a box, or std::nullopt if they
-  /// do not suffice.
-  std::optional<ExactSign> signOfExactLeaves() const {
-    if (inside.choice.insideTest == InsideTest::pseudonormal) return ExactSign::pseudonormal;
-    if (inside.choice.insideTest == InsideTest::shell) return ExactSign::positive;
-    return std::nullopt;
-  }
-
   Vector3 normalOfVertex(std::uint32_t vertex) const {
     return inside.choice.insideTest == InsideTest::pseudonormal ? inside.normals.ofVertex(vertex) : Vector3::Zero();
   }

@@ -11,6 +11,11 @@
 namespace hpsdf::sign {
 namespace {
 
+/// Least length that the pseudonormal of an edge or vertex must have to decide a sign. At a sharp edge, the length is
+/// about the angle between the edge's two faces. Near the edge, a dot product of half this angle's square decides the
+/// sign. This dot product must be far above rounding errors.
+constexpr double kSharp = 1e-6;
+
 /// The corners of all triangles, grouped by vertex. Corner k of triangle s, in the hierarchy's order of triangles, has
 /// the number 3·s + k. The corners of vertex v are at [first[v], first[v + 1]), in the order of the mesh's triangles.
 struct CornersByVertex {
@@ -123,6 +128,14 @@ Vector3 Pseudonormals::ofEdge(const bvh::Hierarchy& hierarchy, std::uint32_t slo
 
 std::size_t Pseudonormals::bytes() const {
   return vertices_.size() * sizeof(vertices_[0]) + nextSide_.size() * sizeof(nextSide_[0]);
+}
+
+bool isSharp(const bvh::Hierarchy& hierarchy, const Pseudonormals& normals, std::uint32_t slot) {
+  bool sharp = false;
+  for (std::uint32_t k = 0; k < 3; ++k)
+    sharp |= normals.ofVertex(hierarchy.triangles()[slot][k]).norm() < kSharp ||
+             normals.ofEdge(hierarchy, slot, k).norm() < kSharp;
+  return sharp;
 }
 
 }  // namespace hpsdf::sign

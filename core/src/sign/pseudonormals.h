@@ -35,4 +35,7 @@ class Pseudonormals {
   std::vector<std::uint32_t> nextSide_;
 };
 
+/// Returns true if the pseudonormal of a vertex or edge of the triangle in `slot` is dominated by rounding errors.
+bool isSharp(const bvh::Hierarchy& hierarchy, const Pseudonormals& normals, std::uint32_t slot);
+
 }  // namespace hpsdf::sign

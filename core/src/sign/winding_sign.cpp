@@ -138,11 +138,17 @@ void WindingSign::applyToBatch(std::span<double> distances, std::span<const Vect
   }
 }
 
-bool WindingSign::separatesOutsideFromInside(std::uint32_t slot) const {
+WindingSign::Sides WindingSign::sidesOf(std::uint32_t slot) const {
   const auto& [a, b, c] = hierarchy_->triangles()[slot];
   const auto vertices = hierarchy_->vertices();
-  return std::abs(winding_.withoutTriangle((vertices[a] + vertices[b] + vertices[c]) / 3, slot) - level_) < 0.25;
+  // Without the triangle, the winding number at its centroid is the mean of the numbers on its two sides, which differ
+  // by 1.
+  const double fromLevel = winding_.withoutTriangle((vertices[a] + vertices[b] + vertices[c]) / 3, slot) - level_;
+  if (std::abs(fromLevel) < 0.25) return Sides::separates;
+  return fromLevel > 0.75 ? Sides::bothInside : Sides::unknown;
 }
+
+bool WindingSign::separatesOutsideFromInside(std::uint32_t slot) const { return sidesOf(slot) == Sides::separates; }
 
 bool WindingSign::isInside(const Vector3& x) const { return sampleAt(x, 0, 0).inside; }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -43,6 +44,19 @@ class WindingSign {
   /// must be about ½, or −½ for a mesh that is oriented inward. Probing a point on each side instead could jump over a
   /// nearby wall.
   bool separatesOutsideFromInside(std::uint32_t slot) const;
+
+  /// The sides of a triangle of a mesh without holes.
+  enum class Sides : std::uint8_t {
+    unknown,     ///< none of the following, or not certain
+    separates,   ///< the outside is in front of the triangle, the inside behind it
+    bothInside,  ///< the inside is in front of the triangle and behind it
+  };
+
+  /// Returns what lies on the two sides of the triangle in `slot`, at its centroid (see `separatesOutsideFromInside`).
+  Sides sidesOf(std::uint32_t slot) const;
+
+  /// Returns true if the mesh has no holes, so that the winding number is constant where no triangle is crossed.
+  bool isClosed() const { return edges_.empty(); }
 
   bool isInside(const Vector3& x) const;
 

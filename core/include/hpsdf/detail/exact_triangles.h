@@ -11,13 +11,14 @@
 namespace hpsdf {
 
 /// The triangles of a field's exact leaves. An exact leaf refers to a list of triangles. The list contains every
-/// triangle that is nearest to any point of the leaf, and all triangles that share a nearest edge or vertex. In an exact
-/// leaf, the field is the exact signed distance to the listed triangles.
+/// triangle that is nearest to any point of the leaf, and all triangles that share a nearest edge or vertex. In an
+/// exact leaf, the field is the exact signed distance to the listed triangles.
 ///
 /// A list is a sequence of runs in `lists`, from the leaf's offset up to the first run that is marked as the last one.
 /// A run is a sequence of triangles with successive indices.
 struct ExactTriangles {
-  /// Vertices in world units: doubles, or floats where these suffice.
+  /// Vertices in world units: doubles, or floats where these suffice. The last one is not part of a triangle: thanks to
+  /// it, a query can load four floats at any other vertex.
   std::variant<std::vector<Eigen::Vector3d>, std::vector<Eigen::Vector3f>> vertices;
   /// Three indices into `vertices` each, counter-clockwise as seen from outside. Triangles that are close in space are
   /// close in this list.
@@ -28,8 +29,8 @@ struct ExactTriangles {
   bool empty() const { return lists.empty(); }
 };
 
-/// Functions that pack and unpack a run of triangles: the index of its first triangle in bits 0 to 26, the number of its
-/// triangles minus 1 in bits 27 to 30, and in bit 31 whether it is the last run of its list.
+/// Functions that pack and unpack a run of triangles: the index of its first triangle in bits 0 to 26, the number of
+/// its triangles minus 1 in bits 27 to 30, and in bit 31 whether it is the last run of its list.
 namespace triangle_run {
 constexpr std::uint32_t kMostTriangles = std::uint32_t{1} << 27;  ///< number of triangles that a run can refer to
 constexpr std::uint32_t kMostLength = 16;

@@ -13,8 +13,8 @@
 
 namespace hpsdf {
 
-/// A search for the triangles that can be nearest to the points of a box. A signed distance that is measured to triangles
-/// offers such a search, from which the construction of a field makes exact leaves. Thread-safe.
+/// A search for the triangles that can be nearest to the points of a box. A signed distance that is measured to
+/// triangles offers such a search, from which the construction of a field makes exact leaves. Thread-safe.
 class TriangleSearch {
  public:
   virtual ~TriangleSearch() = default;
@@ -27,16 +27,19 @@ class TriangleSearch {
   /// Returns the length that is subtracted from every unsigned distance: half of the thickness of a shell, else 0.
   virtual double offset() const = 0;
 
-  /// Returns true if the surface may come closer than `distance` to a point of the box. The answer is false only if this
-  /// is certain not to happen.
+  /// Returns true if the surface may come closer than `distance` to a point of the box. The answer is false only if
+  /// this is certain not to happen.
   virtual bool comesWithin(const Box& box, double distance) const = 0;
 
   /// Returns the indices, in ascending order, of triangles among which are all triangles that can be nearest to a point
   /// of the box. Returns std::nullopt if more than `most` triangles are found.
   virtual std::optional<std::vector<std::uint32_t>> nearestTo(const Box& box, std::size_t most) const = 0;
 
-  /// Returns how the sign of the distance follows from the given triangles, which `nearestTo` found for the box. Returns
-  /// std::nullopt if the sign cannot be found from them.
+  /// Returns false if `signIn` finds no sign anywhere.
+  virtual bool hasSigns() const = 0;
+
+  /// Returns how the sign of the distance follows from the given triangles, which `nearestTo` found for the box.
+  /// Returns std::nullopt if the sign cannot be found from them.
   virtual std::optional<ExactSign> signIn(const Box& box, std::span<const std::uint32_t> triangles) const = 0;
 };
 

@@ -35,7 +35,8 @@ double nearDistance(const BuildOptions& options, double referenceLength) {
 }
 
 std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, const Box& domain) {
-  if (options.strategy != Strategy::hpx || distance.triangleSearch() == nullptr) return std::nullopt;
+  const bool hasTriangles = distance.triangleSearch() != nullptr && distance.triangleSearch()->hasSigns();
+  if (options.strategy != Strategy::hpx || !hasTriangles) return std::nullopt;
   return ExactCells(*distance.triangleSearch(), options.exactWithin * referenceLength(distance.source(), domain),
                     static_cast<std::size_t>(options.exactTriangles));
 }

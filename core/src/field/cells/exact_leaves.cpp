@@ -48,12 +48,14 @@ Fit planeFit(const Box& cell, const CommonPlane& plane) {
 
 }  // namespace
 
-std::optional<Fit> ExactCells::fit(const Box& cell, bool isDivisible) const {
+ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) const {
   constexpr std::size_t kLonger = 64;
+  // Lists without a sign contain triangles that intersect others. Cells with so short lists are not divided further.
+  constexpr std::size_t kFew = 8;
   auto triangles = search_.nearestTo(cell, isDivisible ? most_ : kLonger * most_);
-  if (!triangles) return std::nullopt;
+  if (!triangles) return {{}, isDivisible};
   const std::optional<ExactSign> sign = search_.signIn(cell, *triangles);
-  if (!sign) return std::nullopt;
+  if (!sign) return {{}, isDivisible && triangles->size() > kFew};
   Fit fit;
   const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, *triangles) : std::nullopt;
   if (plane) {
@@ -66,7 +68,7 @@ std::optional<Fit> ExactCells::fit(const Box& cell, bool isDivisible) const {
   fit.isFinal = true;
   fit.error.volume = cell.volume();
   fit.error.near = true;
-  return fit;
+  return {std::move(fit), false};
 }
 
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, int maxDepth, const Progress& progress) {
@@ -82,13 +84,9 @@ void placeExactLeaves(BuildTree& tree, const ExactCells& cells, int maxDepth, co
         BuildNode& node = tree.nodes[level[i]];
         const Box box = tree.boxOf(node);
         if (!cells.mustBeExact(box)) return;
-        const bool isDivisible = depth < maxDepth;
-        if (auto fit = cells.fit(box, isDivisible)) {
-          node.fit = std::move(*fit);
-          choices[i] = Choice::exact;
-        } else if (isDivisible) {
-          choices[i] = Choice::split;
-        }
+        ExactCells::Outcome outcome = cells.makeExact(box, depth < maxDepth);
+        if (outcome.fit) node.fit = std::move(*outcome.fit);
+        if (outcome.fit || outcome.divides) choices[i] = outcome.divides ? Choice::split : Choice::exact;
       });
     }
     std::vector<std::uint32_t> next;

@@ -13,18 +13,23 @@ namespace hpsdf::detail {
 /// Finds the cells in which a short list of triangles gives the distance exactly.
 class ExactCells {
  public:
-  /// Keeps a reference to the search. `within` is the distance from the surface up to which the field is exact, `most` the
-  /// greatest number of triangles of a leaf that could be divided further.
+  /// Keeps a reference to the search. `within` is the distance from the surface up to which the field is exact, `most`
+  /// the greatest number of triangles of a leaf that could be divided further.
   ExactCells(const TriangleSearch& search, double within, std::size_t most)
       : search_(search), within_(within), most_(most) {}
 
   /// Returns true if a point of the cell may be so close to the surface that the field must be exact there.
   bool mustBeExact(const Box& cell) const { return search_.comesWithin(cell, within_); }
 
-  /// Returns the fit of a cell without error: the list of its triangles or, if these lie in one plane, a polynomial of
-  /// degree 1. Returns std::nullopt if the list is too long or does not determine the sign. If the cell cannot be divided
-  /// further, the list may be much longer.
-  std::optional<Fit> fit(const Box& cell, bool isDivisible) const;
+  /// What becomes of a cell that must be exact.
+  struct Outcome {
+    std::optional<Fit> fit;  ///< without error: a list of triangles or, if these lie in one plane, a linear polynomial
+    bool divides = false;    ///< there is no such fit, but there may be fits of the cell's parts
+  };
+
+  /// Makes a cell exact, if its list is not too long and determines the sign. If the cell cannot be divided further,
+  /// the list may be much longer.
+  Outcome makeExact(const Box& cell, bool isDivisible) const;
 
   const TriangleSearch& search() const { return search_; }
 

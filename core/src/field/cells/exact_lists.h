@@ -14,7 +14,8 @@ namespace hpsdf::detail {
 /// triangles that are in a list are stored.
 class ExactListPacker {
  public:
-  explicit ExactListPacker(const TriangleSearch& search) : search_(search), numbers_(search.triangles().size(), kUnused) {}
+  explicit ExactListPacker(const TriangleSearch& search)
+      : search_(search), numbers_(search.triangles().size(), kUnused) {}
 
   /// Marks triangles as used. All lists must be marked before the first one is packed.
   void mark(std::span<const std::uint32_t> triangles);

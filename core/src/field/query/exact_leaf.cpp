@@ -7,114 +7,20 @@
 #include <limits>
 #include <variant>
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "field/query/exact_leaf.cpp"
-#include <hwy/foreach_target.h>
-// Highway requires this include to follow foreach_target.h.
-#include <hwy/highway.h>
+#include "mesh/triangle_bounds.h"
 
-#ifndef HPSDF_EXACT_LEAF_CHUNK
-#define HPSDF_EXACT_LEAF_CHUNK
-namespace hpsdf::query {
-
-/// Some triangles of a list, in single precision relative to a query point, and bounds of their distances from it.
-struct Chunk {
-  static constexpr std::size_t kSize = 64;
-
-  std::size_t count = 0;
-  std::array<std::uint32_t, kSize> triangle;
-  alignas(64) float corner[9][kSize];  ///< x, y and z of the corners A, B and C, minus the query point
-  alignas(64) float lower[kSize];      ///< lower bound of the distance, or NaN for a triangle without area
-  alignas(64) float upper[kSize];      ///< upper bound of the distance, or NaN for a triangle without area
-};
-
-}  // namespace hpsdf::query
-#endif
-
-HWY_BEFORE_NAMESPACE();
-namespace hpsdf::query {
-namespace HWY_NAMESPACE {
-namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Tag = hn::CappedTag<float, 16>;
-using Vec = hn::Vec<Tag>;
-constexpr std::size_t kLanes = hn::MaxLanes(Tag());
-static_assert(Chunk::kSize % kLanes == 0);
-
-struct Vec3 {
-  Vec x, y, z;
-  friend HWY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) {
-    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-  }
-};
-
-HWY_INLINE Vec dot(const Vec3& a, const Vec3& b) {
-  return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
-}
-HWY_INLINE Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {hn::NegMulAdd(a.z, b.y, hn::Mul(a.y, b.z)), hn::NegMulAdd(a.x, b.z, hn::Mul(a.z, b.x)),
-          hn::NegMulAdd(a.y, b.x, hn::Mul(a.x, b.y))};
-}
-
-/// Returns the squared distance from the origin to the segment that begins at `from` with the direction `along`.
-HWY_INLINE Vec squaredToSegment(const Vec3& from, const Vec3& along, Vec squaredLength) {
-  const Tag d;
-  const Vec t = hn::Min(hn::Max(hn::Div(hn::Neg(dot(from, along)), squaredLength), hn::Zero(d)), hn::Set(d, 1.0F));
-  const Vec3 to = {hn::MulAdd(t, along.x, from.x), hn::MulAdd(t, along.y, from.y), hn::MulAdd(t, along.z, from.z)};
-  return dot(to, to);
-}
-
-/// Computes bounds of the distances from the origin to the triangles of a chunk. The error of a computed distance is
-/// bounded by a multiple of the distance R to the farthest corner; for a triangle of little height, whose normal is less
-/// accurate, the multiple is greater.
-void findBounds(Chunk& chunk) {
-  const Tag d;
-  constexpr float kRounding = 32 * std::numeric_limits<float>::epsilon();
-  for (std::size_t i = 0; i < chunk.count; i += kLanes) {
-    const auto load = [&](int corner) HWY_ATTR {
-      return Vec3{hn::Load(d, chunk.corner[3 * corner] + i), hn::Load(d, chunk.corner[3 * corner + 1] + i),
-                  hn::Load(d, chunk.corner[3 * corner + 2] + i)};
-    };
-    const Vec3 a = load(0), b = load(1), c = load(2);
-    const Vec3 ab = b - a, bc = c - b, ca = a - c;
-    const Vec3 n = cross(ab, bc);
-    const Vec nn = dot(n, n), abab = dot(ab, ab), bcbc = dot(bc, bc), caca = dot(ca, ca);
-    const auto outside = [&](const Vec3& corner, const Vec3& side)
-                             HWY_ATTR { return dot(n, cross(corner, side)) < hn::Zero(d); };
-    const auto isOutside = hn::Or(hn::Or(outside(a, ab), outside(b, bc)), outside(c, ca));
-    const Vec height = dot(n, a);
-    const Vec toPlane = hn::Div(hn::Mul(height, height), nn);
-    const Vec toSides = hn::Min(hn::Min(squaredToSegment(a, ab, abab), squaredToSegment(b, bc, bcbc)),
-                                squaredToSegment(c, ca, caca));
-    const Vec distance = hn::Sqrt(hn::IfThenElse(isOutside, toSides, toPlane));
-    const Vec farthest = hn::Sqrt(hn::Max(hn::Max(dot(a, a), dot(b, b)), dot(c, c)));
-    const Vec longest = hn::Max(hn::Max(abab, bcbc), caca);
-    const Vec error = hn::Mul(hn::Mul(hn::Set(d, kRounding), farthest), hn::Div(longest, hn::Sqrt(nn)));
-    hn::Store(hn::Sub(distance, error), d, chunk.lower + i);
-    hn::Store(hn::Add(distance, error), d, chunk.upper + i);
-  }
-}
-
-}  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace hpsdf::query
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
 namespace hpsdf::query {
 namespace {
 
-HWY_EXPORT(findBounds);
+using mesh::TriangleChunk;
 
 /// The nearest feature (face, edge or vertex) of a list of triangles.
 struct NearestFeature {
   double squared = std::numeric_limits<double>::infinity();
-  Vector3 difference = Vector3::Zero();  ///< from the closest point to the query point
-  Vector3 normal = Vector3::Zero();      ///< for a face: its normal, not normalized
-  double height = 0;                     ///< for a face: signed distance from its plane
-  std::uint32_t corners = 0;             ///< number of corners of the feature: 1, 2 or 3
+  Vector3 difference = Vector3::Zero();   ///< from the closest point to the query point
+  Vector3 normal = Vector3::Zero();       ///< for a face: its normal, not normalized
+  double height = 0;                      ///< for a face: signed distance from its plane
+  std::uint32_t corners = 0;              ///< number of corners of the feature: 1, 2 or 3
   std::array<std::uint32_t, 2> vertex{};  ///< for an edge or a vertex: its vertices, the lower index first
 };
 
@@ -123,15 +29,19 @@ template <typename V>
 class ListSearch {
  public:
   ListSearch(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf, const Vector3& x)
-      : exact_(exact), vertices_(vertices.data()), list_(&exact.lists[node::offset(leaf)]), x_(x) {}
+      : exact_(exact), vertices_(vertices.data()), list_(&exact.lists[node::offset(leaf)]), x_(x) {
+    xHigh_ << x.cast<float>(), 0;
+    xLow_ << (x - xHigh_.head<3>().cast<double>()).cast<float>(), 0;
+  }
 
   NearestFeature nearest() {
-    Chunk chunk;
+    TriangleChunk chunk;
+    std::array<std::uint32_t, TriangleChunk::kSize> triangles;
     forEachTriangle([&](std::uint32_t triangle) {
-      if (chunk.count == Chunk::kSize) search(chunk);
-      add(triangle, chunk);
+      if (chunk.count == TriangleChunk::kSize) search(chunk, triangles);
+      triangles[chunk.count++] = triangle;
     });
-    search(chunk);
+    search(chunk, triangles);
     return best_;
   }
 
@@ -170,32 +80,39 @@ class ListSearch {
     }
   }
 
-  void add(std::uint32_t triangle, Chunk& chunk) const {
-    const std::size_t at = chunk.count++;
-    chunk.triangle[at] = triangle;
-    for (int corner = 0; corner < 3; ++corner) {
-      const Vector3 relative = vertex(exact_.triangles[triangle][corner]) - x_;
-      for (int axis = 0; axis < 3; ++axis) chunk.corner[3 * corner + axis][at] = static_cast<float>(relative[axis]);
-    }
-  }
-
   /// Finds the nearest triangle of a chunk in double precision, among those that single precision cannot exclude.
   /// Empties the chunk.
-  void search(Chunk& chunk) {
+  void search(TriangleChunk& chunk, const std::array<std::uint32_t, TriangleChunk::kSize>& triangles) {
     constexpr std::size_t kFew = 3;  // so few triangles are tried at once
     if (chunk.count <= kFew) {
-      for (std::size_t i = 0; i < chunk.count; ++i) tryTriangle(chunk.triangle[i]);
+      for (std::size_t i = 0; i < chunk.count; ++i) tryTriangle(triangles[i]);
     } else {
-      constexpr std::size_t kMostLanes = 16;
-      for (std::size_t i = chunk.count; i % kMostLanes != 0; ++i)
-        for (auto& coordinate : chunk.corner) coordinate[i] = coordinate[chunk.count - 1];
-      HWY_DYNAMIC_DISPATCH(findBounds)(chunk);
+      loadCorners(chunk, triangles);
+      findBounds(chunk);
       for (std::size_t i = 0; i < chunk.count; ++i)
         if (chunk.upper[i] < limit_) limit_ = chunk.upper[i];
       for (std::size_t i = 0; i < chunk.count; ++i)
-        if (!(chunk.lower[i] > limit_)) tryTriangle(chunk.triangle[i]);
+        if (!(chunk.lower[i] > limit_)) tryTriangle(triangles[i]);
     }
     chunk.count = 0;
+  }
+
+  void loadCorners(TriangleChunk& chunk, const std::array<std::uint32_t, TriangleChunk::kSize>& triangles) const {
+    for (std::size_t i = 0; i < chunk.count; ++i) {
+      const auto& corners = exact_.triangles[triangles[i]];
+      for (int k = 0; k < 3; ++k) chunk.corners[k][i] = relative(vertices_[corners[k]]);
+    }
+  }
+
+  /// Returns a vertex minus the query point. The subtraction of the query point in two parts keeps the relative error
+  /// of the result small.
+  Eigen::Vector4f relative(const Eigen::Vector3f& v) const {
+    return (Eigen::Map<const Eigen::Vector4f>(v.data()) - xHigh_) - xLow_;  // reads into the next vertex
+  }
+  Eigen::Vector4f relative(const Eigen::Vector3d& v) const {
+    Eigen::Vector4f result;
+    result << (v - x_).cast<float>(), 0;
+    return result;
   }
 
   void tryTriangle(std::uint32_t triangle) {
@@ -220,7 +137,8 @@ class ListSearch {
     best_ = {squared, normal * (along / squaredNormal), normal, along / std::sqrt(squaredNormal), 3, {}};
   }
 
-  /// Tries the side of a triangle. Its ends are ordered by index, so that the triangles at an edge give the same result.
+  /// Tries the side of a triangle. Its ends are ordered by index, so that the triangles at an edge give the same
+  /// result.
   void trySide(std::uint32_t from, std::uint32_t to) {
     if (from > to) std::swap(from, to);
     const Vector3 start = vertex(from), along = vertex(to) - start, difference = x_ - start;
@@ -239,6 +157,7 @@ class ListSearch {
   const V* vertices_;
   const std::uint32_t* list_;
   Vector3 x_;
+  Eigen::Vector4f xHigh_, xLow_;  ///< x as a sum of two floats
   NearestFeature best_;
   float limit_ = std::numeric_limits<float>::infinity();  ///< upper bound of the distance to the nearest triangle
 };
@@ -296,4 +215,3 @@ void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, const Vector
 }
 
 }  // namespace hpsdf::query
-#endif
