@@ -16,14 +16,15 @@ namespace hpsdf {
 /// The size of a field's jump on an interface between two leaves. At a point of the interface, the jump is the
 /// difference between the field's limits from the two leaves.
 struct Jump {
-  double rms = 0;  ///< √(∫ jump² dA / area) by a quadrature that is exact for polynomials
+  /// √(∫ jump² dA / area) by a quadrature that is exact for polynomials. At exact leaves, it is approximate.
+  double rms = 0;
   double max = 0;  ///< greatest jump at the quadrature points, including points on the face's edges and corners
 };
 
 /// The face that two neighbouring leaves share. If the leaves differ in size, it is a whole face of the smaller leaf.
 struct Interface {
-  std::array<std::uint32_t, 2> cells;  ///< `Cell::id` of the leaf on the lower and of the leaf on the upper side
-  std::array<std::uint8_t, 2> degrees;
+  std::array<std::uint32_t, 2> cells;   ///< `Cell::id` of the leaf on the lower and of the leaf on the upper side
+  std::array<std::uint8_t, 2> degrees;  ///< `kExactDegree` for an exact leaf
   std::array<std::uint8_t, 2> depths;
   int axis;        ///< axis that is normal to the face: 0, 1 or 2
   Jump value;      ///< jump of f in units of length

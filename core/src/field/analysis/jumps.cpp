@@ -171,10 +171,11 @@ class FaceMeter {
     }
 
     // Evaluate the field on both sides of the face, at the samples for the higher one of the two leaves' degrees.
-    const Samples& samples = samplesOfDegree_[std::max(face.degrees[0], face.degrees[1])];
+    const auto bits = [&](int side) { return data_.nodes[sides[side]->node]; };
+    const Samples& samples = samplesOfDegree_[std::max(sampleDegree(bits(0)), sampleDegree(bits(1)))];
     for (int side = 0; side < 2; ++side) {
-      if (data_.blend > 0)
-        traceBlended(traces_[side], *sides[side], small, axis, step, samples);
+      if (data_.blend > 0 || node::isExact(bits(side)))
+        tracePoints(traces_[side], *sides[side], small, axis, step, samples);
       else
         tracePolynomial(traces_[side], *sides[side], small, axis, side == 0 ? 1 : -1, samples);
     }
@@ -244,10 +245,10 @@ class FaceMeter {
         data_.coefficients);
   }
 
-  /// Evaluates the blended field at the samples of a face of the leaf `small`. The results are the limits from
-  /// within `leaf`.
-  void traceBlended(FaceTrace& trace, const OctreeNode& leaf, const OctreeNode& small, int axis, int step,
-                    const Samples& samples) {
+  /// Evaluates the field, blended or exact, point by point at the samples of a face of the leaf `small`. The results
+  /// are the limits from within `leaf`.
+  void tracePoints(FaceTrace& trace, const OctreeNode& leaf, const OctreeNode& small, int axis, int step,
+                   const Samples& samples) {
     const std::size_t n = samples.points.size();
     trace.resize(n * n);
     std::array<double, 3> local{};
@@ -301,7 +302,7 @@ Jumps findJumps(const Field& field, int threads, const Progress& progress) {
   const FieldData& data = field.data();
   const std::vector<OctreeNode> leaves = allLeaves(data);
   int maxDegree = 0;
-  for (const OctreeNode& leaf : leaves) maxDegree = std::max(maxDegree, node::degree(data.nodes[leaf.node]));
+  for (const OctreeNode& leaf : leaves) maxDegree = std::max(maxDegree, sampleDegree(data.nodes[leaf.node]));
   std::vector<Samples> samples;
   for (int degree = 0; degree <= maxDegree; ++degree) samples.emplace_back(degree);
 

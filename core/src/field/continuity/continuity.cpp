@@ -39,9 +39,9 @@ void report(const Progress& progress, double fraction) {
   progress.update("closing jumps", std::clamp(fraction, 0.0, 1.0));
 }
 
-/// Solves (M + λI)d = −Mx₀ by conjugate gradients with the matrix's diagonal as preconditioner. x₀ holds the
-/// coefficients of a field, and d is their change. The matrix M measures jumps, see `FaceCoupling`. λ is the weight of
-/// the change.
+/// Solves (M + λI)d = −Mx₀ − e by conjugate gradients with the matrix's diagonal as preconditioner. x₀ holds the
+/// coefficients of a field, and d is their change. The matrix M measures jumps, and the vector e belongs to the exact
+/// leaves, see `FaceCoupling`. λ is the weight of the change.
 class ConjugateGradients {
  public:
   ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
@@ -50,6 +50,7 @@ class ConjugateGradients {
       preconditioner_.push_back(static_cast<float>(1 / (entry + options.weight)));
     coupling_.apply(0, x0, residual_);
     for (double& r : residual_) r = -r;
+    for (std::size_t i = 0; i < coupling.exactPart().size(); ++i) residual_[i] -= coupling.exactPart()[i];
   }
 
   /// Returns the solution d. Throws `Error` if the iteration does not reach the tolerance.
@@ -132,6 +133,7 @@ double weightedChange(const FieldData& field, std::span<const double> x0, std::s
   double sum = 0;
   std::size_t at = 0;
   for (const query::OctreeNode& leaf : query::allLeaves(field)) {
+    if (node::isExact(field.nodes[leaf.node])) continue;
     const Vector3 size = query::cellSize(field, leaf.depth);
     const double mean = x0[at] / std::sqrt(size.prod() / volume);
     const std::size_t end = at + coefficientCount(node::degree(field.nodes[leaf.node]));

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
 
+#include "basis/legendre.h"
 #include "basis/projection.h"
 #include "field/query/evaluate.h"
 #include "hpsdf/error.h"
@@ -161,11 +163,35 @@ int quarterOf(const std::array<std::uint32_t, 2>& along, int level) {
 
 }  // namespace
 
+/// Gauss points along the axes of a face, with which traces of exact leaves are projected onto polynomials of a degree.
+struct FaceCoupling::FaceSamples {
+  int degree;
+  std::vector<double> points;
+  std::vector<std::array<double, kMaxDegree + 1>> weighted;  ///< by point: half of its weight times each basis function
+
+  explicit FaceSamples(int itsDegree) : degree(itsDegree) {
+    const basis::QuadratureRule rule = basis::gaussLegendre(std::max(degree, query::kExactSampleDegree) + 1);
+    points = rule.points;
+    weighted.resize(points.size());
+    for (std::size_t s = 0; s < points.size(); ++s) {
+      basis::legendreValues(points[s], degree, weighted[s].data());
+      for (int i = 0; i <= degree; ++i) weighted[s][i] *= std::sqrt(2 * i + 1.0) * rule.weights[s] / 2;
+    }
+  }
+
+  /// Adds the part of the point (s0, s1), at which the trace has this value, to the coefficients on a face.
+  void project(std::size_t s0, std::size_t s1, double value, double* face) const {
+    for (int a = 0; a <= degree; ++a)
+      for (int b = 0; b <= degree - a; ++b) face[faceIndex(a, b)] += value * weighted[s0][a] * weighted[s1][b];
+  }
+};
+
 FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(query::allLeaves(field)) {
   start_.push_back(0);
   for (const query::OctreeNode& leaf : leaves_) {
-    degree_.push_back(static_cast<std::uint8_t>(node::degree(field.nodes[leaf.node])));
-    start_.push_back(start_.back() + coefficientCount(degree_.back()));
+    const std::uint64_t bits = field.nodes[leaf.node];
+    degree_.push_back(static_cast<std::uint8_t>(node::degree(bits)));
+    start_.push_back(start_.back() + (node::isExact(bits) ? 0 : coefficientCount(degree_.back())));
   }
   if (start_.back() > 0xffffffffu)
     throw Error("the field needs " + std::to_string(start_.back()) +
@@ -175,11 +201,12 @@ FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(query::allLeaves(fi
   makeTraces();
   linkLeaves(field);
   groupLinksByLeaf();
+  findExactPart(field);
 }
 
 void FaceCoupling::makeTraces() {
   for (const std::uint8_t degree : degree_) {
-    if (!traces_[degree][0].faceIndex.empty()) continue;
+    if (degree == kExactDegree || !traces_[degree][0].faceIndex.empty()) continue;
     basis::forEachCoefficient(degree, [&](int i, int j, int k, int) {
       const std::array<int, 3> order{i, j, k};
       for (int axis = 0; axis < 3; ++axis) {
@@ -197,6 +224,7 @@ void FaceCoupling::linkLeaves(const FieldData& field) {
   const auto linkChunk = [&](std::vector<Link>& links, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n)
       query::forEachInterface(field, leaves_[n], [&](int axis, int step, const query::OctreeNode& large) {
+        if (isExact(static_cast<std::uint32_t>(n)) && isExact(leafOfNode[large.node])) return;
         Link& link = links.emplace_back(Link{.small = static_cast<std::uint32_t>(n),
                                              .large = leafOfNode[large.node],
                                              .along = {},
@@ -211,9 +239,15 @@ void FaceCoupling::linkLeaves(const FieldData& field) {
   };
   links_ = detail::listOfChunks<Link>(leaves_.size(), kLeavesPerTask, {}, "", linkChunk);
   jumpStart_.push_back(0);
-  for (const Link& link : links_)
-    jumpStart_.push_back(jumpStart_.back() + faceCoefficientCount(std::max(degree_[link.small], degree_[link.large])));
+  for (const Link& link : links_) jumpStart_.push_back(jumpStart_.back() + faceCoefficientCount(faceDegree(link)));
   jumps_.resize(jumpStart_.back());
+}
+
+/// Returns the degree of the jump across a face, as far as it depends on polynomials.
+int FaceCoupling::faceDegree(const Link& link) const {
+  const int small = degree_[link.small], large = degree_[link.large];
+  if (isExact(link.small)) return large;
+  return isExact(link.large) ? small : std::max(small, large);
 }
 
 void FaceCoupling::groupLinksByLeaf() {
@@ -234,6 +268,7 @@ std::vector<double> FaceCoupling::toUnknowns(const FieldData& field) const {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
   std::vector<double> x(start_.back());
   for (std::size_t n = 0; n < leaves_.size(); ++n) {
+    if (degree_[n] == kExactDegree) continue;
     const double* c = &coefficients[node::offset(field.nodes[leaves_[n].node])];
     basis::forEachCoefficient(degree_[n], [&](int i, int j, int k, int index) {
       x[start_[n] + index] = c[index] * scale_[leaves_[n].depth] * std::sqrt(basis::squaredNorm(i, j, k));
@@ -245,6 +280,7 @@ std::vector<double> FaceCoupling::toUnknowns(const FieldData& field) const {
 void FaceCoupling::fromUnknowns(std::span<const double> x, FieldData& field) const {
   std::vector<double> coefficients(start_.back());
   for (std::size_t n = 0; n < leaves_.size(); ++n) {
+    if (degree_[n] == kExactDegree) continue;
     field.nodes[leaves_[n].node] = node::leaf(degree_[n], static_cast<std::uint32_t>(start_[n]));
     basis::forEachCoefficient(degree_[n], [&](int i, int j, int k, int index) {
       const std::size_t at = start_[n] + index;
@@ -281,19 +317,20 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
 /// Computes the jump across the face of link n: the small leaf's polynomial minus the large leaf's polynomial, as
 /// coefficients on the small leaf's face. The coefficients are scaled so that their squares sum to the face's part of
 /// xᵀMx. The numbers in x contain the square root of their leaf's volume as a factor; `scale` replaces the large leaf's
-/// volume by the small leaf's volume.
+/// volume by the small leaf's volume. An exact leaf counts as 0.
 void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
+  double* const jump = &jumps_[jumpStart_[n]];
+  if (isExact(link.large)) return restrictToFace(link, link.small, link.side, x, jump);
   std::array<double, kMaxFaceCoefficients> large;
   restrictToFace(link, link.large, 1 - link.side, x, large.data());
   for (int level = link.levels; level-- > 0;)
     query::withDegree(degree_[link.large], [&](auto degree) {
       kQuarterRestriction.apply(large.data(), degree, quarterOf(link.along, level));
     });
-  double* const jump = &jumps_[jumpStart_[n]];
-  const std::size_t smallCount = faceCoefficientCount(degree_[link.small]);
+  const std::size_t smallCount = isExact(link.small) ? 0 : faceCoefficientCount(degree_[link.small]);
   const std::size_t largeCount = faceCoefficientCount(degree_[link.large]);
-  restrictToFace(link, link.small, link.side, x, jump);
+  if (smallCount > 0) restrictToFace(link, link.small, link.side, x, jump);
   for (std::size_t c = smallCount; c < largeCount; ++c) jump[c] = 0;
   const double scale = scale_[link.levels] / scale_[0];
   for (std::size_t c = 0; c < largeCount; ++c) jump[c] -= scale * large[c];
@@ -317,6 +354,61 @@ void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const
   addFromFace(link, leaf, 1 - link.side, -scale_[link.levels] / scale_[0], face, out);
 }
 
+/// Computes the part of the jump across the face of link n that comes from an exact leaf, in the same form as
+/// `computeJump`: the trace of the exact leaf with the sign that it has in the jump, projected onto the polynomials of
+/// the face's degree. The rest of the trace is orthogonal to the trace of the other leaf's polynomial. It adds a
+/// constant to the energy, which does not matter.
+void FaceCoupling::computeExactJump(const FieldData& field, std::size_t n, const FaceSamples& samples) {
+  const Link& link = links_[n];
+  double* const jump = &jumps_[jumpStart_[n]];
+  const query::OctreeNode& small = leaves_[link.small];
+  const std::uint64_t exact = field.nodes[leaves_[isExact(link.small) ? link.small : link.large].node];
+  const GridFrame frame = query::gridFrame(field);
+  const auto coordinate = [&](int axis, double local) {
+    return std::ldexp(static_cast<double>(small.cellIndex[axis]) + (local + 1) / 2, -small.depth);
+  };
+  const double scale = (isExact(link.small) ? 1 : -1) * scale_[small.depth];
+  const int axis0 = link.axis == 0 ? 1 : 0, axis1 = link.axis == 2 ? 1 : 2;
+  std::array<double, 3> at;
+  at[link.axis] = coordinate(link.axis, link.side == 0 ? -1 : 1);
+  std::fill_n(jump, jumpStart_[n + 1] - jumpStart_[n], 0.0);
+  for (std::size_t s0 = 0; s0 < samples.points.size(); ++s0)
+    for (std::size_t s1 = 0; s1 < samples.points.size(); ++s1) {
+      at[axis0] = coordinate(axis0, samples.points[s0]);
+      at[axis1] = coordinate(axis1, samples.points[s1]);
+      double distance = 0;
+      query::evaluateExact(field.exact, exact, query::worldPoint(frame, at), distance);
+      samples.project(s0, s1, scale * distance, jump);
+    }
+}
+
+/// Sets `exactPart_`. For x = 0, the jumps consist of their parts from exact leaves, and half of the gradient of their
+/// energy is Jᵀ times these parts.
+void FaceCoupling::findExactPart(const FieldData& field) {
+  const auto hasExact = [&](const Link& link) { return isExact(link.small) || isExact(link.large); };
+  if (std::ranges::none_of(links_, hasExact)) return;
+  std::vector<std::optional<FaceSamples>> samples(kMaxDegree + 1);
+  for (const Link& link : links_)
+    if (auto& made = samples[faceDegree(link)]; hasExact(link) && !made) made.emplace(faceDegree(link));
+  std::ranges::fill(jumps_, 0.0);
+  detail::forEachChunk(links_.size(), kLeavesPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
+    for (std::size_t n = first; n < first + count; ++n)
+      if (hasExact(links_[n])) computeExactJump(field, n, *samples[faceDegree(links_[n])]);
+  });
+  exactPart_.assign(start_.back(), 0.0);
+  detail::forEachChunk(leaves_.size(), kLeavesPerTask,
+                       [&](std::size_t, std::size_t first, std::size_t count) { addJumps(first, count, exactPart_); });
+}
+
+/// Adds the parts of some leaves in Jᵀ(Jx) to `out`, for all links of these leaves.
+void FaceCoupling::addJumps(std::size_t firstLeaf, std::size_t count, std::vector<double>& out) const {
+  for (std::size_t leaf = firstLeaf; leaf < firstLeaf + count; ++leaf) {
+    if (degree_[leaf] == kExactDegree) continue;
+    for (std::size_t n = linksOfLeafStart_[leaf]; n < linksOfLeafStart_[leaf + 1]; ++n)
+      addJump(static_cast<std::uint32_t>(leaf), linksOfLeaf_[n], out.data());
+  }
+}
+
 double FaceCoupling::apply(double weight, const std::vector<double>& x, std::vector<double>& out) {
   detail::forEachChunk(links_.size(), kLeavesPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n) computeJump(n, x.data());
@@ -325,9 +417,7 @@ double FaceCoupling::apply(double weight, const std::vector<double>& x, std::vec
   detail::forEachChunk(leaves_.size(), kLeavesPerTask, [&](std::size_t chunk, std::size_t first, std::size_t count) {
     const std::size_t last = first + count;
     for (std::size_t c = start_[first]; c < start_[last]; ++c) out[c] = weight * x[c];
-    for (std::size_t leaf = first; leaf < last; ++leaf)
-      for (std::size_t n = linksOfLeafStart_[leaf]; n < linksOfLeafStart_[leaf + 1]; ++n)
-        addJump(static_cast<std::uint32_t>(leaf), linksOfLeaf_[n], out.data());
+    addJumps(first, count, out);
     for (std::size_t c = start_[first]; c < start_[last]; ++c) sums[chunk] += x[c] * out[c];
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
@@ -337,6 +427,7 @@ std::vector<double> FaceCoupling::diagonal() const {
   std::vector<double> result(start_.back(), 0.0);
   for (const Link& link : links_)
     for (const std::uint32_t leaf : {link.small, link.large}) {
+      if (isExact(leaf)) continue;
       const double share = leaf == link.small ? 1 : std::ldexp(1.0, -3 * link.levels);
       const auto& factor = traces_[degree_[leaf]][link.axis].factor[0];
       for (std::size_t c = 0; c < factor.size(); ++c) result[start_[leaf] + c] += share * factor[c] * factor[c];

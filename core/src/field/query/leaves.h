@@ -44,6 +44,13 @@ void visitNodes(const FieldData& field, Visit&& visit) {
       }
 }
 
+/// The polynomial degree for which the faces of exact leaves are sampled. The distance there is no polynomial: its
+/// trace on a face is smooth except for a few bends.
+constexpr int kExactSampleDegree = 6;
+
+/// Returns the polynomial degree for which the faces of a leaf are sampled.
+constexpr int sampleDegree(std::uint64_t leaf) { return node::isExact(leaf) ? kExactSampleDegree : node::degree(leaf); }
+
 /// Returns all leaves in depth-first order.
 std::vector<OctreeNode> allLeaves(const FieldData& field);
 
