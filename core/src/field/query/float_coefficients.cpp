@@ -18,14 +18,30 @@ void convert(FieldData& field) {
   field.coefficients = std::move(to);
 }
 
+const std::vector<Eigen::Vector3d>* doubleVertices(const ExactTriangles& exact) {
+  return std::get_if<std::vector<Eigen::Vector3d>>(&exact.vertices);
+}
+
+/// Returns the greatest distance by which `roundVertices` moves a vertex.
+double vertexRounding(const ExactTriangles& exact) {
+  const auto* vertices = doubleVertices(exact);
+  if (vertices == nullptr || !mayRoundVertices(exact)) return 0;
+  double greatest = 0;
+  for (const Eigen::Vector3d& vertex : *vertices) greatest = std::max(greatest, (throughFloat(vertex) - vertex).norm());
+  return greatest;
+}
+
 }  // namespace
 
 Rounding floatRounding(const FieldData& field) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
   Rounding rounding;
+  const double ofVertices = vertexRounding(field.exact);
+  rounding.max = ofVertices;
   double sum = 0;
   visitNodes(field, [&](const OctreeNode& at) {
     const std::uint64_t bits = field.nodes[at.node];
+    if (node::isExact(bits)) sum += ofVertices * ofVertices * cellSize(field, at.depth).prod();
     if (!node::isLeaf(bits) || node::isExact(bits)) return true;
     const double* c = &coefficients[node::offset(bits)];
     double squares = 0, max = 0;
@@ -42,18 +58,36 @@ Rounding floatRounding(const FieldData& field) {
   return rounding;
 }
 
+double throughFloat(double number) { return static_cast<float>(number); }
+
+Vector3 throughFloat(const Vector3& vertex) {
+  return {throughFloat(vertex.x()), throughFloat(vertex.y()), throughFloat(vertex.z())};
+}
+
 bool hasFloatVertices(const ExactTriangles& exact) {
-  const auto* vertices = std::get_if<std::vector<Eigen::Vector3d>>(&exact.vertices);
+  const auto* vertices = doubleVertices(exact);
   return vertices == nullptr ||
-         std::ranges::all_of(*vertices, [](const Eigen::Vector3d& v) { return v.cast<float>().cast<double>() == v; });
+         std::ranges::all_of(*vertices, [](const Eigen::Vector3d& v) { return throughFloat(v) == v; });
+}
+
+bool mayRoundVertices(const ExactTriangles& exact) {
+  constexpr double kGreatestTurn = 0.1;  // greatest change of a unit normal
+  const auto* vertices = doubleVertices(exact);
+  if (vertices == nullptr) return true;
+  return std::ranges::all_of(exact.triangles, [&](const std::array<std::uint32_t, 3>& triangle) {
+    const Eigen::Vector3d &a = (*vertices)[triangle[0]], &b = (*vertices)[triangle[1]], &c = (*vertices)[triangle[2]];
+    const Eigen::Vector3d before = (b - a).cross(c - a);
+    const Eigen::Vector3d after = (throughFloat(b) - throughFloat(a)).cross(throughFloat(c) - throughFloat(a));
+    return (before.normalized() - after.normalized()).norm() <= kGreatestTurn;  // a vector without length stays 0
+  });
 }
 
 void roundVertices(ExactTriangles& exact) {
-  const auto* vertices = std::get_if<std::vector<Eigen::Vector3d>>(&exact.vertices);
-  if (vertices == nullptr) return;
-  std::vector<Eigen::Vector3f> rounded(vertices->size());
-  std::ranges::transform(*vertices, rounded.begin(), [](const Eigen::Vector3d& v) { return v.cast<float>().eval(); });
-  exact.vertices = std::move(rounded);
+  const auto* vertices = doubleVertices(exact);
+  if (vertices == nullptr || !mayRoundVertices(exact)) return;
+  std::vector<Eigen::Vector3f> floats(vertices->size());
+  std::ranges::transform(*vertices, floats.begin(), [](const Eigen::Vector3d& v) { return v.cast<float>().eval(); });
+  exact.vertices = std::move(floats);
 }
 
 void toFloat(FieldData& field) { convert<float, double>(field); }

@@ -5,14 +5,15 @@
 
 namespace hpsdf::query {
 
-/// The change of a field when its coefficients are rounded to float, in units of length.
+/// The change of a field when its coefficients, and the vertices of its exact leaves, are rounded to float, in units of
+/// length.
 struct Rounding {
   double rms = 0;
   double max = 0;  ///< upper bound of the change at any point
 };
 
-/// Computes by how much rounding the coefficients to float changes a field. The coefficients of the field are
-/// double.
+/// Computes by how much rounding to float changes a field. The coefficients of the field are double. A vertex that
+/// moves by δ changes no distance by more than δ; in `rms`, all exact leaves count with the greatest such δ.
 Rounding floatRounding(const FieldData& field);
 
 /// Convert the coefficients of a field to float or to double. Coefficients that already have that type do not
@@ -20,9 +21,17 @@ Rounding floatRounding(const FieldData& field);
 void toFloat(FieldData& field);
 void toDouble(FieldData& field);
 
+/// Round a number or a vertex to float and back. The conversions are not inlined: where GCC 12 vectorizes both for two
+/// coordinates of a vector, it leaves them out.
+[[gnu::noinline]] double throughFloat(double number);
+Vector3 throughFloat(const Vector3& vertex);
+
 /// Returns true if every vertex of the exact leaves is equal to a vertex of three floats.
 bool hasFloatVertices(const ExactTriangles& exact);
-/// Rounds the vertices of the exact leaves to float.
+/// Returns true if no triangle of the exact leaves turns when its vertices are rounded to float. The sign of a distance
+/// comes from the normals of triangles, so that it would be wrong beside a triangle that turned.
+bool mayRoundVertices(const ExactTriangles& exact);
+/// Rounds the vertices of the exact leaves to float, unless a triangle would turn.
 void roundVertices(ExactTriangles& exact);
 
 }  // namespace hpsdf::query
