@@ -5,6 +5,10 @@
 // points from above and from below. Together with bounds of a leaf's polynomial f, these bounds of Φ give a bound of
 // |f − Φ| over the whole leaf (`CellBound`).
 //
+// An exact leaf measures the same distance as Φ, so that its error consists of rounding errors alone. They follow from
+// the leaf's triangles, without evaluations of Φ. In the zones of a blended field, an exact leaf is evaluated outside
+// its box, where its list may lack the nearest triangles; it does not if the field was built with blending.
+//
 // The bounds hold if Φ is the signed distance of a closed surface without self-intersections. Near the holes of an open
 // mesh, and wherever else the sign of Φ is wrong, Φ jumps and no bound holds.
 
@@ -18,9 +22,10 @@
 namespace hpsdf {
 
 /// Returns a copy of `field` with a proven error bound (`CellBound`) for each leaf. The function evaluates Φ at 24
-/// points per leaf; `exactEvaluations` in the metadata includes these evaluations. The result does not depend on
-/// `threads` (0: all that the machine offers). Throws `Error` if Φ is not finite. Throws `Cancelled` when `progress`
-/// says so.
+/// points per leaf that is a polynomial and, with blending, at 24 points for each exact leaf that touches it. Φ must be
+/// the distance that the field was made from. `exactEvaluations` in the metadata includes these evaluations. The result
+/// does not depend on `threads` (0: all that the machine offers). Throws `Error` if Φ is not finite. Throws `Cancelled`
+/// when `progress` says so.
 Field withBounds(const Field& field, const DistanceFunction& distance, int threads = 0, const Progress& progress = {});
 
 /// Returns the error bound of the leaf that holds x or, for x outside the domain, of the leaf that holds the domain's

@@ -38,7 +38,7 @@ std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Bui
   const bool hasTriangles = distance.triangleSearch() != nullptr && distance.triangleSearch()->hasSigns();
   if (options.strategy != Strategy::hpx || !hasTriangles) return std::nullopt;
   return ExactCells(*distance.triangleSearch(), options.exactWithin * referenceLength(distance.source(), domain),
-                    static_cast<std::size_t>(options.exactTriangles));
+                    static_cast<std::size_t>(options.exactTriangles), options.blend);
 }
 
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.
@@ -71,7 +71,7 @@ class Construction {
       file.keep([this](detail::CheckedWriter& writer) { save(writer, state_, fitter_.evaluations()); });
     };
     std::optional<detail::CheckedReader> reader = file.open();
-    if (reader) fitter_.setEvaluations(restore(*reader, state_, setup_.options, budget_));
+    if (reader) fitter_.setEvaluations(restore(*reader, state_, setup_));
     return reader.has_value();
   }
 
@@ -121,7 +121,7 @@ class Construction {
     // that pruning can still undo refinements.
     if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)
       limits.goal = setup_.goal.relaxedTo(state_.totals, 1 / kGrowth);
-    if (options.maxBytes) limits.mostBytes = budget_.limit();
+    if (options.maxBytes) limits.mostBytes = budget_.limit() - state_.exactSize.inField;
     limits.leastDegree = leastDegree(options);
     limits.mostDegree = mostDegree(options);
     detail::prune(tree, state_.nearness, limits);

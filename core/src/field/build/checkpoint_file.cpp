@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,7 +20,7 @@ namespace {
 constexpr Magic kCheckpointMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
 // Version of the checkpoint file. It must be increased whenever the file's layout changes or a construction
 // would continue differently from the same state.
-constexpr std::uint32_t kCheckpointVersion = 3;
+constexpr std::uint32_t kCheckpointVersion = 4;
 constexpr FileKind kCheckpointKind{"checkpoint", "another output", "delete it to build from the start"};
 
 class Digest {
@@ -129,33 +130,43 @@ void coefficientItems(Stream& stream, int& degree, std::vector<double>& coeffici
                  "a number is not finite");
 }
 
+/// Limits of the fits of a construction.
+struct FitLimits {
+  int mostDegree = kMaxDegree;
+  std::size_t triangles = triangle_run::kMostTriangles;  ///< number of triangles to which exact leaves can refer
+};
+
 template <typename Stream>
-void exactItems(Stream& stream, Fit& fit) {
+void exactItems(Stream& stream, Fit& fit, std::size_t triangles) {
   fit.degree = kExactDegree;
   stream.item(fit.sign);
   stream.require(fit.sign <= ExactSign::negative, "a cell's sign is unknown");
   finiteItem(stream, fit.error.volume);
   stream.list(fit.triangles);
-  stream.require(!fit.triangles.empty(), "an exact cell has no triangles");
+  const bool ascends = std::ranges::adjacent_find(fit.triangles, std::greater_equal()) == fit.triangles.end();
+  stream.require(!fit.triangles.empty() && ascends && fit.triangles.back() < triangles,
+                 "an exact cell has triangles that cannot be");
 }
 
 template <typename Stream>
-void fitItems(Stream& stream, Fit& fit, int mostDegree) {
+void fitItems(Stream& stream, Fit& fit, const FitLimits& limits) {
   const auto bit = [](bool set, std::uint8_t value) { return set ? value : std::uint8_t{0}; };
   auto parts = static_cast<std::uint8_t>(bit(!fit.coefficients.empty(), kFitted) | bit(fit.outsideBand, kOutsideBand) |
                                          bit(fit.error.near, kNear) | bit(!fit.cached.coefficients.empty(), kCached) |
                                          bit(fit.isFinal, kFinal) | bit(fit.isExact(), kExact));
   stream.item(parts);
   stream.require(parts <= kAllBits, "a cell's bits are unknown");
+  stream.require((parts & kExact) == 0 || (parts & (kFitted | kCached | kFinal)) == kFinal,
+                 "an exact cell is not without error");
   fit.outsideBand = (parts & kOutsideBand) != 0;
   fit.error.near = (parts & kNear) != 0;
   fit.isFinal = (parts & kFinal) != 0;
-  if ((parts & kExact) != 0) exactItems(stream, fit);
+  if ((parts & kExact) != 0) exactItems(stream, fit, limits.triangles);
   if ((parts & kFitted) != 0) {
     finiteItem(stream, fit.error.weighted);
     finiteItem(stream, fit.error.squared);
     finiteItem(stream, fit.error.volume);
-    coefficientItems(stream, fit.degree, fit.coefficients, 1, mostDegree);
+    coefficientItems(stream, fit.degree, fit.coefficients, 1, limits.mostDegree);
   }
   if ((parts & kCached) != 0) {
     finiteItem(stream, fit.cached.meanSquare);
@@ -164,10 +175,10 @@ void fitItems(Stream& stream, Fit& fit, int mostDegree) {
 }
 
 template <typename Stream>
-void nodeItems(Stream& stream, BuildTree& tree, int mostDegree) {
+void nodeItems(Stream& stream, BuildTree& tree, const FitLimits& limits) {
   for (BuildNode& node : tree.nodes) {
     stream.item(node.firstChild);
-    fitItems(stream, node.fit, mostDegree);
+    fitItems(stream, node.fit, limits);
   }
 }
 
@@ -196,7 +207,7 @@ void checkFits(const CheckedReader& reader, const ConstructionState& state, bool
     const bool isFitted = !node.fit.coefficients.empty(), isCached = !node.fit.cached.coefficients.empty();
     const bool isUnfitted = isFitting && n >= state.fittedCells && !node.fit.isFinal;
     const bool needsFit =
-        node.firstChild == 0 ? !isUnfitted && !node.fit.isExact() : keepsAll && n >= state.fittedCells;
+        node.firstChild == 0 ? !isUnfitted && !node.fit.isExact() : keepsAll && !isFitting && n >= state.fittedCells;
     const bool isSuperfluous = (isUnfitted || node.fit.isExact()) && isFitted;
     const bool needsCached = isFitted && keepsAll && !node.fit.isFinal;
     reader.require(!(needsFit && !isFitted) && !isSuperfluous && isCached == needsCached,
@@ -204,7 +215,8 @@ void checkFits(const CheckedReader& reader, const ConstructionState& state, bool
   }
 }
 
-void readTree(CheckedReader& reader, ConstructionState& state, const BuildOptions& options) {
+void readTree(CheckedReader& reader, ConstructionState& state, const ConstructionSetup& setup) {
+  const BuildOptions& options = setup.options;
   BuildTree& tree = state.tree;
   constexpr std::uint64_t kLeastBytes = sizeof(std::uint32_t) + 1;  // least size of a node in the file
   const std::uint64_t base = tree.baseCells();
@@ -216,7 +228,9 @@ void readTree(CheckedReader& reader, ConstructionState& state, const BuildOption
   requireMemory({.nodes = count, .coefficients = reader.remaining() / sizeof(double)}, options);
   tree.addBaseCells();
   tree.nodes.resize(count);
-  nodeItems(reader, tree, options.maxDegree);
+  nodeItems(reader, tree,
+            {.mostDegree = options.maxDegree,
+             .triangles = setup.exactCells ? setup.exactCells->search().triangles().size() : 0});
   setCellIndices(reader, tree, options.maxDepth);
   checkFits(reader, state, options.criterion == Criterion::optimal);
 }
@@ -304,18 +318,17 @@ void CheckpointFile::waitFor(double seconds) {
 void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations) {
   scalarItems(writer, state, evaluations);
   writer.item(std::uint64_t{state.tree.nodes.size()});
-  nodeItems(writer, state.tree, kMaxDegree);
+  nodeItems(writer, state.tree, {});
   writer.list(state.deferred);
   writer.list(state.pending);
 }
 
-std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const BuildOptions& options,
-                      const ByteBudget& budget) {
+std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const ConstructionSetup& setup) {
   std::uint64_t evaluations = 0;
   scalarItems(reader, state, evaluations);
   reader.require(state.stage <= ConstructionState::Stage::probe && state.nearness.kind <= NearnessKind::exponential,
                  "it is at an unknown stage");
-  readTree(reader, state, options);
+  readTree(reader, state, setup);
   reader.list(state.deferred);
   reader.list(state.pending);
   reader.finish();
@@ -326,7 +339,8 @@ std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const Bui
   requireLeaves(reader, state.tree, std::span(state.pending).subspan(state.processed));
   if (isFitting) return evaluations;
   for (const BuildNode& node : state.tree.nodes)
-    if (node.firstChild == 0) state.coefficients += budget.finalCoefficients(node.fit);
+    if (node.firstChild == 0) state.coefficients += setup.budget.finalCoefficients(node.fit);
+  state.exactSize = setup.exactSize(state.tree);
   return evaluations;
 }
 

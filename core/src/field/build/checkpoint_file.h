@@ -57,9 +57,8 @@ class CheckpointFile {
 void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations);
 
 /// Reads the construction state that `save` wrote, and returns the number of evaluations of the exact distance.
-/// The domain and the grid of `state` must already be set. Throws `Error` unless a construction with these
-/// options could have saved this state.
-std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const BuildOptions& options,
-                      const ByteBudget& budget);
+/// The domain and the grid of `state` must already be set. Throws `Error` unless a construction with this
+/// setup could have saved this state.
+std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const ConstructionSetup& setup);
 
 }  // namespace hpsdf::detail

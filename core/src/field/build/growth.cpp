@@ -114,22 +114,26 @@ class Growth {
     }
     for (const BuildNode& node : tree.nodes)
       if (node.firstChild == 0) state_.coefficients += setup_.budget.finalCoefficients(node.fit);
+    state_.exactSize = setup_.exactSize(tree);
     if (setup_.goal.byDistance()) chooseNearness();
     refiner_.sumTotals();
-    requireRoomForBaseGrid();
+    requireRoomForFirstCells();
     for (std::size_t n = 0; n < count; ++n)
       if (tree.nodes[n].firstChild == 0) enqueue(static_cast<std::uint32_t>(n));
     state_.stage = Stage::refine;
   }
 
-  void requireRoomForBaseGrid() const {
-    double least = 0;
+  void requireRoomForFirstCells() const {
+    double least = state_.exactSize.inField;
     for (const BuildNode& node : state_.tree.nodes) {
-      if (node.firstChild != 0 || node.fit.isFinal) continue;
+      if (node.firstChild != 0 || node.fit.isFinal) {
+        least += setup_.budget.bytes(1, double(node.fit.coefficients.size()));
+        continue;
+      }
       const bool mayLower = setup_.options.criterion == Criterion::optimal && !node.fit.outsideBand;
       least += setup_.budget.leafBytes(mayLower ? leastDegree(setup_.options) : node.fit.degree);
     }
-    setup_.budget.requireRoomForBaseGrid(refiner_.bytes(), least);
+    setup_.budget.requireRoomForFirstCells(refiner_.bytes(), least, state_.exactSize.inField);
   }
 
   /// Chooses the exponent θ of the weight by which errors far from the surface count less. With this θ, a cell at the
@@ -263,7 +267,7 @@ class Growth {
       fraction = progress_.update(double(fitter_.evaluations()), totals.weighted, goal.weighted);
     }
     if (setup_.options.maxSteps) fraction = std::max(fraction, double(state_.steps) / double(*setup_.options.maxSteps));
-    return std::max(fraction, refiner_.bytes() / setup_.budget.growthLimit());
+    return std::max(fraction, refiner_.bytes() / setup_.budget.growthLimit(state_.exactSize.inField));
   }
 
   const ConstructionSetup& setup_;

@@ -6,7 +6,6 @@
 #include <sstream>
 #include <string>
 
-#include "field/cells/exact_lists.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
 #include "util/refuse.h"
@@ -137,9 +136,7 @@ static void requireGridMemory(const BuildOptions& options) {
 }
 
 std::size_t ByteBudget::finalCoefficients(const Fit& fit) const {
-  if (!fit.isFinal) return finalCoefficients(fit.degree);
-  const auto listed = static_cast<std::size_t>(fit.isExact() ? listBytes(fit.triangles) / sizeof(float) : 0);
-  return fit.coefficients.size() + listed;
+  return fit.isFinal ? fit.coefficients.size() : finalCoefficients(fit.degree);
 }
 
 void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
@@ -172,16 +169,21 @@ double ByteBudget::nodeBytes() const {
   return 8 + (options_.blend > 0 ? 4 : 0) + (options_.bounds ? double(sizeof(CellBound)) : 0);
 }
 
-double ByteBudget::growthLimit() const {
+double ByteBudget::growthLimit(double exactBytes) const {
   // Before pruning, the field may exceed the byte limit by this factor, so that there are refinements from which
   // pruning can choose. The factor was found by measurements, like `kGrowth`.
   constexpr double kByteGrowth = 1.6;
-  return options_.criterion == Criterion::optimal ? limit_ * kByteGrowth : limit_;
+  return options_.criterion == Criterion::optimal ? (limit_ - exactBytes) * kByteGrowth + exactBytes : limit_;
 }
 
-void ByteBudget::requireRoomForBaseGrid(double bytes, double leastBytes) const {
-  if (leastBytes > limit_ || bytes > growthLimit())
-    refuse("the base grid alone takes more than ", *options_.maxBytes, " bytes: allow more, or take a coarser grid");
+void ByteBudget::requireRoomForFirstCells(double bytes, double leastBytes, double exactBytes) const {
+  const double missing = std::max(leastBytes - limit_, bytes - growthLimit(exactBytes));
+  if (!(missing > 0)) return;
+  if (exactBytes > 0 && exactBytes > missing)
+    refuse("the exact cells near the surface and the cells around them take more than ", *options_.maxBytes,
+           " bytes: allow about ", std::ceil(double(*options_.maxBytes) * (1 + missing / limit_)),
+           ", more exact-triangles a cell, or a smaller exact-within");
+  refuse("the base grid alone takes more than ", *options_.maxBytes, " bytes: allow more, or take a coarser grid");
 }
 
 CoefficientType ByteBudget::coefficientType() const {

@@ -39,8 +39,8 @@ struct MemoryNeed {
 /// Throws `Error` if the construction exceeds the allowed memory now, or will exceed it at the end.
 void requireMemory(const MemoryNeed& need, const BuildOptions& options);
 
-/// Computes the bytes of the finished field from its numbers of nodes and coefficients. The lookup grid does
-/// not count.
+/// Computes the bytes of the finished field from its numbers of nodes and coefficients. The lookup grid and the
+/// triangles of exact leaves do not count.
 class ByteBudget {
  public:
   explicit ByteBudget(const BuildOptions& options);
@@ -52,8 +52,7 @@ class ByteBudget {
   }
   /// Returns the number of coefficients that a leaf of degree `degree` has in the finished field.
   std::size_t finalCoefficients(int degree) const { return std::size_t(coefficientCount(finalDegree(degree))); }
-  /// Returns the number of coefficients that a leaf with this fit has in the finished field. Each run of an exact
-  /// leaf's list counts as one coefficient.
+  /// Returns the number of coefficients that a leaf with this fit has in the finished field.
   std::size_t finalCoefficients(const Fit& fit) const;
   /// Returns the bytes of a node, including those for blending and for error bounds if the field has them.
   double nodeBytes() const;
@@ -62,13 +61,15 @@ class ByteBudget {
     return nodeBytes() * nodes + coefficientBytes_ * coefficients;
   }
 
-  /// Returns the byte limit for nodes and coefficients, or infinity if there is no limit.
+  /// Returns the byte limit for nodes, coefficients and the triangles of exact leaves, or infinity if there is no
+  /// limit.
   double limit() const { return limit_; }
-  /// Returns the byte limit while the octree grows. It is greater than `limit` if pruning follows.
-  double growthLimit() const;
-  /// Throws `Error` if the base cells take too many bytes: if `bytes` exceeds the growth limit, or if
-  /// `leastBytes`, the fewest that pruning can leave, exceeds the limit.
-  void requireRoomForBaseGrid(double bytes, double leastBytes) const;
+  /// Returns the byte limit while the octree grows. It is greater than `limit` if pruning follows. `exactBytes` are
+  /// the bytes of triangles and their lists, which pruning leaves as they are.
+  double growthLimit(double exactBytes) const;
+  /// Throws `Error` if the first cells take too many bytes: if `bytes` exceeds the growth limit, or if
+  /// `leastBytes`, the fewest that pruning can leave, exceeds the limit. Both include `exactBytes`.
+  void requireRoomForFirstCells(double bytes, double leastBytes, double exactBytes) const;
 
   /// Returns the precision of the finished field's coefficients. It is float if bytes are limited and no
   /// precision is set.

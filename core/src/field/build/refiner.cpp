@@ -50,7 +50,8 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
   const ByteBudget& budget = setup.budget;
   const std::size_t before = budget.finalCoefficients(tree.nodes[leaf].fit.degree);
   const std::size_t added = raises ? budget.finalCoefficients(trial.raised->degree) - before : 7 * before;
-  if (bytes() + budget.bytes(0, double(added)) + (raises ? 0 : 8 * budget.nodeBytes()) > budget.growthLimit()) {
+  if (bytes() + budget.bytes(0, double(added)) + (raises ? 0 : 8 * budget.nodeBytes()) >
+      budget.growthLimit(state.exactSize.inField)) {
     state.isFull = true;
     return;
   }
@@ -80,9 +81,12 @@ void Refiner::sumTotals() {
 void Refiner::requireMemory(double factor) const {
   // Estimate the memory. If pruning follows, the projections and the internal nodes that are kept for it need
   // about three times as much memory as the coefficients of the leaves.
+  // Exact leaves are in memory twice when the arrays of the field are made. Their bytes count as coefficients.
   const bool keepsAll = setup.options.criterion == Criterion::optimal;
+  const double exactBytes = state.exactSize.inTree + state.exactSize.inField;
   detail::requireMemory({.nodes = state.tree.nodes.size(),
-                         .coefficients = keepsAll ? 4 * state.coefficients : state.coefficients,
+                         .coefficients = (keepsAll ? 4 * state.coefficients : state.coefficients) +
+                                         static_cast<std::size_t>(exactBytes / sizeof(double)),
                          .growthFactor = factor,
                          .fixedBytes = setup.distance.bytes()},
                         setup.options);

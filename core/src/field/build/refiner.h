@@ -30,6 +30,7 @@ struct ConstructionState {
   std::vector<std::uint32_t> deferred;  ///< leaves set aside while the near or the far error meets its goal
   std::vector<std::uint32_t> pending;   ///< leaves whose maximum error is measured, in this order
   std::size_t coefficients = 0;         ///< number of coefficients of the finished field; derived, not stored
+  ExactSize exactSize;                  ///< memory of the exact leaves; derived, not stored
 };
 
 /// The goal of a construction, and the settings and objects that all stages share.
@@ -42,6 +43,11 @@ struct ConstructionSetup {
   ErrorGoal growthGoal;  ///< goal before pruning: a smaller error than `goal` if pruning follows
   const ByteBudget& budget;
   std::optional<ExactCells> exactCells = {};  ///< makes exact leaves; only for `Strategy::hpx`
+
+  /// Returns the memory of the exact leaves of a tree of this construction.
+  ExactSize exactSize(const BuildTree& tree) const {
+    return detail::exactSize(tree, distance.triangleSearch(), budget.coefficientType());
+  }
 };
 
 /// Callbacks during the refinement of the octree.
@@ -78,7 +84,9 @@ struct Refiner {
   /// Computes the error totals anew from all leaves, which removes the rounding errors of the running totals.
   void sumTotals();
   /// Returns the size in bytes of the field that would be made from the present octree.
-  double bytes() const { return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)); }
+  double bytes() const {
+    return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)) + state.exactSize.inField;
+  }
   /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by `factor`.
   void requireMemory(double factor = 1) const;
 };

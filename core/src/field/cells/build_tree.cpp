@@ -67,6 +67,25 @@ static std::optional<ExactListPacker> makePacker(const BuildTree& tree, const Tr
   return packer;
 }
 
+ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, CoefficientType type) {
+  std::optional<ExactListPacker> packer = makePacker(tree, search);
+  ExactSize size;
+  if (!packer) return size;
+  for (const BuildNode& node : tree.nodes) {
+    if (node.firstChild != 0 || !node.fit.isExact()) continue;
+    packer->pack(node.fit.triangles);
+    size.inTree += double(node.fit.triangles.size() * sizeof(node.fit.triangles[0]));
+  }
+  const ExactTriangles exact = packer->finish();
+  const bool isFloat =
+      query::hasFloatVertices(exact) || (type != CoefficientType::float64 && query::mayRoundVertices(exact));
+  const std::size_t vertices = std::get<std::vector<Eigen::Vector3d>>(exact.vertices).size();
+  size.inField = double(exact.lists.size() * sizeof(exact.lists[0])) +
+                 double(exact.triangles.size() * sizeof(exact.triangles[0])) +
+                 double(vertices * (isFloat ? sizeof(Eigen::Vector3f) : sizeof(Eigen::Vector3d)));
+  return size;
+}
+
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search) {
   FieldData data;
   data.domain = tree.domain;

@@ -40,6 +40,16 @@ struct BuildTree {
   void split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own = {});
 };
 
+/// The memory that exact leaves take besides their nodes, in bytes.
+struct ExactSize {
+  double inField = 0;  ///< in the finished field: lists, triangles and vertices
+  double inTree = 0;   ///< in the octree of the construction
+};
+
+/// Computes the memory of the exact leaves of a tree. In the finished field, the vertices have the precision of
+/// coefficients of type `type`.
+ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, CoefficientType type);
+
 /// Copies the nodes and coefficients into the arrays of a field, depth first, so that neighbours in space are
 /// neighbours in memory. The coefficients remain double. Destroys the tree.
 /// `search` provides the triangles of exact leaves; it may be nullptr if there are none.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -12,6 +13,7 @@
 
 #include "basis/projection.h"
 #include "field/cells/cell_fit.h"
+#include "field/cells/exact_bounds.h"
 #include "field/query/evaluate.h"
 #include "field/query/leaves.h"
 #include "hpsdf/detail/legendre_part.h"
@@ -24,7 +26,7 @@ namespace {
 // Upper bound of the accumulated rounding errors, relative to the magnitude of the numbers involved.
 constexpr double kRounding = 1e-12;
 
-/// A leaf's polynomial over one of the eight octants of the leaf, in local coordinates of the octant.
+/// A leaf's polynomial over one of the eight octants of a box, in local coordinates of the octant.
 struct Part {
   Vector3 center, half;              ///< in the field's units
   double value = 0;                  ///< constant coefficient: the linear polynomial's value at the centre
@@ -48,10 +50,9 @@ std::vector<double> partCoefficients(std::vector<double> c, int degree,
   return c;
 }
 
-/// Transformations of Legendre coefficients from the whole range of an axis to its lower and its upper half.
-struct Halves {
-  LegendreRows below = legendreOfPart(-0.5, 0.5, kMaxDegree), above = legendreOfPart(0.5, 0.5, kMaxDegree);
-};
+/// Transformations of Legendre coefficients from the local coordinates of a leaf to the lower and the upper half of a
+/// box, along each axis.
+using Halves = std::array<std::array<const LegendreRows*, 2>, 3>;
 
 /// Adds the term coefficient · L_i(x) L_j(y) L_k(z) to a part. L_i is the Legendre polynomial of degree i; `order`
 /// holds i, j and k. The bounds use |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
@@ -74,13 +75,13 @@ void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
     part.products[std::ranges::find(order, 0) - order.begin()] = coefficient;
 }
 
-/// Returns a leaf's polynomial over one octant of the leaf. The octant's number is x + 2y + 4z.
+/// Returns a leaf's polynomial over one octant of a box. The octant's number is x + 2y + 4z.
 Part partOf(const std::vector<double>& cube, int degree, const Box& box, int number, const Halves& halves) {
   std::array<const LegendreRows*, 3> rows;
   Part part;
   for (int axis = 0; axis < 3; ++axis) {
     const bool upper = number >> axis & 1;
-    rows[axis] = upper ? &halves.above : &halves.below;
+    rows[axis] = halves[axis][upper];
     const double half = box.sizes()[axis] / 2;
     part.center[axis] = box.center()[axis] + (upper ? 0.5 : -0.5) * half;
     part.half[axis] = 0.5 * half;
@@ -186,86 +187,163 @@ std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degre
   return cube;
 }
 
-/// Computes the bounds of each leaf from the leaf's own polynomial, without regard to blending.
+/// The box in which two touching leaves both have a blending weight. It extends on either side of the leaves' common
+/// face, edge or corner by the edge of the smaller leaf times the blend width.
+struct Zone {
+  Vector3 from, to;  ///< relative to the small leaf's lower corner, in edges of the small leaf
+  /// Lower corner and edge of the large leaf, in the same coordinates. Relative positions are exact even far from the
+  /// domain's corner.
+  Vector3 largeAt;
+  double largeEdge;
+};
+
+Zone zoneBetween(const FieldData& field, const query::OctreeNode& small, const query::OctreeNode& large) {
+  const int levels = small.depth - large.depth;
+  const std::int64_t width = std::int64_t{1} << levels;
+  Zone zone;
+  zone.largeEdge = static_cast<double>(width);
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t smallAt = small.cellIndex[axis], largeAt = large.cellIndex[axis] << levels;
+    const std::int64_t wall = std::int64_t{field.grid[axis]} << small.depth;
+    const auto low = static_cast<double>(std::max<std::int64_t>(0, largeAt - smallAt));
+    const auto high = static_cast<double>(std::min<std::int64_t>(1, largeAt + width - smallAt));
+    zone.from[axis] = std::max(low - field.blend, static_cast<double>(-smallAt));
+    zone.to[axis] = std::min(high + field.blend, static_cast<double>(wall - smallAt));
+    zone.largeAt[axis] = static_cast<double>(largeAt - smallAt);
+  }
+  return zone;
+}
+
+/// Upper bounds of |f − Φ| and ‖∇f‖ for the field f of one leaf.
+struct Bounds {
+  double error = 0, slope = 0;
+};
+
+/// Computes bounds of the fields of single leaves, without regard to blending.
 class BoundFinder {
  public:
   BoundFinder(const FieldData& field, const DistanceFunction& distance)
-      : field_(field), frame_(query::gridFrame(field)), distance_(distance) {}
+      : field_(field),
+        frame_(query::gridFrame(field)),
+        distance_(distance),
+        exact_(field, distance),
+        rounding_(kRounding * field.domain.diagonal().norm()) {
+    halves_.fill({&below_, &above_});
+  }
 
+  /// Returns the bounds of a leaf in its own box.
   CellBound operator()(const query::OctreeNode& leaf) const {
+    const Bounds found = isExact(leaf) ? Bounds{exact_.error(leaf), 1}
+                                       : boundsIn(query::cellBox(frame_, leaf.depth, leaf.cellIndex), leaf, halves_);
+    CellBound bound;
+    bound.error = roundedUp(found.error + rounding_);
+    bound.slope = roundedUp(found.slope * (1 + kRounding));
+    return bound;
+  }
+
+  /// Bounds the errors of exact leaves in all zones, which `inZone` needs.
+  void boundExactLeavesInZones(const std::vector<query::OctreeNode>& leaves) {
+    exactErrorAround_.resize(field_.nodes.size());
+    tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
+      if (isExact(leaves[n])) exactErrorAround_[leaves[n].node] = exact_.errorAround(leaves[n]);
+    });
+  }
+
+  /// Returns the bounds of a leaf in the zone that it shares with another leaf. `at` and `edge` are the leaf's lower
+  /// corner and edge in the coordinates of the zone, and `small` is the smaller one of the two leaves.
+  Bounds inZone(const Zone& zone, const query::OctreeNode& leaf, const Vector3& at, double edge,
+                const query::OctreeNode& small) const {
+    if (isExact(leaf)) return {exactErrorAround_[leaf.node] + rounding_, 1 + kRounding};
+    std::array<std::array<LegendreRows, 2>, 3> rows;
+    Halves halves;
+    std::array<double, 3> lower, upper;
     const int degree = node::degree(field_.nodes[leaf.node]);
-    const Box box = query::cellBox(frame_, leaf.depth, leaf.cellIndex);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double centre = (zone.from[axis] + zone.to[axis] - 2 * at[axis]) / edge - 1;
+      const double quarter = (zone.to[axis] - zone.from[axis]) / edge / 2;
+      for (int side = 0; side < 2; ++side) {
+        rows[axis][side] = legendreOfPart(centre + (side == 0 ? -quarter : quarter), quarter, degree);
+        halves[axis][side] = &rows[axis][side];
+      }
+      const auto corner = static_cast<double>(small.cellIndex[axis]);
+      lower[axis] = std::ldexp(corner + zone.from[axis], -small.depth);
+      upper[axis] = std::ldexp(corner + zone.to[axis], -small.depth);
+    }
+    const Box box(query::worldPoint(frame_, lower), query::worldPoint(frame_, upper));
+    const Bounds found = boundsIn(box, leaf, halves);
+    return {found.error + rounding_, found.slope * (1 + kRounding)};
+  }
+
+  bool isExact(const query::OctreeNode& leaf) const { return node::isExact(field_.nodes[leaf.node]); }
+
+  std::uint64_t evaluations() const { return evaluations_; }
+
+ private:
+  /// Computes the bounds of a leaf's polynomial in a box.
+  Bounds boundsIn(const Box& box, const query::OctreeNode& leaf, const Halves& halves) const {
+    const int degree = node::degree(field_.nodes[leaf.node]);
     const std::vector<double> cube = cubeOf(field_, leaf.node, degree);
     std::array<Part, 8> parts;
     std::array<std::array<Vector3, kPointsPerPart>, 8> partPoints;
     std::array<Vector3, 8 * kPointsPerPart> points;  // neighbours are adjacent, which makes exact distances faster
     for (int number = 0; number < 8; ++number) {
-      parts[number] = partOf(cube, degree, box, number, halves_);
+      parts[number] = partOf(cube, degree, box, number, halves);
       partPoints[number] = pointsOf(parts[number], field_.domain, box.sizes().maxCoeff());
       for (std::size_t p = 0; p < kPointsPerPart; ++p) points[8 * p + number] = partPoints[number][p];
     }
     std::array<double, points.size()> distances;
     distance_(points, distances);
-    CellBound bound;
-    double error = 0, slope = 0;
+    evaluations_ += points.size();
+    Bounds bounds;
     for (int number = 0; number < 8; ++number) {
       std::array<double, kPointsPerPart> partDistances;
       for (std::size_t p = 0; p < kPointsPerPart; ++p) partDistances[p] = distances[8 * p + number];
       for (const double value : partDistances)
         if (!std::isfinite(value)) throw Error("bounds: the signed distance is not finite within the domain");
       const Part& part = parts[number];
-      error = std::max(error, errorBound(part, partPoints[number], partDistances));
-      slope = std::max(slope, (part.gradient.cwiseAbs() + part.restGradient).norm());
+      bounds.error = std::max(bounds.error, errorBound(part, partPoints[number], partDistances));
+      bounds.slope = std::max(bounds.slope, (part.gradient.cwiseAbs() + part.restGradient).norm());
     }
-    const double size = field_.domain.diagonal().norm();
-    bound.error = roundedUp(error + kRounding * size);
-    bound.slope = roundedUp(slope * (1 + kRounding));
-    return bound;
+    return bounds;
   }
 
-  static constexpr std::uint64_t kCalls = 8 * kPointsPerPart;
-
- private:
   const FieldData& field_;
   GridFrame frame_;
   const DistanceFunction& distance_;
+  ExactBounds exact_;
+  std::vector<double> exactErrorAround_;  ///< by node: see `ExactBounds::errorAround`
+  double rounding_;                       ///< bound of the rounding errors of values
+  LegendreRows below_ = legendreOfPart(-0.5, 0.5, kMaxDegree), above_ = legendreOfPart(0.5, 0.5, kMaxDegree);
   Halves halves_;
+  mutable std::atomic<std::uint64_t> evaluations_ = 0;
 };
 
-/// Upper bounds of the differences between two polynomials and between their gradients.
+/// Upper bounds of how a leaf changes where its neighbours are blended with it.
 struct Disagreement {
-  double value = 0, slope = 0;
+  double value = 0;  ///< difference between the fields of two leaves
+  double error = 0;  ///< growth of |f − Φ|
+  double slope = 0;  ///< growth of ‖∇f‖, without regard to the slopes of the blending weights
 
   void widen(const Disagreement& other) {
     value = std::max(value, other.value);
+    error = std::max(error, other.error);
     slope = std::max(slope, other.slope);
   }
 };
 
-/// Bounds the difference between the polynomials of two touching leaves in the zone where both leaves have a blending
-/// weight. The zone extends on either side of the leaves' common face by the edge of the smaller leaf times the blend
-/// width.
+/// Bounds the difference between the polynomials of two touching leaves in their common zone.
 Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode& small,
                                 const query::OctreeNode& large) {
   const int degree = std::max(node::degree(field.nodes[small.node]), node::degree(field.nodes[large.node]));
-  const int levels = small.depth - large.depth;
+  const Zone zone = zoneBetween(field, small, large);
+  const Vector3 half = (zone.to - zone.from) / 2;
   std::array<LegendreRows, 3> smallRows, largeRows;
-  Vector3 half;
   for (int axis = 0; axis < 3; ++axis) {  // lengths are in edges of the small cell
-    const std::int64_t smallAt = small.cellIndex[axis], largeAt = large.cellIndex[axis] << levels;
-    const std::int64_t width = std::int64_t{1} << levels, wall = std::int64_t{field.grid[axis]} << small.depth;
-    // Compute the extent of the zone relative to the small leaf's lower corner. Relative positions are exact even
-    // far from the domain's corner.
-    const auto low = static_cast<double>(std::max<std::int64_t>(0, largeAt - smallAt));
-    const auto high = static_cast<double>(std::min<std::int64_t>(1, largeAt + width - smallAt));
-    const double from = std::max(low - field.blend, static_cast<double>(-smallAt));
-    const double to = std::min(high + field.blend, static_cast<double>(wall - smallAt));
-    half[axis] = (to - from) / 2;
     const auto rows = [&](double start, double edge) {
-      return legendreOfPart((from + to - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
+      return legendreOfPart((zone.from[axis] + zone.to[axis] - 2 * start) / edge - 1, 2 * half[axis] / edge, degree);
     };
     smallRows[axis] = rows(0, 1);
-    largeRows[axis] = rows(static_cast<double>(largeAt - smallAt), static_cast<double>(width));
+    largeRows[axis] = rows(zone.largeAt[axis], zone.largeEdge);
   }
   const std::vector<double> one =
       partCoefficients(cubeOf(field, small.node, degree), degree, {&smallRows[0], &smallRows[1], &smallRows[2]});
@@ -280,8 +358,39 @@ Disagreement disagreementInZone(const FieldData& field, const query::OctreeNode&
     disagreement.value += difference;
     slope += difference * Vector3(i * (i + 1) / 2.0, j * (j + 1) / 2.0, k * (k + 1) / 2.0).cwiseProduct(toWorld);
   });
+  disagreement.error = disagreement.value;
   disagreement.slope = slope.norm();
   return disagreement;
+}
+
+/// Bounds how a leaf with the bounds `own` changes in a zone where a leaf with the bounds `other` is blended with it.
+/// The blended field and its gradient, without the slopes of the weights, are weighted means of both leaves. Hence
+/// neither |f − Φ| nor ‖∇f‖ exceeds the greater one of the two bounds.
+Disagreement disagreementBy(const CellBound& own, const Bounds& other) {
+  return {.value = double(own.error) + other.error,
+          .error = std::max(0.0, other.error - double(own.error)),
+          .slope = std::max(0.0, other.slope - double(own.slope))};
+}
+
+/// The disagreements of two touching leaves.
+struct PairOfLeaves {
+  std::uint32_t node;  ///< the neighbour
+  Disagreement ofLeaf, ofNeighbour;
+};
+
+/// Bounds how two touching leaves change each other. `neighbour` is at least as large as `leaf`. Where both are
+/// polynomials, their difference is known better than the difference of each from Φ.
+PairOfLeaves disagreementsOf(const FieldData& field, const BoundFinder& find, const query::OctreeNode& leaf,
+                             const query::OctreeNode& neighbour) {
+  if (!find.isExact(leaf) && !find.isExact(neighbour)) {
+    const Disagreement both = disagreementInZone(field, leaf, neighbour);
+    return {neighbour.node, both, both};
+  }
+  const Zone zone = zoneBetween(field, leaf, neighbour);
+  const Bounds ofLeaf = find.inZone(zone, leaf, Vector3::Zero(), 1, leaf);
+  const Bounds ofNeighbour = find.inZone(zone, neighbour, zone.largeAt, zone.largeEdge, leaf);
+  return {neighbour.node, disagreementBy(field.bounds[leaf.node], ofNeighbour),
+          disagreementBy(field.bounds[neighbour.node], ofLeaf)};
 }
 
 /// Calls f(neighbour) for each leaf that touches `leaf` and is larger, or is of equal size and comes later in
@@ -320,28 +429,26 @@ constexpr std::size_t kLeavesPerStep = 4096;
 void report(const Progress& progress, double fraction) { progress.update("finding bounds", fraction); }
 
 /// Widens the bounds of leaves to include blending. In a blended leaf f = f₀ + Σ vₙ (fₙ − f₀). Here f₀ is the
-/// leaf's own polynomial, the fₙ are the polynomials of touching leaves, and the weights vₙ sum to at most 1.
-/// The error bound grows by the greatest |fₙ − f₀| in the blend zones. The slope bound grows by the greatest
-/// difference of gradients and by |fₙ − f₀| times the slope of the weights.
-void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& leaves, const Progress& progress) {
+/// leaf's own polynomial or exact distance, the fₙ are those of touching leaves, and the weights vₙ sum to at most 1.
+/// Where all are polynomials, the error bound grows by the greatest |fₙ − f₀| in the blend zones. The slope bound grows
+/// by the greatest difference of gradients and by |fₙ − f₀| times the slope of the weights.
+void widenForBlending(FieldData& field, BoundFinder& find, const std::vector<query::OctreeNode>& leaves,
+                      const Progress& progress) {
+  find.boundExactLeavesInZones(leaves);
   std::vector<Disagreement> disagreement(field.nodes.size());
   for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
     report(progress, 0.5 + 0.5 * double(begin) / double(leaves.size()));
-    struct Pair {
-      std::uint32_t node;
-      Disagreement disagreement;
-    };
-    std::vector<std::vector<Pair>> found(std::min(kLeavesPerStep, leaves.size() - begin));
+    std::vector<std::vector<PairOfLeaves>> found(std::min(kLeavesPerStep, leaves.size() - begin));
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t n) {
       const query::OctreeNode& leaf = leaves[begin + n];
       forEachPair(field, leaf, [&](const query::OctreeNode& neighbour) {
-        found[n].push_back({neighbour.node, disagreementInZone(field, leaf, neighbour)});
+        found[n].push_back(disagreementsOf(field, find, leaf, neighbour));
       });
     });
     for (std::size_t n = 0; n < found.size(); ++n)
-      for (const Pair& pair : found[n]) {
-        disagreement[leaves[begin + n].node].widen(pair.disagreement);
-        disagreement[pair.node].widen(pair.disagreement);
+      for (const PairOfLeaves& pair : found[n]) {
+        disagreement[leaves[begin + n].node].widen(pair.ofLeaf);
+        disagreement[pair.node].widen(pair.ofNeighbour);
       }
   }
   // Find the deepest leaf around each leaf, because weights are steepest in the narrowest blend zone. The blend zones
@@ -356,7 +463,7 @@ void widenForBlending(FieldData& field, const std::vector<query::OctreeNode>& le
     CellBound& bound = field.bounds[leaf.node];
     const Disagreement& others = disagreement[leaf.node];
     const double extent = field.blend * query::cellSize(field, deepest[leaf.node]).minCoeff();
-    bound.error = roundedUp(double(bound.error) + others.value + rounding);
+    bound.error = roundedUp(double(bound.error) + others.error + rounding);
     bound.slope = roundedUp(double(bound.slope) + others.slope + kSlopes * (others.value + rounding) / extent);
   }
 }
@@ -367,7 +474,7 @@ std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, con
   field.bounds.clear();
   std::vector<CellBound> bounds(field.nodes.size());
   const std::vector<query::OctreeNode> leaves = query::allLeaves(field);
-  const BoundFinder find(field, distance);
+  BoundFinder find(field, distance);
   const double share = field.blend > 0 ? 0.5 : 1;  // part of the whole progress that this loop makes
   for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
     report(progress, share * double(begin) / double(leaves.size()));
@@ -375,8 +482,8 @@ std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, con
                       [&](std::size_t n) { bounds[leaves[n].node] = find(leaves[n]); });
   }
   field.bounds = std::move(bounds);
-  if (field.blend > 0) widenForBlending(field, leaves, progress);
-  return BoundFinder::kCalls * leaves.size();
+  if (field.blend > 0) widenForBlending(field, find, leaves, progress);
+  return find.evaluations();
 }
 
 }  // namespace hpsdf::detail

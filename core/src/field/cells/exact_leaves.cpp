@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "field/cells/exact_lists.h"
+
 namespace hpsdf::detail {
 namespace {
 
@@ -52,9 +54,10 @@ ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) con
   constexpr std::size_t kLonger = 64;
   // Lists without a sign contain triangles that intersect others. Cells with so short lists are not divided further.
   constexpr std::size_t kFew = 8;
-  auto triangles = search_.nearestTo(cell, isDivisible ? most_ : kLonger * most_);
+  const Box box = boxOfWeight(cell, blend_);
+  auto triangles = search_.nearestTo(box, isDivisible ? most_ : kLonger * most_);
   if (!triangles) return {{}, isDivisible};
-  const std::optional<ExactSign> sign = search_.signIn(cell, *triangles);
+  const std::optional<ExactSign> sign = search_.signIn(box, *triangles);
   if (!sign) return {{}, isDivisible && triangles->size() > kFew};
   Fit fit;
   const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, *triangles) : std::nullopt;

@@ -14,9 +14,10 @@ namespace hpsdf::detail {
 class ExactCells {
  public:
   /// Keeps a reference to the search. `within` is the distance from the surface up to which the field is exact, `most`
-  /// the greatest number of triangles of a leaf that could be divided further.
-  ExactCells(const TriangleSearch& search, double within, std::size_t most)
-      : search_(search), within_(within), most_(most) {}
+  /// the greatest number of triangles of a leaf that could be divided further. `blend` is the width of the field's
+  /// blend zones in edges of a leaf; a leaf is exact in its blend zones too.
+  ExactCells(const TriangleSearch& search, double within, std::size_t most, double blend)
+      : search_(search), within_(within), most_(most), blend_(blend) {}
 
   /// Returns true if a point of the cell may be so close to the surface that the field must be exact there.
   bool mustBeExact(const Box& cell) const { return search_.comesWithin(cell, within_); }
@@ -37,6 +38,7 @@ class ExactCells {
   const TriangleSearch& search_;
   double within_;
   std::size_t most_;
+  double blend_;
 };
 
 /// Makes the leaves exact that may contain points close to the surface. Starts from the base cells of a tree without

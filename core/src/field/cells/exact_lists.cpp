@@ -23,10 +23,6 @@ std::vector<std::uint32_t> runsOf(std::span<const std::uint32_t> triangles) {
 
 }  // namespace
 
-double listBytes(std::span<const std::uint32_t> triangles) {
-  return double(sizeof(std::uint32_t) * runsOf(triangles).size());
-}
-
 void ExactListPacker::mark(std::span<const std::uint32_t> triangles) {
   for (const std::uint32_t triangle : triangles) numbers_[triangle] = 0;
 }

@@ -36,7 +36,11 @@ class ExactListPacker {
   std::map<std::vector<std::uint32_t>, std::uint32_t> offsets_;  ///< offsets by list of runs
 };
 
-/// Number of bytes of a list in the arrays of a field, if no other leaf has the same list.
-double listBytes(std::span<const std::uint32_t> triangles);
+/// Returns the box in which a leaf has a weight in a field whose blend zones are `blend` edges wide. The list of an
+/// exact leaf must give the right distance there.
+inline Box boxOfWeight(const Box& leaf, double blend) {
+  const Vector3 width = blend * (leaf.max() - leaf.min());
+  return Box(leaf.min() - width, leaf.max() + width);
+}
 
 }  // namespace hpsdf::detail
