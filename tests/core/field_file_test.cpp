@@ -179,7 +179,7 @@ std::string withChecksum(std::string bytes) {
 }
 
 constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8,
-                      kSinceVersion5 = 8 + 4 + 4 + 4 * 8;  // bytes that versions 3, 4 and 5 added
+                      kSinceVersion5 = 8 + 4 + 8 + 4 + 4 * 8;  // bytes that versions 3, 4 and 5 added
 
 /// Older files end their headers earlier: version 4 before the settings and sizes of exact leaves, version 3 before the
 /// inside test, version 2 before the settings that follow the number of steps, and version 1 before the number of

@@ -21,11 +21,11 @@ constexpr double kTooNear = 0x1p-44;
 /// Finds how the distance in an exact leaf gets its sign, such that it has the sign of the whole mesh's inside test.
 /// Thread-safe.
 ///
-/// For `InsideTest::winding`, the mesh must be closed. Its winding number is then constant where no triangle is crossed.
-/// The sign of a leaf into which no triangle reaches is therefore that of its centre. In other leaves, the pseudonormal
-/// gives the sign if every listed triangle has the outside in front of it and the inside behind it, intersects no other
-/// triangle, and has no edge or vertex that is too sharp: the triangles are then the whole boundary of the inside around
-/// their nearest points.
+/// For `InsideTest::winding`, the mesh must be closed. Its winding number is then constant where no triangle is
+/// crossed. The sign of a leaf into which no triangle reaches is therefore that of its centre. In other leaves, the
+/// pseudonormal gives the sign if every listed triangle has the outside in front of it and the inside behind it,
+/// intersects no other triangle, and has no edge or vertex that is too sharp: the triangles are then the whole boundary
+/// of the inside around their nearest points.
 class ExactLeafSigns {
  public:
   /// Keeps references to the arguments.

@@ -215,6 +215,10 @@ const std::vector<Row> kRows = {
     {"exact-within", kResult, number().within(0, 1).in("share of the mesh's longest side").stored(14).advanced(),
      member<&BuildOptions::exactWithin>,
      "Distance from the surface up to which a field of strategy hpx is exact, as a share of the mesh's longest side."},
+    {"exact-tolerance", kResult, number().within(0, 1).in("share of the mesh's longest side").stored(16).advanced(),
+     member<&BuildOptions::exactTolerance>,
+     "With strategy hpx: error, as a share of the mesh's longest side, up to which a polynomial may stand for the "
+     "triangles of a cell near the surface, measured at 512 points of the cell. 0: triangles everywhere."},
     {"exact-triangles", kMethod, wholeNumber().within(1, 4096).stored(15).advanced(),
      member<&BuildOptions::exactTriangles>,
      "Greatest number of triangles that an exact cell of strategy hpx keeps, unless it cannot be divided further: more "
@@ -273,7 +277,7 @@ const std::vector<Row> kRows = {
 /// a name to the list of members here.
 [[maybe_unused]] void requireAllMembers(const BuildOptions& options) {
   [[maybe_unused]] const auto& [m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18, m19,
-                                m20, m21, m22, m23, m24, m25] = options;
+                                m20, m21, m22, m23, m24, m25, m26] = options;
 }
 
 std::string numberText(double number) {

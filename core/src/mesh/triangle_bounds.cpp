@@ -64,8 +64,8 @@ void findBoundsOnTarget(TriangleChunk& chunk) {
     const auto isOutside = hn::Or(hn::Or(outside(a, ab), outside(b, bc)), outside(c, ca));
     const Vec height = dot(n, a);
     const Vec toPlane = hn::Div(hn::Mul(height, height), nn);
-    const Vec toSides = hn::Min(hn::Min(squaredToSegment(a, ab, abab), squaredToSegment(b, bc, bcbc)),
-                                squaredToSegment(c, ca, caca));
+    const Vec toSides =
+        hn::Min(hn::Min(squaredToSegment(a, ab, abab), squaredToSegment(b, bc, bcbc)), squaredToSegment(c, ca, caca));
     const Vec distance = hn::Sqrt(hn::IfThenElse(isOutside, toSides, toPlane));
     const Vec farthest = hn::Sqrt(hn::Max(hn::Max(dot(a, a), dot(b, b)), dot(c, c)));
     const Vec longest = hn::Max(hn::Max(abab, bcbc), caca);

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <queue>
 #include <utility>
 #include <vector>
 
 #include "field/build/refiner.h"
+#include "field/cells/probes.h"
 
 namespace hpsdf::detail {
 namespace {
@@ -97,7 +99,10 @@ class Growth {
     BuildTree& tree = state_.tree;
     if (tree.nodes.empty()) {
       tree.addBaseCells();
-      if (setup_.exactCells) placeExactLeaves(tree, *setup_.exactCells, setup_.options.maxDepth, setup_.progress);
+      if (setup_.exactCells) {
+        const auto smooth = [&](const Box& cell) { return smoothFit(cell); };
+        placeExactLeaves(tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress);
+      }
     }
     const std::size_t count = tree.nodes.size();
     const int degree = startDegree(setup_.options);
@@ -107,7 +112,7 @@ class Growth {
       const std::size_t end = std::min(begin + kChunk, count);
       tbb::parallel_for(begin, end, [&](std::size_t n) {
         BuildNode& node = tree.nodes[n];
-        if (node.firstChild == 0 && !node.fit.isFinal) node.fit = fitter_.fit(tree.boxOf(node), degree);
+        if (node.firstChild == 0 && !node.fit.isFinal) node.fit = firstFit(tree.boxOf(node), degree);
       });
       state_.fittedCells = end;
       refiner_.observer.atWholeState();
@@ -134,6 +139,19 @@ class Growth {
       least += setup_.budget.leafBytes(mayLower ? leastDegree(setup_.options) : node.fit.degree);
     }
     setup_.budget.requireRoomForFirstCells(refiner_.bytes(), least, state_.exactSize.inField);
+  }
+
+  /// Returns a polynomial that stands for the triangles near a cell, if there is one.
+  std::optional<Fit> smoothFit(const Box& cell) const {
+    const double tolerance = setup_.options.exactTolerance * setup_.referenceLength;
+    if (!(tolerance > 0)) return std::nullopt;
+    return fitWithin(fitter_, cell, tolerance, setup_.options.maxDegree,
+                     [&] { return setup_.exactCells->isSmooth(cell); });
+  }
+
+  Fit firstFit(const Box& cell, int degree) const {
+    std::optional<Fit> exact = setup_.exactCells ? setup_.exactCells->fitOfFirstCell(cell) : std::nullopt;
+    return exact ? std::move(*exact) : fitter_.fit(cell, degree);
   }
 
   /// Chooses the exponent θ of the weight by which errors far from the surface count less. With this θ, a cell at the

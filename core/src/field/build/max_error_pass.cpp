@@ -1,7 +1,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -10,68 +9,10 @@
 #include <vector>
 
 #include "field/build/refiner.h"
-#include "field/query/evaluate.h"
+#include "field/cells/probes.h"
 
 namespace hpsdf::detail {
 namespace {
-
-constexpr int kAcross = 8;
-
-/// The points at which the error of a cell is measured: a lattice of 8 × 8 × 8 points between opposite corners of
-/// the cell.
-struct Probes {
-  std::vector<std::array<int, 3>> index;  ///< position in the lattice
-  std::vector<Vector3> local;             ///< the points in local coordinates
-};
-
-/// Returns the lattice of probes, in blocks of eight neighbours. Exact distances are fastest for eight
-/// neighbouring points at a time.
-const Probes& probes() {
-  static const Probes all = [] {
-    constexpr int kBlocks = kAcross / 2;  // number of blocks of eight neighbours along an axis
-    Probes made;
-    for (int block = 0; block < kBlocks * kBlocks * kBlocks; ++block)
-      for (int corner = 0; corner < 8; ++corner) {
-        const std::array<int, 3> index = {2 * (block % kBlocks) + (corner & 1),
-                                          2 * (block / kBlocks % kBlocks) + (corner >> 1 & 1),
-                                          2 * (block / kBlocks / kBlocks) + (corner >> 2)};
-        made.index.push_back(index);
-        made.local.push_back(2.0 / (kAcross - 1) * Vector3(index[0], index[1], index[2]) - Vector3::Ones());
-      }
-    return made;
-  }();
-  return all;
-}
-
-/// Estimates the greatest error |f − Φ| of the fit f to the exact distance Φ in a cell: the greatest error at the probe
-/// points, plus half of the greatest difference between the errors f − Φ at two neighbouring probes. It assumes that
-/// errors rise no faster between probes than from probe to probe. `exact` holds Φ at the probes. Probes with |Φ| above
-/// `farthest` do not count.
-double worstError(const Fit& fit, std::span<const double> exact, double farthest) {
-  constexpr std::array<int, 3> kStride = {1, kAcross, kAcross * kAcross};
-  std::array<double, kAcross * kAcross * kAcross> errors;
-  const auto place = [&](std::size_t i) {
-    const auto& [x, y, z] = probes().index[i];
-    return x * kStride[0] + y * kStride[1] + z * kStride[2];
-  };
-  double worst = 0, step = 0;
-  for (std::size_t i = 0; i < exact.size(); ++i) {
-    const Vector3& local = probes().local[i];
-    double& error = errors[place(i)];
-    error = query::evaluate(fit.coefficients.data(), fit.degree, {local.x(), local.y(), local.z()}) - exact[i];
-    if (std::abs(exact[i]) > farthest) error = std::numeric_limits<double>::quiet_NaN();
-    worst = std::fmax(worst, std::abs(error));  // fmax ignores the NaN of probes that do not count
-  }
-  for (std::size_t i = 0; i < exact.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis)
-      if (probes().index[i][axis] > 0)
-        step = std::fmax(step, std::abs(errors[place(i)] - errors[place(i) - kStride[axis]]));
-  return worst + step / 2;
-}
-
-/// Returns the greatest distance from a point of a cell to its closest probe. `cellDiagonal` is the length of
-/// the cell's diagonal.
-double probeSpacing(double cellDiagonal) { return cellDiagonal / (2 * (kAcross - 1)); }
 
 class MaxErrorPass {
  public:
@@ -125,7 +66,7 @@ class MaxErrorPass {
     }
     const bool mayStep = refiner_.mayStep();
     if (mayStep) refiner_.apply(leaf, std::move(*candidate.trial), candidate.raises);
-    if (!mayStep || state_.isFull || candidate.raises) {
+    if (!mayStep || state_.isFull || state_.tree.nodes[leaf].firstChild == 0) {
       state_.pending.push_back(leaf);  // probe the leaf again; if no step is left, only to measure its error
       return;
     }
@@ -153,7 +94,7 @@ class MaxErrorPass {
     // Compare the leaf's polynomial with the exact distance at the probes. A probe slightly outside the narrow band
     // counts too, because it represents the points around it that lie within the band.
     const Box box = state_.tree.boxOf(leaf);
-    const std::vector<double> exact = fitter_.distances(box, probes().local);
+    const std::vector<double> exact = fitter_.distances(box, probePoints());
     const double band = setup_.options.band;
     const double farthest =
         band > 0 ? band + probeSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();

@@ -40,11 +40,39 @@ bool Refiner::mayStep() const {
   return !state.isFull && (!setup.options.maxSteps || state.steps < *setup.options.maxSteps);
 }
 
+Trial Refiner::attempt(const BuildNode& leaf, Refinement allowed) const {
+  const Box box = state.tree.boxOf(leaf);
+  // With a limit of bytes, only the cells near the surface are exact, because the bytes that the triangles of other
+  // cells would add are not known before the octree is finished.
+  if (setup.exactCells && !setup.options.maxBytes)
+    if (std::optional<Fit> exact = setup.exactCells->fitOfRefinedCell(box)) {
+      exact->error.near = leaf.fit.error.near;
+      return {.raised = {}, .children = {}, .exact = std::move(exact)};
+    }
+  return fitter.attempt(box, leaf.fit, allowed);
+}
+
+void Refiner::makeExact(std::uint32_t leaf, Fit&& fit) {
+  Fit& before = state.tree.nodes[leaf].fit;
+  state.coefficients += fit.coefficients.size();
+  state.coefficients -= setup.budget.finalCoefficients(before);
+  const double listed = double(fit.triangles.size() * sizeof(fit.triangles[0]));
+  state.exactSize.inTree += listed;
+  state.exactSize.inField += listed;
+  state.totals.add(before.error, -1);
+  state.totals.add(fit.error);
+  before = std::move(fit);
+}
+
 void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
-  constexpr std::size_t kStepsBetweenSums = 1000;  // steps after which the total error is summed anew (paper, sec. 3.6)
   BuildTree& tree = state.tree;
   if (tree.nodes.size() > 0xffffffffu - 8)
     throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
+
+  if (trial.exact) {
+    makeExact(leaf, std::move(*trial.exact));
+    return countStep();
+  }
 
   // Refuse a refinement that would exceed the limit of bytes.
   const ByteBudget& budget = setup.budget;
@@ -69,6 +97,11 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
     const std::uint32_t first = tree.nodes[leaf].firstChild;
     for (std::uint32_t child = first; child < first + 8; ++child) state.totals.add(tree.nodes[child].fit.error);
   }
+  countStep();
+}
+
+void Refiner::countStep() {
+  constexpr std::size_t kStepsBetweenSums = 1000;  // steps after which the total error is summed anew (paper, sec. 3.6)
   if (++state.steps % kStepsBetweenSums == 0) sumTotals();
   if (observer.afterStep) observer.afterStep(state.steps);
 }

@@ -72,17 +72,20 @@ struct Refiner {
   /// Returns false once the limit of refinement steps or of bytes is reached.
   bool mayStep() const;
 
-  /// Computes the fits of a leaf's allowed refinements. Thread-safe.
-  Trial attempt(const BuildNode& leaf, Refinement allowed) const {
-    return fitter.attempt(state.tree.boxOf(leaf), leaf.fit, allowed);
-  }
+  /// Computes the fit without error of a leaf or, if there is none, the fits of its allowed refinements. Thread-safe.
+  Trial attempt(const BuildNode& leaf, Refinement allowed) const;
 
-  /// Raises the degree of a leaf if `raises` is true, else splits the leaf. The new fits come from `trial`. If
-  /// the limit of bytes forbids the refinement, sets `isFull` of the state instead.
+  /// Makes a leaf exact if `trial` has a fit without error. Otherwise raises the degree of the leaf if `raises` is
+  /// true, else splits the leaf. The new fits come from `trial`. If the limit of bytes forbids the refinement, sets
+  /// `isFull` of the state instead.
   void apply(std::uint32_t leaf, Trial&& trial, bool raises);
 
   /// Computes the error totals anew from all leaves, which removes the rounding errors of the running totals.
   void sumTotals();
+  /// Counts a refinement, and sums the error totals anew from time to time.
+  void countStep();
+  /// Replaces the fit of a leaf by a fit without error.
+  void makeExact(std::uint32_t leaf, Fit&& fit);
   /// Returns the size in bytes of the field that would be made from the present octree.
   double bytes() const {
     return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)) + state.exactSize.inField;

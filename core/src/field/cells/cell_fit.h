@@ -44,11 +44,12 @@ struct Fit {
   bool isExact() const { return degree == kExactDegree; }
 };
 
-/// The fits that result from the two possible refinements of a cell: a higher degree, or a split into eight
-/// children.
+/// The fits that result from the possible refinements of a cell: a higher degree, a split into eight children, or a fit
+/// without error.
 struct Trial {
   std::optional<Fit> raised;                   ///< fit of the cell, one degree higher
   std::optional<std::array<Fit, 8>> children;  ///< fits of the eight children, at the cell's degree
+  std::optional<Fit> exact = {};               ///< fit without error; the other fits are then missing
 };
 
 enum class Refinement : std::uint8_t { degree, octree, either };

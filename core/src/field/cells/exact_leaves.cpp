@@ -16,19 +16,23 @@ struct CommonPlane {
   Vector3 origin, normal;
 };
 
+/// Returns the normal of a triangle with twice the triangle's area as its length.
+Vector3 normalOf(const TriangleSearch& search, std::uint32_t triangle) {
+  const auto& [a, b, c] = search.triangles()[triangle];
+  const auto vertices = search.vertices();
+  return (vertices[b] - vertices[a]).cross(vertices[c] - vertices[a]);
+}
+
 std::optional<CommonPlane> commonPlane(const TriangleSearch& search, std::span<const std::uint32_t> triangles) {
   const auto corner = [&](std::uint32_t triangle, int k) -> const Vector3& {
     return search.vertices()[search.triangles()[triangle][k]];
   };
-  const auto normalOf = [&](std::uint32_t triangle) -> Vector3 {
-    return (corner(triangle, 1) - corner(triangle, 0)).cross(corner(triangle, 2) - corner(triangle, 0));
-  };
   const std::uint32_t largest = *std::ranges::max_element(
-      triangles, {}, [&](std::uint32_t triangle) { return normalOf(triangle).squaredNorm(); });
-  if (!(normalOf(largest).norm() > 0)) return std::nullopt;
-  const CommonPlane plane{corner(largest, 0), normalOf(largest).normalized()};
+      triangles, {}, [&](std::uint32_t triangle) { return normalOf(search, triangle).squaredNorm(); });
+  if (!(normalOf(search, largest).norm() > 0)) return std::nullopt;
+  const CommonPlane plane{corner(largest, 0), normalOf(search, largest).normalized()};
   for (const std::uint32_t triangle : triangles) {
-    if (normalOf(triangle).dot(plane.normal) < 0) return std::nullopt;
+    if (normalOf(search, triangle).dot(plane.normal) < 0) return std::nullopt;
     for (int k = 0; k < 3; ++k) {
       const Vector3& v = corner(triangle, k);
       const double size = v.cwiseAbs().maxCoeff() + plane.origin.cwiseAbs().maxCoeff();
@@ -50,6 +54,25 @@ Fit planeFit(const Box& cell, const CommonPlane& plane) {
 
 }  // namespace
 
+/// Returns the fit of a cell with these triangles, which were found for `box`; or std::nullopt if they do not determine
+/// the sign.
+std::optional<Fit> ExactCells::fitFrom(const Box& cell, const Box& box, std::vector<std::uint32_t> triangles) const {
+  const std::optional<ExactSign> sign = search_.signIn(box, triangles);
+  if (!sign) return std::nullopt;
+  const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, triangles) : std::nullopt;
+  Fit fit;
+  if (plane) {
+    fit = planeFit(cell, *plane);
+  } else {
+    fit.degree = kExactDegree;
+    fit.triangles = std::move(triangles);
+    fit.sign = *sign;
+  }
+  fit.isFinal = true;
+  fit.error.volume = cell.volume();
+  return fit;
+}
+
 ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) const {
   constexpr std::size_t kLonger = 64;
   // Lists without a sign contain triangles that intersect others. Cells with so short lists are not divided further.
@@ -57,24 +80,33 @@ ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) con
   const Box box = boxOfWeight(cell, blend_);
   auto triangles = search_.nearestTo(box, isDivisible ? most_ : kLonger * most_);
   if (!triangles) return {{}, isDivisible};
-  const std::optional<ExactSign> sign = search_.signIn(box, *triangles);
-  if (!sign) return {{}, isDivisible && triangles->size() > kFew};
-  Fit fit;
-  const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, *triangles) : std::nullopt;
-  if (plane) {
-    fit = planeFit(cell, *plane);
-  } else {
-    fit.degree = kExactDegree;
-    fit.triangles = std::move(*triangles);
-    fit.sign = *sign;
-  }
-  fit.isFinal = true;
-  fit.error.volume = cell.volume();
-  fit.error.near = true;
+  const bool isLong = triangles->size() > kFew;
+  std::optional<Fit> fit = fitFrom(cell, box, std::move(*triangles));
+  if (!fit) return {{}, isDivisible && isLong};
+  fit->error.near = true;
   return {std::move(fit), false};
 }
 
-void placeExactLeaves(BuildTree& tree, const ExactCells& cells, int maxDepth, const Progress& progress) {
+bool ExactCells::isSmooth(const Box& cell) const {
+  constexpr std::size_t kMost = 512;
+  constexpr double kCosine = 0.95;  // of the greatest angle between a normal and the mean normal, 18 degrees
+  const auto triangles = search_.nearestTo(boxOfWeight(cell, blend_), kMost);
+  if (!triangles) return false;
+  std::vector<Vector3> normals(triangles->size());
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t i = 0; i < normals.size(); ++i) sum += normals[i] = normalOf(search_, (*triangles)[i]).normalized();
+  const Vector3 mean = sum.normalized();
+  return std::ranges::all_of(normals, [&](const Vector3& normal) { return normal.dot(mean) >= kCosine; });
+}
+
+std::optional<Fit> ExactCells::fitOfFarCell(const Box& cell, std::size_t mostTriangles) const {
+  const Box box = boxOfWeight(cell, blend_);
+  auto triangles = search_.nearestTo(box, mostTriangles);
+  return triangles ? fitFrom(cell, box, std::move(*triangles)) : std::nullopt;
+}
+
+void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
+                      const Progress& progress) {
   constexpr std::size_t kChunk = 1024;
   enum class Choice : std::uint8_t { leave, exact, split };
   std::vector<std::uint32_t> level(tree.nodes.size());
@@ -87,7 +119,8 @@ void placeExactLeaves(BuildTree& tree, const ExactCells& cells, int maxDepth, co
         BuildNode& node = tree.nodes[level[i]];
         const Box box = tree.boxOf(node);
         if (!cells.mustBeExact(box)) return;
-        ExactCells::Outcome outcome = cells.makeExact(box, depth < maxDepth);
+        ExactCells::Outcome outcome{smoothFit(box), false};
+        if (!outcome.fit) outcome = cells.makeExact(box, depth < maxDepth);
         if (outcome.fit) node.fit = std::move(*outcome.fit);
         if (outcome.fit || outcome.divides) choices[i] = outcome.divides ? Choice::split : Choice::exact;
       });

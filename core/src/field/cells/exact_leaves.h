@@ -1,8 +1,12 @@
 #pragma once
 // Exact leaves of a construction: which cells become exact, and the arrays that hold their triangles.
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <vector>
 
 #include "field/cells/build_tree.h"
 #include "hpsdf/detail/triangle_search.h"
@@ -32,18 +36,40 @@ class ExactCells {
   /// the list may be much longer.
   Outcome makeExact(const Box& cell, bool isDivisible) const;
 
+  /// Returns true if the triangles that can be nearest to points of the cell all face about the same way, so that the
+  /// cell holds no part of a slot, rib or sharp edge, nor of a surface halfway between two others.
+  bool isSmooth(const Box& cell) const;
+
+  /// Makes a cell exact that need not be exact, if its list is not longer than `mostTriangles`. A cell that is refined
+  /// is worth a list of any length that leaves near the surface may have: the list takes fewer bytes than the seven
+  /// polynomials that a split adds. A cell that is not fitted yet is worth a short list, which takes fewer bytes than
+  /// its polynomial.
+  std::optional<Fit> fitOfFarCell(const Box& cell, std::size_t mostTriangles) const;
+  std::optional<Fit> fitOfRefinedCell(const Box& cell) const { return fitOfFarCell(cell, most_); }
+  std::optional<Fit> fitOfFirstCell(const Box& cell) const { return fitOfFarCell(cell, std::min(most_, kShort)); }
+
   const TriangleSearch& search() const { return search_; }
 
  private:
+  static constexpr std::size_t kShort =
+      12;  ///< triangles of a list with at most as many bytes as a quadratic polynomial
+
+  std::optional<Fit> fitFrom(const Box& cell, const Box& box, std::vector<std::uint32_t> triangles) const;
+
   const TriangleSearch& search_;
   double within_;
   std::size_t most_;
   double blend_;
 };
 
-/// Makes the leaves exact that may contain points close to the surface. Starts from the base cells of a tree without
+/// Tries to make a polynomial that stands for the triangles of a cell.
+using SmoothFit = std::function<std::optional<Fit>(const Box& cell)>;
+
+/// Makes the leaves exact that may contain points close to the surface, or takes the polynomial from `smoothFit` where
+/// there is one. Starts from the base cells of a tree without
 /// fits, and divides cells whose lists are too long. Cells far from the surface remain without fits. Reports progress
 /// and throws `Cancelled`.
-void placeExactLeaves(BuildTree& tree, const ExactCells& cells, int maxDepth, const Progress& progress);
+void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
+                      const Progress& progress);
 
 }  // namespace hpsdf::detail

@@ -140,7 +140,7 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(m.source.insideTest);
   stream.item(m.source.thickness);
   if (version < 5) return;
-  settingItems(stream, m.settings, 14, 15);
+  settingItems(stream, m.settings, 14, 16);
   stream.item(sizes.vertexBytes);
   stream.item(sizes.vertices);
   stream.item(sizes.triangles);
