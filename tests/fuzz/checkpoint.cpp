@@ -16,10 +16,10 @@ using namespace hpsdf;
 Checkpoint at(const std::filesystem::path& file) { return {.file = file, .seconds = 0, .share = 1}; }
 
 /// Returns the bytes with which checkpoints of this construction begin, up to the state.
-std::string beginning(const BuildOptions& options) {
+std::string beginning(std::size_t which) {
   const auto file = fuzz::fileOf("state", "");
   std::filesystem::remove(file);
-  buildResumably(fuzz::sphere, fuzz::domain(), options, at(file));
+  buildResumably(fuzz::distanceOf(which), fuzz::domain(), fuzz::constructions()[which], at(file));
   const std::string whole = fuzz::bytesOf(file);
   return whole.substr(0, fuzz::bytesBeforeState(whole));
 }
@@ -28,8 +28,8 @@ std::string beginning(const BuildOptions& options) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const auto kConstructions = fuzz::constructions();
-  static const std::array kBeginnings = {beginning(kConstructions[0]), beginning(kConstructions[1]),
-                                         beginning(kConstructions[2])};
+  static const std::array kBeginnings = {beginning(0), beginning(1), beginning(2), beginning(3)};
+  static_assert(kBeginnings.size() == kConstructions.size());
   if (size == 0) return 0;
   const std::size_t which = data[0] % kConstructions.size();
   std::string bytes = kBeginnings[which];
@@ -38,6 +38,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::mendChecksum(reinterpret_cast<std::uint8_t*>(bytes.data()), bytes.size());
   Checkpoint checkpoint = at(fuzz::fileOf("state", bytes));
   checkpoint.seconds = 1000;  // no further checkpoint is written
-  fuzz::reads([&] { buildResumably(fuzz::sphere, fuzz::domain(), kConstructions[which], checkpoint); });
+  fuzz::reads([&] { buildResumably(fuzz::distanceOf(which), fuzz::domain(), kConstructions[which], checkpoint); });
   return 0;
 }

@@ -43,29 +43,47 @@ void writeFields(const fs::path& folder) {
   add("weak", [](BuildOptions& o) { o.targetError = 1e-3, o.continuityWeight = 1, o.enrich = true; });
   add("h2", [](BuildOptions& o) { o.targetError = 1e-3, o.strategy = Strategy::h2, o.criterion = Criterion::optimal; });
   add("cell", [](BuildOptions& o) { o.grid = {1, 1, 1}, o.maxSteps = 0; });
+  const ExactDistance octahedron(fuzz::octahedron(), {.insideTest = InsideTest::pseudonormal, .threads = 1});
+  const auto addExact = [&](const std::string& name, const auto& change) {
+    BuildOptions options = plain;
+    options.grid = {3, 3, 3};
+    options.strategy = Strategy::hpx;
+    options.exactTriangles = 6;
+    options.coefficients = CoefficientType::float32;
+    change(options);
+    save(build(octahedron, fuzz::domain(), options), folder / (name + ".hpsdf"));
+  };
+  addExact("exact", [](BuildOptions&) {});
+  addExact("exact-double", [](BuildOptions& o) { o.coefficients = CoefficientType::float64; });
+  addExact("exact-blended", [](BuildOptions& o) { o.blend = 0.1, o.bounds = true; });
   add("wide", [](BuildOptions& o) { o.grid = {5, 4, 3}, o.maxDegree = 1, o.maxDepth = 0; });
 }
 
+/// Returns the checkpoint of a construction that ends when it has asked so many times whether to cancel; empty if it
+/// has not written one by then.
+std::string checkpointAfter(int questions, std::size_t construction) {
+  const auto file = fuzz::fileOf("state", "");
+  fs::remove(file);
+  try {
+    buildResumably(fuzz::distanceOf(construction), fuzz::domain(), fuzz::constructions()[construction],
+                   {.file = file, .seconds = 0, .share = 1},
+                   {.report = {}, .cancelled = [&] { return --questions < 0; }});
+  } catch (const Cancelled&) {
+  }
+  return fs::exists(file) ? fuzz::bytesOf(file) : "";
+}
+
 void writeStates(const fs::path& folder) {
-  constexpr int kMiddle = 12;  // number of times that the construction asks whether to cancel
-  std::uint8_t which = 0;
-  for (const BuildOptions& options : fuzz::constructions()) {
-    int questions = 0;
-    for (const int last : {kMiddle, 1 << 30}) {  // interrupted in the middle, and ended
-      const auto file = fuzz::fileOf("state", "");
-      fs::remove(file);
-      try {
-        questions = 0;
-        buildResumably(fuzz::sphere, fuzz::domain(), options, {.file = file, .seconds = 0, .share = 1},
-                       {.report = {}, .cancelled = [&] { return ++questions > last; }});
-      } catch (const Cancelled&) {
-      }
-      const std::string whole = fuzz::bytesOf(file);
+  constexpr int kMiddle = 12, kNever = 1 << 30;
+  for (std::size_t which = 0; which < fuzz::constructions().size(); ++which) {
+    int questions = kMiddle;
+    while (checkpointAfter(questions, which).empty()) ++questions;
+    for (const int last : {questions, kNever}) {  // interrupted in the middle, and ended
+      const std::string whole = checkpointAfter(last, which);
       const std::size_t begin = fuzz::bytesBeforeState(whole);
-      write(folder / ("state-" + std::to_string(which) + (last == kMiddle ? "-middle" : "-end")),
+      write(folder / ("state-" + std::to_string(which) + (last == kNever ? "-end" : "-middle")),
             std::string(1, static_cast<char>(which)) + whole.substr(begin, whole.size() - 8 - begin));
     }
-    ++which;
   }
 }
 
