@@ -43,6 +43,20 @@ struct BlendZone {
   float width;                                        // width of the blend zones, as a share of the leaf's edge
 };
 
+// A triangle of an exact leaf, in world units.
+struct Triangle {
+  vec3 a, b, c;  // corners, from the domain's lower corner or from another point
+  vec3 normal;   // unit normal, or zero for a triangle without area
+};
+
+const float kNever = 1e30;
+
+// The first crossings of a ray through triangles, from their outer and from their inner sides.
+struct Crossings {
+  float fromOutside, fromInside;  // lengths along the ray, or kNever
+  uint outer, inner;              // indices of the triangles
+};
+
 // The value of the field at a point, and the range of the values that the blended leaf polynomials have at this point.
 struct FieldRange {
   float value, lowest, highest;

@@ -90,10 +90,10 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   float scale = ldexp(1.0, other.w - depth);  // derivative of `inOther` with respect to `local`
   vec4 polynomial;
   if (withGradient) {
-    polynomial = evaluateWithGradient(leaf.offset, leaf.degree, inOther);
+    polynomial = leafWithGradient(leaf, uint(other.w), uvec3(other.xyz), inOther);
     polynomial.xyz *= scale;
   } else {
-    polynomial = vec4(vec3(0.0), evaluate(leaf.offset, leaf.degree, inOther));
+    polynomial = vec4(vec3(0.0), leafValue(leaf, uint(other.w), uvec3(other.xyz), inOther));
   }
   total.lowest = min(total.lowest, polynomial.w);
   total.highest = max(total.highest, polynomial.w);

@@ -17,14 +17,16 @@ layout(location = 17) uniform bool parallel;  // whether the rays are parallel (
 
 // The state of each pixel after a march pass. The integers are March::kind, the bits of the floats March::t and
 // March::side, and March::lastLeaf. For the kind kBracketed, the floats are a, b and a first guess of the root, which
-// lies between a and b. For the kind kUnderWay, the floats are March::lastHeight and March::longestStep.
+// lies between a and b. For the kind kUnderWay, the floats are March::lastHeight and March::longestStep. For the kind
+// kOnTriangle, the last integer is the triangle, and the first float is the length from t to the triangle.
 layout(binding = 2) uniform usampler2D stateIntegers;
 layout(binding = 3) uniform sampler2D stateFloats;
 
 const uint kMiss = 0u;
 const uint kUnderWay = 1u;
 const uint kOnFace = 2u;     // the ray crosses the surface at t, where it enters a leaf
-const uint kBracketed = 3u;  // the ray crosses the surface between a and b, within one leaf
+const uint kBracketed = 3u;   // the ray crosses the surface between a and b, within one leaf
+const uint kOnTriangle = 4u;  // the ray crosses a triangle of an exact leaf
 
 struct Ray {
   dvec3 worldDirection;  // unit direction in world coordinates

@@ -10,6 +10,7 @@ layout(location = 1) out vec4 normal;
 const float kTurned = 1e-4;     // greatest turn of the gradient in the last Newton step, roughly in radians
 const float kInfinity = 1e30;
 const float kConverged = 1e-8;  // refinement ends when the root changes by less, in domain diagonals; as in trace.cpp
+const float kExactRounding = 2e-7;  // in place of kConverged for exact distances, which single precision rounds by about that
 const float kCrack = 4e-6;      // a greater jump at slopes up to 1 is a crack; in domain diagonals; as in trace.h
 
 vec3 localAt(CellPoint cell, Ray ray, double t) {
@@ -49,12 +50,24 @@ Root refine(CellPoint at, vec3 local, vec3 localDirection, float side, bool brac
     // `turned` bounds the relative change of the slope in the step. A Newton step ends at most turned * |change| / 2
     // away from the root.
     float turned = newton ? abs(curve / slope * change) : kInfinity;
+    float exactlyEnough = isExact(at.node) ? kExactRounding : kConverged;
     bool close = turned <= kTurned && turned * abs(change) <= 2.0 * kConverged * diagonal;
-    if (close || abs(change) <= kConverged * diagonal) break;
+    if (close || abs(change) <= exactlyEnough * diagonal) break;
   }
   added += change;
   gradientValue.w += change * dot(gradientValue.xyz, localDirection);
   return Root(added, gradientValue);
+}
+
+// The length along the ray from `point`, in world units from the domain's lower corner, to the crossing with a triangle.
+// The ray may pass a little beside the triangle because of rounding.
+double lengthToTriangle(dvec3 point, dvec3 direction, Triangle t) {
+  dvec3 a = dvec3(t.a) - point, b = dvec3(t.b) - point, c = dvec3(t.c) - point;
+  dvec3 weights = dvec3(dot(direction, cross(b, c)), dot(direction, cross(c, a)), dot(direction, cross(a, b)));
+  double sum = weights.x + weights.y + weights.z;
+  weights = max(weights * sign(sum), dvec3(0.0lf));
+  return dot(weights, dvec3(dot(a, direction), dot(b, direction), dot(c, direction))) /
+         (weights.x + weights.y + weights.z);
 }
 
 void main() {
@@ -74,6 +87,15 @@ void main() {
 
   double first = double(bracketed ? bracket.z : t);
   vec3 localDirection = 2.0 * at.scale * vec3(ray.direction);
+  if (kExactLeaves && integers.x == kOnTriangle) {
+    Triangle triangle = fetchTriangle(integers.w);
+    double added = lengthToTriangle((ray.origin + first * ray.direction) / scale, ray.worldDirection, triangle);
+    if (!(abs(added) < 1e30lf)) added = double(bracket.x);
+    normal.xyz = triangle.normal;
+    cellLevelsValueDistance = uvec4(at.node.index, uint(at.node.degree) | at.depth << 8, floatBitsToUint(offset),
+                                    floatBitsToUint(float(ray.fromEye + first + added)));
+    return;
+  }
   Root root = refine(at, localAt(at, ray, first), localDirection, side, bracketed, bracket.x - bracket.z,
                      bracket.y - bracket.z);
   float value = root.gradientValue.w;

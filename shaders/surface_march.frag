@@ -23,10 +23,14 @@ const float kNudge = 1e-6;     // overshoot of a step across a cell's face, and 
 const float kPastFace = 4e-7;  // lengthToExit ends this far behind a face, as a share of the domain's extent
 const float kGrain = 0.25;     // least length of a step in a blend zone, as a share of the blend extent
 
+const float kBack = 16.0;      // an exact leaf's triangles are looked for so far behind t, in nudges
+const float kClear = 1e-3;     // sine of the least angle at which a ray counts as not parallel to a triangle
+
 const float kInfinity = 1e30;
 
 struct MarchRay {
   vec3 origin, direction;
+  vec3 world;    // unit direction in world coordinates
   vec3 inverse;  // 1 / |direction| for each axis; infinite for an axis along which the ray does not move
   float length;
   float nudge;  // the length kNudge in world units
@@ -105,6 +109,15 @@ March startMarch(Ray ray, MarchRay marchRay) {
   return march;
 }
 
+// The distance from the centre of a leaf to the farther end of the ray's part from t to the leaf's exit. The distance from
+// the centre bounds the change of an exact distance.
+float farthestFromCentre(LeafPoint leaf) {
+  vec3 here = 2.0 * leaf.at.fraction - 1.0;
+  vec3 there = here + leaf.toLeave * leaf.localDirection;
+  vec3 toWorld = halfCell(leaf.at.depth);
+  return max(length(here * toWorld), length(there * toWorld));
+}
+
 // Finds the node at parameter t of the ray and bounds the height there. Also sets march.side if it is unknown and the
 // bounds prove the sign.
 LeafPoint boundHeight(MarchRay ray, inout March march) {
@@ -123,8 +136,10 @@ LeafPoint boundHeight(MarchRay ray, inout March march) {
     vec4 linear = texelFetch(linearParts, int(leaf.at.node.index));
     leaf.middle = dot(linear.xyz, 2.0 * leaf.at.fraction - 1.0) + (linear.w - offset);
     leaf.slope = dot(linear.xyz, leaf.localDirection);
-    leaf.lowest = leaf.middle - leaf.at.node.valueDeviation - leaf.zone.valueDifference;
-    leaf.highest = leaf.middle + leaf.at.node.valueDeviation + leaf.zone.valueDifference;
+    float deviation = leaf.at.node.valueDeviation;
+    if (isExact(leaf.at.node)) deviation = min(deviation, farthestFromCentre(leaf) + kNudge * diagonal);
+    leaf.lowest = leaf.middle - deviation - leaf.zone.valueDifference;
+    leaf.highest = leaf.middle + deviation + leaf.zone.valueDifference;
   }
   // Find the sign of f - offset at the ray's start. If it is negative, negate the bounds, because a height is positive
   // at the start of the ray.
@@ -228,13 +243,44 @@ bool stepInLeaf(MarchRay ray, inout LeafPoint leaf, inout March march) {
                                          : max(safe, min(march.longestStep, sqrt(4.0 * max(clear, 0.0) / curve))));
   if (!leaf.known) stepLength = 0.0;
   vec3 localAhead = 2.0 * (leaf.at.fraction + stepLength * leaf.at.scale * ray.direction) - 1.0;
-  float value = evaluate(leaf.at.node.offset, leaf.at.node.degree, localAhead) - offset;
+  float value = leafValue(leaf.at.node, leaf.at.depth, cellIndexOf(leaf.at), localAhead) - offset;
   if (!leaf.known) return enterLeaf(leaf, value, lower, march);
   advance(ray, leaf, stepLength, march.side * value, lower, curve, falling || stepLength <= safe, march);
   return false;
 }
 
-// Marches along the ray, using the polynomials of single leaves. Returns true if the ray reaches a point at which the
+// Follows the ray to the first triangle that it crosses in an exact leaf, or to the end of the leaf or of its part without
+// blending. Where the ray first crosses a triangle to the side on which it is already, it has crossed the surface at the
+// face. Rays parallel to a triangle do not tell that, because of rounding.
+void crossExactLeaf(MarchRay ray, LeafPoint leaf, inout March march) {
+  float toExit = kBlended ? lengthToExit(leaf.at, ray, leaf.zone.width) : leaf.toLeave;
+  Crossings found = crossingsOf(leaf.at.node, worldOf(ray.origin + march.t * ray.direction), ray.world,
+                                -min(march.t, kBack * ray.nudge), toExit + ray.nudge);
+  float rule = float(constantSign(leaf.at.node));
+  if (rule != 0.0) {
+    found.fromOutside = kNever;
+    found.fromInside = kNever;
+  }
+  float first = min(found.fromOutside, found.fromInside);
+  if (march.side == 0.0) march.side = rule != 0.0 || first == kNever ? rule : found.fromOutside == first ? 1.0 : -1.0;
+  bool outer = march.side > 0.0;
+  float entry = outer ? found.fromOutside : found.fromInside;
+  bool behind = first > 2.0 * ray.nudge && first < entry - 2.0 * ray.nudge &&
+                abs(dot(ray.world, normalOf(outer ? found.inner : found.outer))) > kClear;
+  if (march.side != 0.0 && (behind || rule == -march.side)) {
+    march.kind = kOnFace;
+  } else if (entry < kNever) {
+    march.kind = kOnTriangle;
+    march.lastLeaf = outer ? found.outer : found.inner;
+    march.bracket.x = entry;
+  } else {
+    march.t += toExit + ray.nudge;
+    march.lastLeaf = kNoCell;
+    if (!(march.t <= ray.length)) march.kind = kMiss;
+  }
+}
+
+// Marches along the ray, using the functions of single leaves. Returns true if the ray reaches a point at which the
 // blended field has to be evaluated. Then `leaf` is the leaf at this point.
 bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
   bool blended = false;
@@ -246,6 +292,10 @@ bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
       stays = passNode(ray, leaf, march);
     }
     if (!stays) break;
+    if (kExactLeaves && crossesAtTriangles(leaf.at.node) && !leaf.zone.inside) {
+      crossExactLeaf(ray, leaf, march);
+      continue;
+    }
     blended = stepInLeaf(ray, leaf, march);
   }
   return blended;
@@ -284,6 +334,7 @@ void main() {
   MarchRay ray;
   ray.origin = vec3(pixel.origin);
   ray.direction = vec3(pixel.direction);
+  ray.world = vec3(pixel.worldDirection);
   ray.inverse = abs(1.0 / ray.direction);
   ray.length = float(pixel.length);
   ray.nudge = kNudge * diagonal;

@@ -84,7 +84,7 @@ class CpuRenderer final : public Renderer {
     if (!hit) return;
     const std::size_t pixel = std::size_t(y) * buffers.width + x;
     setCell(hit->cell, pixel, buffers);
-    const Sample sample = field_.sample(hit->cell, hit->local);
+    const Sample sample = field_.sample(*hit);
     const Vector3 gradient = field_.worldGradient(sample.gradient, hit->cell.depth);
     const double length = gradient.norm();
     // A cell of degree 0 has no gradient; its normal points to the eye.

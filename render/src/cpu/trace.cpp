@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "view/exact_leaf.h"
+
 namespace hpsdf::render {
 namespace {
 
@@ -144,11 +146,11 @@ void TraceField::forEachWeight(const Vector3& p, const Use& use) const {
 
 Sample TraceField::sampleBlended(const CellPoint& leaf, const Vector3& local) const {
   const double edge = std::ldexp(1.0, -leaf.depth);
-  const Vector3 p = leaf.base + edge * (leaf.path + 0.5 * (local + Vector3::Ones()));
+  const Vector3 p = gridPoint(leaf, local);
   double weights = 0, sum = 0;
   Vector3 weightsGradient = Vector3::Zero(), sumGradient = Vector3::Zero();
   forEachWeight(p, [&](std::uint32_t other, int depth, const Vector3& localInOther, const Weight& weight) {
-    const Sample sample = samplePolynomial(other, localInOther);
+    const Sample sample = sampleLeaf(other, depth, localInOther, p);
     weights += weight.value;
     sum += weight.value * sample.value;
     weightsGradient += weight.gradient;
@@ -194,7 +196,7 @@ CellPoint TraceField::leafAt(const Vector3& p) const {
 
 double TraceField::linearSlope(std::uint32_t leaf, const Vector3& direction) const {
   const int p = degree(leaf);
-  if (p == 0) return 0;
+  if (p == 0 || p == kExactDegree) return 0;
   // The coefficients c_ijk are in lexicographic order; the indices below are those of c_100, c_010 and c_001.
   return withCoefficients(field_, leaf, [&](const auto* c) {
     return c[coefficientCount(p) - coefficientCount(p - 1)] * direction.x() + c[p + 1] * direction.y() +
@@ -212,22 +214,50 @@ CellPoint TraceField::relevantNodeAt(const Vector3& p, double offset) const {
   return at;
 }
 
-Sample TraceField::samplePolynomial(std::uint32_t leaf, const Vector3& local) const {
+bool TraceField::crossesAtTriangles(std::uint32_t leaf, double offset) const {
+  return node::isExact(field_.nodes[leaf]) && offset + field_.exact.offset == 0;
+}
+
+Vector3 TraceField::gridPoint(const CellPoint& leaf, const Vector3& local) const {
+  return leaf.base + std::ldexp(1.0, -leaf.depth) * (leaf.path + 0.5 * (local + Vector3::Ones()));
+}
+
+Vector3 TraceField::worldPoint(const Vector3& gridPoint) const {
+  return space_.lo + gridPoint.cwiseQuotient(space_.grid).cwiseProduct(space_.size);
+}
+
+Sample TraceField::sampleLeaf(std::uint32_t leaf, int depth, const Vector3& local, const Vector3& p) const {
+  const std::uint64_t bits = field_.nodes[leaf];
+  if (node::isExact(bits)) {
+    const ValueAndGradient world = evaluateExactLeaf(field_.exact, bits, worldPoint(p));
+    return {world.value, localGradient(world.gradient, depth)};
+  }
   return withCoefficients(field_, leaf, [&](const auto* c) { return evaluate<true>(c, degree(leaf), local); });
 }
 
 Sample TraceField::sample(const CellPoint& leaf, const Vector3& local) const {
-  return field_.blend > 0 ? sampleBlended(leaf, local) : samplePolynomial(leaf.node, local);
+  return field_.blend > 0 ? sampleBlended(leaf, local)
+                          : sampleLeaf(leaf.node, leaf.depth, local, gridPoint(leaf, local));
+}
+
+Sample TraceField::sample(const Hit& hit) const {
+  if (!hit.triangle) return sample(hit.cell, hit.local);
+  return {-field_.exact.offset, localGradient(unitNormal(field_.exact, *hit.triangle), hit.cell.depth)};
 }
 
 double TraceField::value(const CellPoint& leaf, const Vector3& local) const {
   if (field_.blend > 0) return sampleBlended(leaf, local).value;
+  if (node::isExact(field_.nodes[leaf.node])) return sample(leaf, local).value;
   return withCoefficients(field_, leaf.node,
                           [&](const auto* c) { return evaluate<false>(c, degree(leaf.node), local).value; });
 }
 
 Vector3 TraceField::worldGradient(const Vector3& local, int depth) const {
   return std::ldexp(2.0, depth) * local.cwiseProduct(space_.grid).cwiseQuotient(space_.size);
+}
+
+Vector3 TraceField::localGradient(const Vector3& world, int depth) const {
+  return std::ldexp(0.5, -depth) * world.cwiseProduct(space_.size).cwiseQuotient(space_.grid);
 }
 
 /// Marches along one ray to the first crossing of f = offset, by steps that cannot pass a crossing (docs/rendering.md,
@@ -246,7 +276,7 @@ class TraceField::March {
 
  private:
   /// The point of the ray at parameter t, the leaf that contains it, and bounds for the height of the leaf's polynomial
-  /// along the ray.
+  /// or exact distance along the ray.
   struct LeafPoint {
     CellPoint at;
     Vector3 localDirection;  ///< change of the local coordinates per world unit along the ray
@@ -259,7 +289,7 @@ class TraceField::March {
   };
 
   std::optional<Hit> step() {
-    const CellPoint at = field_.relevantNodeAt(ray_.origin + t_ * ray_.direction, offset_);
+    const CellPoint at = field_.relevantNodeAt(pointAt(t_), offset_);
     if (field_.excludes(at.node, offset_)) return passNode(at);
     if (at.node != lastLeaf_) {
       enterLeaf(at);
@@ -270,7 +300,8 @@ class TraceField::March {
       leave(leaf.toLeave);
       return std::nullopt;
     }
-    return leaf.inBlendZone ? stepInBlendZone(leaf) : stepInLeaf(leaf);
+    if (leaf.inBlendZone) return stepInBlendZone(leaf);
+    return field_.crossesAtTriangles(at.node, offset_) ? crossExactLeaf(leaf) : stepInLeaf(leaf);
   }
 
   /// Steps past a node whose range of values excludes the offset. If the node lies on the other side of the
@@ -299,7 +330,8 @@ class TraceField::March {
     const double deviation = bounds.gradientDeviation * localDirection.norm();
     const bool inBlendZone = field_.inBlendZone(at);
     const double height =
-        inBlendZone ? side_ * (field_.samplePolynomial(at.node, localAt(at, t_)).value - offset_) : lastHeight_;
+        inBlendZone ? side_ * (field_.sampleLeaf(at.node, at.depth, localAt(at, t_), pointAt(t_)).value - offset_)
+                    : lastHeight_;
     return {.at = at,
             .localDirection = localDirection,
             .steepest = slope - deviation,
@@ -344,6 +376,24 @@ class TraceField::March {
     return std::nullopt;
   }
 
+  /// Follows the ray to the first triangle that it crosses in an exact leaf, or to the leaf's end or blend zone.
+  std::optional<Hit> crossExactLeaf(const LeafPoint& leaf) {
+    // The triangles may be crossed a little before t, because steps end behind faces.
+    constexpr double kBack = 16;
+    const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
+    const Vector3 direction = ray_.direction.cwiseProduct(field_.space_.size).cwiseQuotient(field_.space_.grid);
+    const RayPart part{field_.worldPoint(pointAt(t_)), direction, -std::min(t_, kBack * nudge_), toExit + nudge_};
+    const bool hasCrossing = node::exactSign(field_.field_.nodes[leaf.at.node]) == ExactSign::pseudonormal;
+    const auto crossing = hasCrossing ? firstCrossing(field_.field_.exact, field_.field_.nodes[leaf.at.node], part, side_)
+                                      : std::nullopt;
+    if (crossing) {
+      const double t = t_ + crossing->t;
+      return Hit{t, leaf.at, localAt(leaf.at, t), false, crossing->triangle};
+    }
+    advance(leaf, toExit, toExit == leaf.toLeave ? 0 : heightAt(leaf.at, t_ + toExit));
+    return std::nullopt;
+  }
+
   void advance(const LeafPoint& leaf, double length, double ahead) {
     if (length == leaf.toLeave)
       leave(length);
@@ -380,7 +430,7 @@ class TraceField::March {
   }
 
   Hit hitOnFace() const {
-    const CellPoint leaf = field_.leafAt(ray_.origin + t_ * ray_.direction);
+    const CellPoint leaf = field_.leafAt(pointAt(t_));
     return {t_, leaf, localFromFraction(leaf.fraction), true};
   }
 
@@ -388,6 +438,8 @@ class TraceField::March {
     const Vector3 inBase = ray_.origin - cell.base + t * ray_.direction;
     return localFromFraction(inBase * std::ldexp(1.0, cell.depth) - cell.path);
   }
+
+  Vector3 pointAt(double t) const { return ray_.origin + t * ray_.direction; }
 
   double heightAt(const CellPoint& leaf, double t) const {
     return side_ * (field_.value(leaf, localAt(leaf, t)) - offset_);

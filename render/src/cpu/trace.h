@@ -40,6 +40,7 @@ struct Hit {
   CellPoint cell;
   Vector3 local;  ///< coordinates within the cell, in [−1, 1]³ but for rounding
   bool onFace;    ///< whether f crosses the offset on the face between two leaves, not within one leaf
+  std::optional<std::uint32_t> triangle = {};  ///< the triangle of an exact leaf that the ray crosses
 };
 
 /// A hit on the face between two leaves is a crack if |f − offset| exceeds kCrack · domain diagonal · max(|∇f|, 1). In
@@ -61,6 +62,9 @@ class TraceField {
   Sample sample(const CellPoint& leaf, const Vector3& local) const;
   double value(const CellPoint& leaf, const Vector3& local) const;
 
+  /// Value and gradient of the field at a hit. Where a ray crosses a triangle, the gradient is the triangle's normal.
+  Sample sample(const Hit& hit) const;
+
   int degree(std::uint32_t leaf) const { return node::degree(field_.nodes[leaf]); }
 
   /// Converts a gradient with respect to a cell's local coordinates into one with respect to world coordinates.
@@ -75,8 +79,10 @@ class TraceField {
   /// Returns true if leaves other than the one that contains the point may have a blending weight there.
   bool inBlendZone(const CellPoint& at) const;
 
-  Sample samplePolynomial(std::uint32_t leaf, const Vector3& local) const;
-  /// The blended field by its definition: the weighted mean of the polynomials of all leaves whose blending weights at
+  /// The function of one leaf, without blending, at the point `p`, in grid coordinates. `local` are the local coordinates
+  /// of this point.
+  Sample sampleLeaf(std::uint32_t leaf, int depth, const Vector3& local, const Vector3& p) const;
+  /// The blended field by its definition: the weighted mean of the functions of all leaves whose blending weights at
   /// the point are above 0.
   Sample sampleBlended(const CellPoint& leaf, const Vector3& local) const;
   /// The blending weight of a leaf at a point, and its gradient in grid coordinates.
@@ -96,9 +102,16 @@ class TraceField {
   void descend(CellPoint& at) const;
   /// Descends to the leaf at a point, but stops earlier at a node whose range of field values excludes `offset`.
   CellPoint relevantNodeAt(const Vector3& p, double offset) const;
-  /// The derivative of the linear part of a leaf's polynomial along a direction in local coordinates.
+  /// The derivative of the linear part of a leaf's polynomial along a direction in local coordinates; 0 for an exact leaf.
   double linearSlope(std::uint32_t leaf, const Vector3& direction) const;
   bool excludes(std::uint32_t node, double offset) const;
+  /// Returns true if f crosses `offset` within a leaf where the triangles of the leaf are, and nowhere else.
+  bool crossesAtTriangles(std::uint32_t leaf, double offset) const;
+  /// The point at local coordinates of a leaf, in grid coordinates.
+  Vector3 gridPoint(const CellPoint& leaf, const Vector3& local) const;
+  Vector3 worldPoint(const Vector3& gridPoint) const;
+  /// The inverse of worldGradient.
+  Vector3 localGradient(const Vector3& world, int depth) const;
 
   const FieldData& field_;
   const std::vector<std::uint32_t>& blendExtents_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hpsdf/error.h"
+#include "view/exact_leaf.h"
 
 namespace hpsdf::render {
 namespace {
@@ -23,7 +24,10 @@ void checkFits(std::size_t texels, std::size_t largest, const char* what) {
 }
 
 /// The number of coefficients that a leaf of this degree takes on the device, a multiple of four.
-std::size_t uploadedCount(int degree) { return (coefficientCount(std::max(degree, kLowDegree - 1)) + 3) / 4 * 4; }
+std::size_t uploadedCount(int degree) {
+  if (degree == kExactDegree) return 0;
+  return (coefficientCount(std::max(degree, kLowDegree - 1)) + 3) / 4 * 4;
+}
 
 std::size_t uploadedCount(const FieldData& field) {
   std::size_t count = 0;
@@ -54,7 +58,7 @@ std::vector<float> uploadedCoefficients(const FieldData& field) {
   std::vector<float> uploaded(uploadedCount(field), 0.0F);
   float* out = uploaded.data();
   for (const std::uint64_t bits : field.nodes) {
-    if (!node::isLeaf(bits)) continue;
+    if (!node::isLeaf(bits) || node::isExact(bits)) continue;
     const int degree = node::degree(bits);
     std::visit([&](const auto& c) { uploadLeaf(c.data() + node::offset(bits), degree, out); }, field.coefficients);
     out += uploadedCount(degree);
@@ -71,7 +75,12 @@ std::vector<NodeTexel> nodeTexels(const FieldData& field, const std::vector<Surf
     const std::uint64_t bits = field.nodes[n];
     const SurfaceBounds& bound = bounds[n];
     NodeTexel& texel = texels[n];
-    if (node::isLeaf(bits)) {
+    texel[3] = bitsOf(bound.secondDerivative);
+    if (node::isExact(bits)) {
+      texel[0] = std::uint32_t(kExactDegree) << kOffsetBits | node::offset(bits);
+      texel[1] = bitsOf(bound.valueDeviation);
+      texel[3] = (texel[3] & ~std::uint32_t{3}) | std::uint32_t(node::exactSign(bits));
+    } else if (node::isLeaf(bits)) {
       const int degree = node::degree(bits);
       texel[0] = std::uint32_t(degree) << kOffsetBits | offset;
       texel[1] = bitsOf(bound.valueDeviation);
@@ -81,7 +90,6 @@ std::vector<NodeTexel> nodeTexels(const FieldData& field, const std::vector<Surf
       texel[1] = packOutwards(bound.lo, bound.hi);
     }
     texel[2] = bitsOf(bound.gradientDeviation);
-    texel[3] = bitsOf(bound.secondDerivative);
   }
   return texels;
 }
@@ -92,6 +100,21 @@ std::vector<NodeTexel> zoneTexels(const std::vector<BlendZoneBounds>& zones,
   for (std::size_t n = 0; n < zones.size(); ++n)
     texels[n] = {blendExtents[n], bitsOf(zones[n].valueDifference), bitsOf(zones[n].gradientDifference),
                  bitsOf(zones[n].extent)};
+  return texels;
+}
+
+/// Three texels for each triangle, see `FieldUpload`.
+std::vector<std::array<float, 4>> cornerTexels(const FieldData& field) {
+  std::vector<std::array<float, 4>> texels;
+  texels.reserve(3 * field.exact.triangles.size());
+  for (std::uint32_t triangle = 0; triangle < field.exact.triangles.size(); ++triangle) {
+    const std::array<Vector3, 3> corners = cornersOf(field.exact, triangle);
+    const Vector3 normal = unitNormal(field.exact, triangle);
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3f corner = (corners[k] - field.domain.min()).cast<float>();
+      texels.push_back({corner.x(), corner.y(), corner.z(), static_cast<float>(normal[k])});
+    }
+  }
   return texels;
 }
 
@@ -124,7 +147,17 @@ FieldUpload::FieldUpload(const Field& whole, const std::vector<SurfaceBounds>& b
   upload(linearPartBuffer_, linearParts_, GL_RGBA32F, linearParts);
   upload(coefficientBuffer_, coefficients_, GL_R32F, uploadedCoefficients(field));
   glTextureBuffer(coefficientQuads_.name(), GL_RGBA32F, coefficientBuffer_.name());
+  uploadExact(field, largest);
   if (!zones.empty()) upload(zoneBuffer_, zones_, GL_RGBA32UI, zoneTexels(zones, whole.lookupGrid().blendExtents));
+}
+
+void FieldUpload::uploadExact(const FieldData& field, GLint largest) {
+  const ExactTriangles& exact = field.exact;
+  if (exact.empty()) return;
+  checkFits(exact.lists.size(), std::min<std::size_t>(largest, std::size_t{1} << kOffsetBits), "runs of triangles");
+  checkFits(3 * exact.triangles.size(), largest, "corners of triangles");
+  upload(exactListBuffer_, exactLists_, GL_R32UI, exact.lists);
+  upload(exactCornerBuffer_, exactCorners_, GL_RGBA32F, cornerTexels(field));
 }
 
 void FieldUpload::bind() const {
@@ -133,6 +166,8 @@ void FieldUpload::bind() const {
   glBindTextureUnit(4, linearParts_.name());
   glBindTextureUnit(5, coefficientQuads_.name());
   glBindTextureUnit(6, zones_.name());
+  glBindTextureUnit(7, exactLists_.name());
+  glBindTextureUnit(8, exactCorners_.name());
 }
 
 }  // namespace hpsdf::render

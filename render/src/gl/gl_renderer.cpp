@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,7 @@ enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
 enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend, kBlendedSteps };
 enum : GLint { kViewport = 13, kStartSide };
+enum : GLint { kBaseCell = 20, kExactOffset, kAtTriangles };
 constexpr GLint kRefinementLimit = kMostSteps;
 
 constexpr int kStepsInAll = 1 << 16;  // greatest number of steps of a ray, as on the CPU
@@ -62,25 +64,49 @@ Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
 int highestDegree(const FieldData& field) {
   int degree = 0;
   for (const std::uint64_t bits : field.nodes)
-    if (node::isLeaf(bits)) degree = std::max(degree, node::degree(bits));
+    if (node::isLeaf(bits) && !node::isExact(bits)) degree = std::max(degree, node::degree(bits));
   return degree;
+}
+
+/// The greatest number of loop iterations in a search through the list of an exact leaf; 0 without exact leaves.
+int longestSearch(const ExactTriangles& exact) {
+  int longest = 0, iterations = 0;
+  for (const std::uint32_t run : exact.lists) {
+    iterations += int(triangle_run::length(run)) + 2;
+    longest = std::max(longest, iterations + 1);
+    if (triangle_run::isLast(run)) iterations = 0;
+  }
+  return longest;
 }
 
 /// The OpenGL objects of the renderer. Their context must be current when they are created and destroyed.
 struct Resources {
   Resources(const Field& whole, const std::vector<SurfaceBounds>& bounds, const std::vector<BlendZoneBounds>& zones)
       : field(whole, bounds, zones),
-        slice(linkedProgram({"full_screen.vert"}, {"field.glsl", leaves(whole), "slice.frag"})),
-        march(linkedProgram({"surface.vert"}, {"field.glsl", leaves(whole), "surface.glsl", "surface_march.frag"})),
-        hit(linkedProgram({"surface.vert"}, {"field.glsl", leaves(whole), "surface.glsl", "surface_hit.frag"})) {
+        slice(linkedProgram({"full_screen.vert"}, {"field.glsl", functions(whole), leaves(whole), "slice.frag"})),
+        march(linkedProgram({"surface.vert"}, {"field.glsl", functions(whole), leaves(whole), "surface.glsl", "surface_march.frag"})),
+        hit(linkedProgram({"surface.vert"}, {"field.glsl", functions(whole), leaves(whole), "surface.glsl", "surface_hit.frag"})) {
     const FieldData& data = whole.data();
     for (const GlProgram* program : {&slice, &march, &hit}) {
       glProgramUniform3ui(program->name(), kGrid, data.grid[0], data.grid[1], data.grid[2]);
+      if (!data.exact.empty()) setExactLeaves(*program, data);
       if (data.blend > 0) glProgramUniform1f(program->name(), kBlend, static_cast<float>(data.blend));
     }
     glEnableVertexArrayAttrib(blocks.name(), 0);
     glVertexArrayAttribFormat(blocks.name(), 0, 3, GL_FLOAT, GL_FALSE, 0);
     glVertexArrayAttribBinding(blocks.name(), 0, 0);
+  }
+
+  static void setExactLeaves(const GlProgram& program, const FieldData& data) {
+    const GridSpace space(data);
+    const Eigen::Vector3f cell = space.size.cwiseQuotient(space.grid).cast<float>();
+    glProgramUniform3f(program.name(), kBaseCell, cell.x(), cell.y(), cell.z());
+    glProgramUniform1f(program.name(), kExactOffset, static_cast<float>(data.exact.offset));
+  }
+
+  /// The shader file for the functions of single leaves, with or without exact leaves.
+  static std::string_view functions(const Field& field) {
+    return field.data().exact.empty() ? "leaves_polynomial.glsl" : "leaves_exact.glsl";
   }
 
   /// The shader file for the evaluation of the field, with or without blending.
@@ -122,12 +148,14 @@ class GlRenderer final : public Renderer {
   GlRenderer(const Field& field, GlChoice choice) : context_(choice), space_(field.data()) {
     octree_.grid = field.grid();
     octree_.nodes = field.data().nodes;
+    if (!field.data().exact.empty()) triangleLevel_ = -field.data().exact.offset;
     const std::vector<BlendZoneBounds> zones = blendZoneBounds(field);
     bounds_ = surfaceBounds(field.data(), zones);
     // Limit the steps and the root refinements in one pass, so that the shaders stay within kLoopBudget.
-    const int unblended = evaluationLoops(highestDegree(field.data()));
+    const int search = longestSearch(field.data().exact);
+    const int unblended = evaluationLoops(highestDegree(field.data())) + search;
     const int evaluation = zones.empty() ? unblended : blendedEvaluationLoops(unblended);
-    const int loopsOfStep = unblended + kMaxDepth + 4;
+    const int loopsOfStep = unblended + search + kMaxDepth + 4;
     stepsInPass_ = std::max(1, kLoopBudget / loopsOfStep);
     refinements_ = std::clamp((kLoopBudget - kMaxDepth) / (evaluation + 1) - 1, 1, kRefinementsInAll);
     const EglContext::Current current(context_);
@@ -179,6 +207,7 @@ class GlRenderer final : public Renderer {
     setRays(resources_->march, rays, view.offset, space_.diagonal);
     setRays(resources_->hit, rays, view.offset, space_.diagonal);
     glProgramUniform1i(resources_->march.name(), kMostSteps, stepsInPass_);
+    if (triangleLevel_) glProgramUniform1i(resources_->march.name(), kAtTriangles, view.offset == *triangleLevel_);
     glProgramUniform1i(resources_->hit.name(), kRefinementLimit, refinements_);
 
     // Find the blocks of pixels that may see the surface, and upload them.
@@ -286,6 +315,7 @@ class GlRenderer final : public Renderer {
   FieldData octree_;  ///< the field's octree, without coefficients
   std::vector<SurfaceBounds> bounds_;
   std::unique_ptr<Resources> resources_;
+  std::optional<double> triangleLevel_;  ///< value of the field on the triangles of exact leaves, if it has such leaves
   int stepsInPass_;                   ///< greatest number of steps of a ray in one pass of the march
   int refinements_;                   ///< greatest number of iterations that refine a root
   std::vector<Texel> integers_;       ///< integer outputs of the shaders for the last tile

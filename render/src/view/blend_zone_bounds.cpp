@@ -7,6 +7,9 @@
 #include <cmath>
 #include <cstdint>
 
+#include "view/exact_leaf.h"
+#include "view/grid_space.h"
+
 namespace hpsdf::render {
 namespace {
 
@@ -144,13 +147,20 @@ class Polynomial {
 /// Computes the blend zone bounds of leaves. Each thread has its own object of this class.
 class LeafBounder {
  public:
-  explicit LeafBounder(const Field& field) : field_(field.data()), extents_(field.lookupGrid().blendExtents) {}
+  explicit LeafBounder(const Field& field)
+      : field_(field.data()), extents_(field.lookupGrid().blendExtents), space_(field.data()) {}
 
   BlendZoneBounds bounds(const NodeBox& leaf) {
     double value = 0, gradient = 0;
     int smallest = smallestNeighbour(leaf);
     visitTouching(field_, leaf, [&](const NodeBox& other) {
       smallest = std::max(smallest, smallestNeighbour(other));
+      if (isExact(leaf) || isExact(other)) {
+        const Difference difference = exactDifference(leaf, other);
+        value = std::max(value, difference.value);
+        gradient = std::max(gradient, difference.gradient);
+        return;
+      }
       const double rounding = kFloatRounding * restrictBoth(leaf, other);
       ofOther_.subtract(ofLeaf_);
       value = std::max(value, ofOther_.magnitude() * (1 + kFloatRounding) + rounding);
@@ -171,27 +181,85 @@ class LeafBounder {
     return deepest;
   }
 
+  /// The part of a leaf into which the blending weight of another leaf may extend, in edges of the smallest possible
+  /// cell.
+  struct Overlap {
+    Vector3 lo, hi;
+  };
+
+  Overlap overlap(const NodeBox& leaf, const NodeBox& other) const {
+    const double extent = field_.blend * double(std::min(leaf.width(), other.width()));
+    Overlap both;
+    for (int axis = 0; axis < 3; ++axis) {
+      both.lo[axis] = std::max(double(leaf.lo[axis]), double(other.lo[axis]) - extent);
+      both.hi[axis] = std::min(double(leaf.lo[axis] + leaf.width()), double(other.lo[axis] + other.width()) + extent);
+    }
+    return both;
+  }
+
+  /// Restricts the polynomial of the leaf `from` to a part of it or of another leaf.
+  void restrict(Polynomial& polynomial, const NodeBox& from, const Overlap& to, int size) const {
+    assign(polynomial, from, size);
+    const double half = 0.5 * double(from.width());
+    for (int axis = 0; axis < 3; ++axis)
+      polynomial.restrict(axis, 0.5 * (to.hi[axis] - to.lo[axis]) / half,
+                          (0.5 * (to.lo[axis] + to.hi[axis]) - (double(from.lo[axis]) + half)) / half);
+  }
+
   /// Restricts the polynomials of `leaf` and `other` to the part of `leaf` into which the blending weight of `other`
   /// may extend. Returns the sum of the magnitudes of all coefficients of the two restricted polynomials.
   double restrictBoth(const NodeBox& leaf, const NodeBox& other) {
     const int size = std::max(degree(leaf), degree(other)) + 1;
-    assign(ofLeaf_, leaf, size);
-    assign(ofOther_, other, size);
-    const double extent = field_.blend * double(std::min(leaf.width(), other.width()));
-    for (int axis = 0; axis < 3; ++axis) {
-      const double lo = std::max(double(leaf.lo[axis]), double(other.lo[axis]) - extent);
-      const double hi = std::min(double(leaf.lo[axis] + leaf.width()), double(other.lo[axis] + other.width()) + extent);
-      const auto restrict = [&](Polynomial& polynomial, const NodeBox& from) {
-        const double half = 0.5 * double(from.width()), middle = double(from.lo[axis]) + half;
-        polynomial.restrict(axis, 0.5 * (hi - lo) / half, (0.5 * (lo + hi) - middle) / half);
-      };
-      restrict(ofLeaf_, leaf);
-      restrict(ofOther_, other);
-      perUnit_[axis] = double(leaf.width()) / (hi - lo);
-    }
+    const Overlap both = overlap(leaf, other);
+    restrict(ofLeaf_, leaf, both, size);
+    restrict(ofOther_, other, both, size);
+    perUnit_ = double(leaf.width()) * (both.hi - both.lo).cwiseInverse();
     return ofLeaf_.magnitude() + ofOther_.magnitude();
   }
 
+  /// Upper bounds of the difference of two leaves' functions, and of its gradient in local coordinates of the first.
+  struct Difference {
+    double value, gradient;
+  };
+
+  /// Bounds the difference where one or both leaves are exact. `other` knows the triangles that are nearest to its own
+  /// box. At a distance of `beyond` from the box, its distance is that to a triangle which is at most 2 · beyond farther
+  /// than the nearest one.
+  Difference exactDifference(const NodeBox& leaf, const NodeBox& other) {
+    const Overlap both = overlap(leaf, other);
+    const Range own = rangeOf(leaf, leaf, both), others = rangeOf(other, leaf, both);
+    double value = std::abs(own.middle - others.middle) + own.deviation + others.deviation;
+    if (isExact(leaf) && isExact(other)) {
+      const double extent = field_.blend * double(std::min(leaf.width(), other.width()));
+      value = std::min(value, 2 * extent * smallestCell().norm());
+    }
+    const double rounding = kFloatRounding * (std::abs(own.middle) + space_.diagonal);
+    return {value * (1 + kFloatRounding) + rounding, own.gradient + others.gradient};
+  }
+
+  /// The range of a leaf's function in an overlap, and an upper bound of its gradient in local coordinates of `leaf`.
+  struct Range {
+    double middle, deviation, gradient;
+  };
+
+  Range rangeOf(const NodeBox& from, const NodeBox& leaf, const Overlap& both) {
+    if (isExact(from)) {
+      const Vector3 centre = space_.lo + (0.5 * (both.lo + both.hi)).cwiseProduct(smallestCell());
+      const double middle = evaluateExactLeaf(field_.exact, field_.nodes[from.node], centre).value;
+      const double radius = 0.5 * (both.hi - both.lo).cwiseProduct(smallestCell()).norm();
+      return {middle, radius, 0.5 * double(leaf.width()) * smallestCell().maxCoeff() * (1 + kFloatRounding)};
+    }
+    restrict(ofOther_, from, both, degree(from) + 1);
+    const double middle = ofOther_.at(0, 0, 0), magnitude = ofOther_.magnitude();
+    const Vector3 perUnit = double(leaf.width()) * (both.hi - both.lo).cwiseInverse();
+    return {middle, magnitude - std::abs(middle) + kFloatRounding * magnitude,
+            ofOther_.gradientBound(perUnit) * (1 + kFloatRounding) + kFloatRounding * magnitude};
+  }
+
+  /// The edges of the smallest possible cell, world units.
+  Vector3 smallestCell() const { return std::ldexp(1.0, -kMaxDepth) * space_.size.cwiseQuotient(space_.grid); }
+
+  bool isExact(const NodeBox& leaf) const { return node::isExact(field_.nodes[leaf.node]); }
   int degree(const NodeBox& leaf) const { return node::degree(field_.nodes[leaf.node]); }
 
   void assign(Polynomial& polynomial, const NodeBox& leaf, int size) const {
@@ -202,6 +270,7 @@ class LeafBounder {
 
   const FieldData& field_;
   const std::vector<std::uint32_t>& extents_;
+  GridSpace space_;
   Polynomial ofLeaf_, ofOther_;
   Vector3 perUnit_;  // derivative of the restricted box's local coordinates with respect to the leaf's
 };

@@ -9,8 +9,8 @@ namespace hpsdf::render {
 /// Bounds of the field are widened by this relative rounding error, because devices compute in single precision.
 constexpr double kFloatRounding = 4e-6;
 
-/// Bounds of the blended field F within a leaf. F = f + (Σ wₙ dₙ) / (Σ wₙ), where f is the polynomial of this leaf, wₙ
-/// is the blending weight of leaf n, and dₙ is the polynomial of leaf n minus f.
+/// Bounds of the blended field F within a leaf. F = f + (Σ wₙ dₙ) / (Σ wₙ), where f is the polynomial or
+/// exact distance of this leaf, wₙ is the blending weight of leaf n, and dₙ is the function of leaf n minus f.
 struct BlendZoneBounds {
   float valueDifference = 0;     ///< upper bound of |dₙ| where wₙ > 0, and therefore of |F − f|
   float gradientDifference = 0;  ///< upper bound of |∇dₙ| where wₙ > 0, in local coordinates

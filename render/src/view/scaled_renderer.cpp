@@ -16,6 +16,12 @@ Field scaled(const Field& field, double factor) {
         for (auto& c : coefficients) c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
       },
       data.coefficients);
+  std::visit(
+      [&](auto& vertices) {
+        for (auto& v : vertices) v = (factor * v.template cast<double>()).template cast<typename std::remove_reference_t<decltype(v)>::Scalar>();
+      },
+      data.exact.vertices);
+  data.exact.offset *= factor;
   data.bounds.clear();  // the bounds would have to be scaled, and no renderer uses them
   return Field(std::move(data));
 }

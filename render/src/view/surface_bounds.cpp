@@ -7,6 +7,9 @@
 #include <bit>
 #include <cmath>
 
+#include "view/exact_leaf.h"
+#include "view/grid_space.h"
+
 namespace hpsdf::render {
 namespace {
 
@@ -57,17 +60,60 @@ SurfaceBounds leafBounds(const T* c, int degree) {
           .linear = linearPart(c, degree)};
 }
 
+/// Bounds of an exact leaf whose distance at the centre is `central`. `half` is half of the leaf's box. A distance changes
+/// by at most the length of the way, so that the linear part is the value at the centre alone.
+SurfaceBounds exactLeafBounds(double central, const Vector3& half, double rounding) {
+  const double range = half.norm() * (1 + kFloatRounding) + rounding;
+  return {.lo = static_cast<float>(central - range),
+          .hi = static_cast<float>(central + range),
+          .gradientDeviation = static_cast<float>(half.maxCoeff() * (1 + kFloatRounding)),
+          .valueDeviation = static_cast<float>(range),
+          .secondDerivative = kExactCurve,
+          .linear = {0, 0, 0, static_cast<float>(central)}};
+}
+
+/// Sets the bounds of the exact leaves below a node. `half` is half of the node's box.
+void setExactBounds(const FieldData& field, std::uint32_t n, const Vector3& centre, const Vector3& half,
+                    std::vector<SurfaceBounds>& bounds) {
+  const std::uint64_t bits = field.nodes[n];
+  if (node::isExact(bits)) {
+    const double central = evaluateExactLeaf(field.exact, bits, centre).value;
+    bounds[n] = exactLeafBounds(central, half, kFloatRounding * (std::abs(central) + field.domain.sizes().norm()));
+  }
+  if (node::isLeaf(bits)) return;
+  for (std::uint32_t child = 0; child < 8; ++child) {
+    const Vector3 side(child & 1 ? 0.5 : -0.5, child & 2 ? 0.5 : -0.5, child & 4 ? 0.5 : -0.5);
+    setExactBounds(field, node::firstChild(bits) + child, centre + side.cwiseProduct(half), half / 2, bounds);
+  }
+}
+
+/// Sets the bounds of all exact leaves.
+void setExactBounds(const FieldData& field, std::vector<SurfaceBounds>& bounds) {
+  if (field.exact.empty()) return;
+  const GridSpace space(field);
+  const Vector3 cell = space.size.cwiseQuotient(space.grid);
+  const std::size_t cells = std::size_t(field.grid[0]) * field.grid[1] * field.grid[2];
+  tbb::parallel_for(std::size_t{0}, cells, [&](std::size_t n) {
+    const Vector3 corner(double(n % field.grid[0]), double(n / field.grid[0] % field.grid[1]),
+                         double(n / field.grid[0] / field.grid[1]));
+    setExactBounds(field, static_cast<std::uint32_t>(n),
+                   space.lo + (corner + Vector3::Constant(0.5)).cwiseProduct(cell), cell / 2, bounds);
+  });
+}
+
 }  // namespace
 
 std::vector<SurfaceBounds> surfaceBounds(const FieldData& field, const std::vector<BlendZoneBounds>& zones) {
   std::vector<SurfaceBounds> bounds(field.nodes.size());
   // Compute the bounds of all leaves.
+  setExactBounds(field, bounds);
   std::visit(
       [&](const auto& coefficients) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size()), [&](const auto& range) {
           for (std::size_t n = range.begin(); n < range.end(); ++n) {
             if (!node::isLeaf(field.nodes[n])) continue;
-            bounds[n] = leafBounds(coefficients.data() + node::offset(field.nodes[n]), node::degree(field.nodes[n]));
+            if (!node::isExact(field.nodes[n]))
+              bounds[n] = leafBounds(coefficients.data() + node::offset(field.nodes[n]), node::degree(field.nodes[n]));
             if (zones.empty()) continue;
             bounds[n].lo -= zones[n].valueDifference;
             bounds[n].hi += zones[n].valueDifference;
