@@ -29,7 +29,7 @@ std::string jumpText(const Jump& jump) {
 
 Json interfaceJson(const Interface& face) {
   return {{"cells", face.cells},
-          {"degrees", face.degrees},
+          {"degrees", {degreeJson(face.degrees[0]), degreeJson(face.degrees[1])}},
           {"depths", face.depths},
           {"axis", face.axis},
           {"area", face.area},
@@ -98,7 +98,8 @@ std::string worstText(const Jumps& jumps, JumpKind by, std::size_t count) {
     const Interface& face = jumps.interfaces[n];
     text += fmt::format("  {:>4} {:>10} {:>10}  {:<34} {:>4}  {:<16} {}\n", ++rank, shortNumber(face.value.max),
                         shortNumber(face.gradient.max), vectorText(face.worst), "xyz"[face.axis],
-                        fmt::format("{}|{}, {}|{}", face.degrees[0], face.degrees[1], face.depths[0], face.depths[1]),
+                        fmt::format("{}|{}, {}|{}", levelName(face.degrees[0]), levelName(face.degrees[1]), face.depths[0],
+                                    face.depths[1]),
                         fmt::format("{}|{}", face.cells[0], face.cells[1]));
   }
   return text;
@@ -122,7 +123,8 @@ void writeTable(const Jumps& jumps, const std::string& file) {
       "worst_x,worst_y,worst_z\n");
   for (const Interface& face : jumps.interfaces)
     out.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", face.cells[0], face.cells[1],
-                          face.degrees[0], face.degrees[1], face.depths[0], face.depths[1], face.axis, face.area,
+                          levelName(face.degrees[0]), levelName(face.degrees[1]), face.depths[0], face.depths[1],
+                          face.axis, face.area,
                           face.center.x(), face.center.y(), face.center.z(), face.value.rms, face.value.max,
                           face.gradient.rms, face.gradient.max, face.worst.x(), face.worst.y(), face.worst.z()));
   out.commit();

@@ -62,7 +62,7 @@ void writeTable(const Line& line, std::span<const double> exact, const std::stri
     const auto& cell = line.pieces[sample.piece].cell;
     const Vector3 &x = sample.point, &g = sample.gradient;
     out.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", sample.t, sample.t * line.length(), x.x(), x.y(),
-                          x.z(), cell ? fmt::format("{},{},{}", cell->id, cell->degree, cell->depth) : ",,",
+                          x.z(), cell ? fmt::format("{},{},{}", cell->id, levelName(cell->degree), cell->depth) : ",,",
                           sample.value, exact.empty() ? "," : fmt::format("{},{}", exact[i], sample.value - exact[i]),
                           g.x(), g.y(), g.z(), line.slopeAlong(sample)));
   }

@@ -134,7 +134,7 @@ Json worstJson(const WorstPoint& at) {
           {"value", at.value},
           {"error", at.value - at.exact},
           {"cell", at.cell},
-          {"degree", at.degree},
+          {"degree", degreeJson(at.degree)},
           {"depth", at.depth}};
 }
 
@@ -211,7 +211,7 @@ std::string worstText(const std::vector<WorstPoint>& worst) {
   int rank = 0;
   for (const WorstPoint& at : worst)
     text += fmt::format("  {:>4} {:>10} {:>12.5g} {:>12.5g}  {:<36} {:>6} {:>5}  {}\n", ++rank, shortNumber(at.error()),
-                        at.exact, at.value, vectorText(at.point), at.degree, at.depth, at.cell);
+                        at.exact, at.value, vectorText(at.point), levelName(at.degree), at.depth, at.cell);
   return text;
 }
 
@@ -254,7 +254,7 @@ std::string worstScript(const Session& session, const Verified& verified, const 
   text += fmt::format("show slice\ncolor error mesh={}\n", scriptWord(verified.surface));
   int rank = 0;
   for (const WorstPoint& at : verified.figures.worst) {
-    text += fmt::format("# {}: error {}, degree {}, depth {}\n", ++rank, shortNumber(at.error()), at.degree, at.depth);
+    text += fmt::format("# {}: error {}, degree {}, depth {}\n", ++rank, shortNumber(at.error()), levelName(at.degree), at.depth);
     text += fmt::format("fly to={},{},{}\nshot output={}\n", at.point.x(), at.point.y(), at.point.z(),
                         scriptWord(fmt::format("{}-{}.png", file.stem().string(), rank)));
   }

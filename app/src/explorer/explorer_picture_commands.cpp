@@ -250,7 +250,7 @@ void addCellsAndArrowsCommands(Registry& registry) {
       .parameters = {{"style", choice({"none", "lines", "boxes"}).positional(),
                       "Lines along their edges, or boxes of 0.8 of their extent."},
                      {"degrees", text("LIST").under(kDrawn).advanced(),
-                      "Only cells of these degrees: numbers and ranges, as in 2,4-6; or all."},
+                      "Only cells of these degrees: numbers, ranges and the word exact, as in 2,4-6,exact; or all."},
                      {"depths", text("LIST").under(kDrawn).advanced(), "Only cells of these depths; or all."}},
       .action = changing(changeCells),
   });

@@ -17,7 +17,7 @@ void drawLevelSwatches(const std::vector<render::Legend::Level>& levels) {
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const float x0 = std::round(from.x + width * float(i)), x1 = std::round(from.x + width * float(i + 1));
     list.AddRectFilled({x0, from.y}, {x1, from.y + height}, packed(levels[i].color));
-    const std::string label = std::to_string(levels[i].level);
+    const std::string label = levelName(levels[i].level);
     const bool dark = 2 * levels[i].color[0] + 5 * levels[i].color[1] + levels[i].color[2] < 4 * 255;
     if (widthOf(label) + 2 <= x1 - x0)
       textAt((x0 + x1 - widthOf(label)) / 2, from.y + 3, label, dark ? IM_COL32_WHITE : IM_COL32(20, 20, 30, 255));
@@ -69,7 +69,7 @@ void drawHistogramColumn(float x, float width, float bottom, float bar, ImU32 co
   };
   const std::string share = percent < 0.1 ? "<.1" : fmt::format("{:.{}f}", percent, percent < 9.95 ? 1 : 0);
   centered(share, bottom - bar - ImGui::GetTextLineHeight(), kSoftInk);
-  centered(std::to_string(level), bottom + 2, kInk);
+  centered(levelName(level), bottom + 2, kInk);
 }
 
 /// Draws a histogram with one column for each level (a degree or depth). The column shows the level's share of the

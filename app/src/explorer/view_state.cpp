@@ -64,7 +64,10 @@ render::Plane planeOf(const ViewState& view, const Field& field) {
 }  // namespace
 
 std::string levelText(const std::vector<int>& levels) {
-  return levels.empty() ? "all" : fmt::format("{}", fmt::join(levels, ","));
+  if (levels.empty()) return "all";
+  std::vector<std::string> names;
+  for (const int level : levels) names.push_back(levelName(level));
+  return fmt::format("{}", fmt::join(names, ","));
 }
 
 render::SlicePicture slicePicture(const ViewState& view, const Field& field) {

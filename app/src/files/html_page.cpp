@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "hpsdf/field.h"
+
 namespace hpsdf::app {
 namespace {
 
@@ -47,7 +49,7 @@ std::string levels(const std::string& title, const std::map<int, double>& shares
     rows += fmt::format(
         "<tr><th>{}</th><td class=\"share\">{}</td><td class=\"bar\"><span "
         "style=\"width:{:.2f}%\"></span></td></tr>\n",
-        level, htmlEscaped(shareText(share)), 100 * share);
+        levelName(level), htmlEscaped(shareText(share)), 100 * share);
   return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", htmlEscaped(title), rows);
 }
 

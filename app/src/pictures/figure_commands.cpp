@@ -19,7 +19,7 @@ Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int
   return {{"position", vectorJson(position)},
           {"value", value},
           {"cell", cell},
-          {"degree", degree},
+          {"degree", degreeJson(degree)},
           {"depth", depth},
           {"gradient", vectorJson(gradient)},
           {"slope", gradient.norm()}};
@@ -111,7 +111,7 @@ void runPick(Session& session, const Arguments& arguments) {
   out << fmt::format(
       "pixel {},{}: ({:.6g}, {:.6g}, {:.6g}), value {:.6g}, cell {}, degree {}, depth {}, slope {:.6g}\n", pixel[0],
       pixel[1], p[0].get<double>(), p[1].get<double>(), p[2].get<double>(), pick["value"].get<double>(),
-      pick["cell"].get<std::uint32_t>(), pick["degree"].get<int>(), pick["depth"].get<int>(),
+      pick["cell"].get<std::uint32_t>(), degreeText(pick["degree"]), pick["depth"].get<int>(),
       pick["slope"].get<double>());
 }
 

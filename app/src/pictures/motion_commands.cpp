@@ -131,9 +131,14 @@ void widenLevels(render::ScaleOptions& scale, const Field& base, render::ColorBy
   if (scale.levels.empty()) return;
   const FieldStatistics figures = statistics(base);
   const auto& levels = color == render::ColorBy::degree ? figures.degreeLeaves : figures.depthLeaves;
-  const int first = std::min(levels.begin()->first, scale.levels.front());
-  scale.levels.resize(std::size_t(scale.levels.back() - first + 1));
-  std::iota(scale.levels.begin(), scale.levels.end(), first);
+  const bool hasExact = scale.levels.back() == kExactDegree;
+  if (hasExact) scale.levels.pop_back();
+  if (!scale.levels.empty()) {
+    const int first = std::min(levels.begin()->first, scale.levels.front());
+    scale.levels.resize(std::size_t(scale.levels.back() - first + 1));
+    std::iota(scale.levels.begin(), scale.levels.end(), first);
+  }
+  if (hasExact) scale.levels.push_back(kExactDegree);
 }
 
 Json frameFigures(const Field& field) {

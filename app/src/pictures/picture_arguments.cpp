@@ -168,6 +168,7 @@ std::vector<int> levelList(const std::string& text, const char* name, int most) 
                     name, most, text));
   };
   const auto level = [&](std::string_view word) {
+    if (most == kMaxDegree && word == levelName(kExactDegree)) return kExactDegree;
     const auto number = parseNumber(word);
     if (!number || *number != std::floor(*number) || !(*number >= 0 && *number <= most)) refuse();
     return static_cast<int>(*number);
@@ -179,7 +180,7 @@ std::vector<int> levelList(const std::string& text, const char* name, int most) 
     const std::size_t dash = part.find('-');
     const int first = level(part.substr(0, dash));
     const int last = dash == std::string_view::npos ? first : level(part.substr(dash + 1));
-    if (first > last) refuse();
+    if (first > last || (last == kExactDegree && first != last)) refuse();
     for (int i = first; i <= last; ++i) levels.push_back(i);
     start = end + 1;
   }

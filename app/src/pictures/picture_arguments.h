@@ -36,7 +36,8 @@ std::string viewName(const render::OrbitCamera& camera);
 render::CellStyle cellStyle(std::string_view name);
 std::string cellStyleName(render::CellStyle style);
 
-/// Parses a list of degrees or depths such as "2,4-6". Each number must lie between 0 and `most`. Returns an empty list
+/// Parses a list of degrees or depths such as "2,4-6". Each number must lie between 0 and `most`. A list of
+/// degrees may contain the word "exact". Returns an empty list
 /// for "". Throws `Error` naming the parameter `name` for any other text.
 std::vector<int> levelList(const std::string& text, const char* name, int most);
 

@@ -62,8 +62,8 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
       const std::size_t pixel = std::size_t(y) * std::size_t(buffers.width) + std::size_t(x);
       if (!buffers.hit(pixel)) continue;
       const Vector3 p = render::pixelPoint(view, x, y, buffers.width, buffers.height);
-      rows += fmt::format("{},{},{},{},{},{}\n", p.x(), p.y(), p.z(), buffers.value[pixel], buffers.degree[pixel],
-                          buffers.depth[pixel]);
+      rows += fmt::format("{},{},{},{},{},{}\n", p.x(), p.y(), p.z(), buffers.value[pixel],
+                          levelName(buffers.degree[pixel]), buffers.depth[pixel]);
     }
     out.write(rows);
   }
@@ -171,7 +171,7 @@ const std::vector<Parameter> kRenderDrawn = {
      "Also draws the cells of the octree: lines along their edges, faded where cells are small in the picture, or "
      "boxes of 0.8 of their extent in the colours of the picture."},
     {"degrees", text("LIST").advanced(),
-     "Draws cells of these polynomial degrees only: numbers and ranges, as in 2,4-6."},
+     "Draws cells of these polynomial degrees only: numbers, ranges and the word exact, as in 2,4-6,exact."},
     {"depths", text("LIST").advanced(), "Draws cells of these depths only: numbers and ranges, as in 2,4-6."}};
 
 /// Returns the parameters that choose the colours of a picture. The parameter `color` accepts all colour modes

@@ -59,7 +59,7 @@ std::vector<std::string> readoutText(const Readout& r) {
   if (r.exact) first += fmt::format("   exact {:.6g}   error {:.3g}", *r.exact, r.value - *r.exact);
   std::string second =
       fmt::format("cell {}   degree {}   depth {}   gradient ({:.4g}, {:.4g}, {:.4g}), length {:.4g}", r.pick.cell,
-                  r.pick.degree, r.pick.depth, r.gradient.x(), r.gradient.y(), r.gradient.z(), r.gradient.norm());
+                  levelName(r.pick.degree), r.pick.depth, r.gradient.x(), r.gradient.y(), r.gradient.z(), r.gradient.norm());
   if (std::isfinite(r.toFace))
     second += fmt::format("   nearest face: jump {} of f, {} of its gradient", shortNumber(r.valueJump.max),
                           shortNumber(r.gradientJump.max));

@@ -24,7 +24,7 @@ std::string histogram(std::string_view name, const std::map<int, double>& volume
   for (const auto& [level, share] : volume) {
     const int cells = share > 0 ? std::max(1, static_cast<int>(std::lround(share * kHistogramColumns))) : 0;
     text +=
-        fmt::format("  {:>8} {:>6.2f} % {:>12}  {:▇<{}}\n", level, 100 * share, grouped(leaves.at(level)), "", cells);
+        fmt::format("  {:>8} {:>6.2f} % {:>12}  {:▇<{}}\n", levelName(level), 100 * share, grouped(leaves.at(level)), "", cells);
   }
   return text;
 }

@@ -4,16 +4,18 @@
 #include <map>
 #include <string>
 
+#include "hpsdf/field.h"
 #include "session/current_field.h"
 #include "text/json.h"
 
 namespace hpsdf::app {
 
-/// Converts a map from degrees or depths to values into a JSON object with the degrees or depths as keys.
+/// Converts a map from degrees or depths to values into a JSON object with the degrees or depths as keys, and the key
+/// "exact" for exact leaves.
 template <typename Value>
 Json levelsJson(const std::map<int, Value>& levels) {
   Json json = Json::object();
-  for (const auto& [level, value] : levels) json[std::to_string(level)] = value;
+  for (const auto& [level, value] : levels) json[levelName(level)] = value;
   return json;
 }
 

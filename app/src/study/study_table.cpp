@@ -88,11 +88,11 @@ std::string sharesSvg(int width, const Shares& shares, const Colors& colors, boo
     parts +=
         fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
                     width * from, width * share, kDegreeBarHeight, colorText(color),
-                    tellsShares ? fmt::format("{}: {:.2f} %", level, 100 * share) : std::to_string(level));
+                    tellsShares ? fmt::format("{}: {:.2f} %", levelName(level), 100 * share) : levelName(level));
     const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
-    if (width * share > 12)
+    if (width * share > (level == kExactDegree ? 34 : 12))
       parts += fmt::format("<text x=\"{:.2f}\" y=\"13\" fill=\"{}\">{}</text>", width * from + width * share / 2,
-                           isLight ? "#000000" : "#ffffff", level);
+                           isLight ? "#000000" : "#ffffff", levelName(level));
     from += share;
   }
   return fmt::format(
@@ -103,7 +103,7 @@ std::string sharesSvg(int width, const Shares& shares, const Colors& colors, boo
 
 /// Returns an SVG legend of the colours of all levels (degrees or depths).
 std::string legendSvg(const Colors& colors) {
-  constexpr int kWidth = 26;
+  const int kWidth = colors.contains(kExactDegree) ? 36 : 26;
   Shares equal;
   for (const auto& [level, color] : colors) equal[level] = 1 / double(colors.size());
   return sharesSvg(kWidth * int(colors.size()), equal, colors, false);

@@ -23,4 +23,9 @@ Json vectorJson(const Vector3& v);
 
 Json boxJson(const Box& box);
 
+/// Returns the degree of a leaf as a number, or the word "exact" for an exact leaf.
+Json degreeJson(int degree);
+/// Returns the text of a degree that `degreeJson` returned.
+std::string degreeText(const Json& degree);
+
 }  // namespace hpsdf::app

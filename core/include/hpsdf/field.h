@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <span>
+#include <string>
 
 #include "hpsdf/detail/field_data.h"
 #include "hpsdf/detail/lookup_grid.h"
@@ -82,5 +83,8 @@ struct FieldStatistics {
 };
 
 FieldStatistics statistics(const Field& field);
+
+/// Returns a degree or a depth as text: "exact" for the degree of exact leaves, which is greater than every depth.
+std::string levelName(int level);
 
 }  // namespace hpsdf

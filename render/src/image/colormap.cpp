@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hpsdf/types.h"
+
 namespace hpsdf::render {
 namespace {
 
@@ -39,13 +41,18 @@ LinearColor orderedColor(double t) {
   return fromOklch(lightness, chroma, hue);
 }
 
+LinearColor exactColor() { return fromOklch(0.51, 0.20, 30); }
+
 LevelMap::LevelMap(std::span<const int> levels) : levels_(levels.begin(), levels.end()) {
   std::sort(levels_.begin(), levels_.end());
   levels_.erase(std::unique(levels_.begin(), levels_.end()), levels_.end());
   colors_.fill(LinearColor(1, 0, 1));
-  for (std::size_t i = 0; i < levels_.size(); ++i)
-    colors_[static_cast<std::uint8_t>(levels_[i])] =
-        orderedColor(levels_.size() == 1 ? 0.5 : double(i) / double(levels_.size() - 1));
+  const auto ordered = levels_.size() - static_cast<std::size_t>(std::ranges::count(levels_, kExactDegree));
+  std::size_t i = 0;
+  for (const int level : levels_)
+    colors_[static_cast<std::uint8_t>(level)] = level == kExactDegree ? exactColor()
+                                                : ordered == 1        ? orderedColor(0.5)
+                                                                      : orderedColor(double(i++) / double(ordered - 1));
 }
 
 ColorScale::ColorScale(double low, double high, bool logarithmic)

@@ -13,7 +13,12 @@ namespace hpsdf::render {
 /// rises monotonically.
 LinearColor orderedColor(double t);
 
-/// Colours for levels (polynomial degrees or octree depths, 0 to 255), spread evenly over the colour map.
+/// The colour of exact leaves: a brick red. It is far from all colours of the ordered colour map, and stays so for people
+/// with protanopia, deuteranopia or tritanopia.
+LinearColor exactColor();
+
+/// Colours for levels (polynomial degrees or octree depths, 0 to 255), spread evenly over the colour map. The degree of
+/// exact leaves, `kExactDegree`, has a colour of its own.
 class LevelMap {
  public:
   explicit LevelMap(std::span<const int> levels);

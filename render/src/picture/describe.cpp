@@ -7,9 +7,11 @@ namespace {
 std::string describeRuns(const std::vector<int>& levels) {
   std::string text;
   for (std::size_t i = 0, last; i < levels.size(); i = last + 1) {
-    for (last = i; last + 1 < levels.size() && levels[last + 1] == levels[last] + 1;) ++last;
-    text += (i == 0 ? "" : ", ") + std::to_string(levels[i]);
-    if (last > i) text += "–" + std::to_string(levels[last]);
+    for (last = i; last + 1 < levels.size() && levels[last + 1] == levels[last] + 1 &&
+                   levels[last + 1] != kExactDegree;)
+      ++last;
+    text += (i == 0 ? "" : ", ") + levelName(levels[i]);
+    if (last > i) text += "–" + levelName(levels[last]);
   }
   return text;
 }
@@ -58,8 +60,11 @@ std::string describeCracks(const Cracks& cracks) {
 }
 
 std::string describeLevels(const std::map<int, double>& shares) {
-  const int first = shares.begin()->first, last = shares.rbegin()->first;
-  return first == last ? std::to_string(first) : std::to_string(first) + "–" + std::to_string(last);
+  const bool hasExact = shares.contains(kExactDegree);
+  if (hasExact && shares.size() == 1) return levelName(kExactDegree);
+  const int first = shares.begin()->first, last = std::prev(shares.end(), hasExact ? 2 : 1)->first;
+  const std::string range = first == last ? levelName(first) : levelName(first) + "–" + levelName(last);
+  return hasExact ? range + ", " + levelName(kExactDegree) : range;
 }
 
 std::string describeBytes(std::size_t bytes) {

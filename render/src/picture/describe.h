@@ -28,7 +28,7 @@ std::string describeCells(const ShownCells& cells);
 std::string describeCamera(const OrbitCamera& camera);
 std::string describeCracks(const Cracks& cracks);
 
-/// The range of degrees or depths as text, from the lowest to the highest, as in "3–7".
+/// The range of degrees or depths as text, from the lowest to the highest, as in "3–7" or "3–7, exact".
 std::string describeLevels(const std::map<int, double>& shares);
 
 /// A number of bytes as text, as in "12.3 kB".

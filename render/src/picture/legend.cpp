@@ -83,19 +83,24 @@ void addSwatch(Overlay& overlay, const LevelRow& row, double left, double width,
   overlay.boxes.push_back({left, std::round(row.top), left + width, std::round(row.top + row.height - gap), color});
 }
 
-// Adds a row for a level: a swatch with the level's number, and the level's share of the volume as text. In a roomy
+// Returns the width of the swatches in which the levels' names stand.
+double swatchWidth(const std::map<int, double>& shares, double size) {
+  const bool hasExact = shares.contains(kExactDegree);
+  return std::round(hasExact ? advanceOf(levelName(kExactDegree), size) + 0.5 * size : 2.1 * size);
+}
+
+// Adds a row for a level: a swatch with the level's name, and the level's share of the volume as text. In a roomy
 // picture, a grey bar shows the share too.
-void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, double size, double largestShare,
-                bool roomy, const LinearColor& color) {
+void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, double size, double swatch,
+                double largestShare, bool roomy, const LinearColor& color) {
   const double left = std::round(column.left);
-  const double swatch = std::round(2.1 * size);
   const double gap = std::max(1.0, std::round(0.16 * row.height));
   addSwatch(overlay, row, left, swatch, gap, encodeSrgb(color));
   LevelRow box = row;
   box.height -= gap;
-  const std::string number = std::to_string(row.level);
+  const std::string name = levelName(row.level);
   const double baseline = std::round(box.baseline(size));
-  addText(overlay, number, size, left + (swatch - advanceOf(number, size)) / 2, baseline, inkOn(color));
+  addText(overlay, name, size, left + (swatch - advanceOf(name, size)) / 2, baseline, inkOn(color));
 
   const double shareRight = left + swatch + 0.5 * size + advanceOf("99.9 %", size);
   if (shareRight > column.right) return;
@@ -119,7 +124,7 @@ void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<Lev
     const double baseline = std::round(row.baseline(size));
     if (baseline - capHeight(size) < lastTop + 1.5 * size || baseline > column.bottom) continue;
     if (baseline - capHeight(size) < column.top) continue;
-    addText(overlay, std::to_string(row.level), size, left + swatch + 0.5 * size, baseline, kInk);
+    addText(overlay, levelName(row.level), size, left + swatch + 0.5 * size, baseline, kInk);
     lastTop = baseline - capHeight(size);
   }
 }
@@ -237,7 +242,9 @@ void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::s
     largestShare = std::max(largestShare, level->second);
   }
   if (size < kSmallestText) return addNarrowRows(overlay, column, rows, map);
-  for (const LevelRow& row : rows) addWideRow(overlay, column, row, size, largestShare, frame.roomy, map(row.level));
+  const double swatch = swatchWidth(shares, size);
+  for (const LevelRow& row : rows)
+    addWideRow(overlay, column, row, size, swatch, largestShare, frame.roomy, map(row.level));
 }
 
 void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale) {

@@ -273,14 +273,16 @@ class Plotter {
     }
     text(name, small_, left_ - 0.5 * em_ - advanceOf(name, small_), baselineIn(band, small_), kInk);
     if (frame_.panel.empty()) return;
-    const double left = frame_.panel.x0 + em_, width = (frame_.panel.x1 - em_ - left) / double(seen.size());
-    const double swatchWidth = std::min(width, 1.8 * em_);
-    int n = 0;
+    // The name of exact leaves is wider than a number.
+    const auto widthsOf = [&](int level) { return level == kExactDegree ? 2.0 : 1.0; };
+    double widths = 0;
+    for (const int level : seen) widths += widthsOf(level);
+    double left = frame_.panel.x0 + em_;
+    const double unit = std::min((frame_.panel.x1 - em_ - left) / widths, 1.8 * em_);
     for (const int level : seen) {
-      swatch({left + n * swatchWidth, double(band.y0), left + (n + 1) * swatchWidth, double(band.y1),
-              encodeSrgb(map(level))},
-             level, map);
-      ++n;
+      const double right = left + widthsOf(level) * unit;
+      swatch({left, double(band.y0), right, double(band.y1), encodeSrgb(map(level))}, level, map);
+      left = right;
     }
   }
 
@@ -294,13 +296,13 @@ class Plotter {
     }
   }
 
-  // Draws a box in a level's colour, with the level's number if it fits.
+  // Draws a box in a level's colour, with the level's name if it fits.
   void swatch(const BoxItem& item, int level, const LevelMap& map) {
     layout_.overlay.boxes.push_back(item);
-    const std::string number = std::to_string(level);
-    const double advance = advanceOf(number, small_);
+    const std::string name = levelName(level);
+    const double advance = advanceOf(name, small_);
     if (advance + 0.4 * em_ > item.x1 - item.x0) return;
-    text(number, small_, (item.x0 + item.x1 - advance) / 2, (item.y0 + item.y1 + capHeight(small_)) / 2,
+    text(name, small_, (item.x0 + item.x1 - advance) / 2, (item.y0 + item.y1 + capHeight(small_)) / 2,
          inkOn(map(level)));
   }
 

@@ -68,6 +68,14 @@ void visitTouching(const FieldData& field, const NodeBox& leaf, const Visit& vis
   });
 }
 
+/// The Legendre polynomial L_i at −1, 0 or 1.
+double legendreAtSign(int i, double x) {
+  if (x != 0) return x > 0 || i % 2 == 0 ? 1 : -1;
+  double value = i % 2 == 0 ? 1 : 0;
+  for (int n = 2; n <= i && value != 0; n += 2) value *= -(n - 1.0) / n;
+  return value;
+}
+
 /// A polynomial on a box. The coefficient of the Legendre product L_i(x) L_j(y) L_k(z) has the index
 /// (i · n + j) · n + k, where n = degree + 1.
 class Polynomial {
@@ -112,6 +120,18 @@ class Polynomial {
     double sum = 0;
     for (const double c : c_) sum += std::abs(c);
     return sum;
+  }
+
+  /// The value at a corner or at the centre of the box, whose coordinates are −1, 0 or 1 along all axes.
+  double valueAtSigns(const Vector3& local) const {
+    double value = 0;
+    std::size_t next = 0;
+    for (int i = 0; i < size_; ++i)
+      for (int j = 0; j < size_; ++j)
+        for (int k = 0; k < size_; ++k)
+          value += c_[next++] * legendreAtSign(i, local.x()) * legendreAtSign(j, local.y()) *
+                   legendreAtSign(k, local.z());
+    return value;
   }
 
   /// Returns an upper bound, on the box, of the length of the polynomial's gradient with respect to other coordinates.
@@ -222,38 +242,45 @@ class LeafBounder {
     double value, gradient;
   };
 
-  /// Bounds the difference where one or both leaves are exact. `other` knows the triangles that are nearest to its own
-  /// box. At a distance of `beyond` from the box, its distance is that to a triangle which is at most 2 · beyond farther
-  /// than the nearest one.
+  /// Bounds the difference where one or both leaves are exact.
   Difference exactDifference(const NodeBox& leaf, const NodeBox& other) {
     const Overlap both = overlap(leaf, other);
-    const Range own = rangeOf(leaf, leaf, both), others = rangeOf(other, leaf, both);
-    double value = std::abs(own.middle - others.middle) + own.deviation + others.deviation;
-    if (isExact(leaf) && isExact(other)) {
-      const double extent = field_.blend * double(std::min(leaf.width(), other.width()));
-      value = std::min(value, 2 * extent * smallestCell().norm());
-    }
-    const double rounding = kFloatRounding * (std::abs(own.middle) + space_.diagonal);
-    return {value * (1 + kFloatRounding) + rounding, own.gradient + others.gradient};
+    const double value = isExact(leaf) && isExact(other) ? mostBeyond(leaf, other) : sampledDifference(leaf, other, both);
+    return {value * (1 + kFloatRounding) + kFloatRounding * space_.diagonal,
+            slope(leaf, leaf, both) + slope(other, leaf, both)};
   }
 
-  /// The range of a leaf's function in an overlap, and an upper bound of its gradient in local coordinates of `leaf`.
-  struct Range {
-    double middle, deviation, gradient;
-  };
+  /// An exact leaf knows the triangles that are nearest to its own box. At a distance from the box, the nearest of them is
+  /// at most twice this distance farther than the nearest triangle of all.
+  double mostBeyond(const NodeBox& leaf, const NodeBox& other) const {
+    return 2 * field_.blend * double(std::min(leaf.width(), other.width())) * smallestCell().norm();
+  }
 
-  Range rangeOf(const NodeBox& from, const NodeBox& leaf, const Overlap& both) {
-    if (isExact(from)) {
-      const Vector3 centre = space_.lo + (0.5 * (both.lo + both.hi)).cwiseProduct(smallestCell());
-      const double middle = evaluateExactLeaf(field_.exact, field_.nodes[from.node], centre).value;
-      const double radius = 0.5 * (both.hi - both.lo).cwiseProduct(smallestCell()).norm();
-      return {middle, radius, 0.5 * double(leaf.width()) * smallestCell().maxCoeff() * (1 + kFloatRounding)};
+  /// Estimates the greatest difference between an exact distance and a polynomial from its values at the corners and the
+  /// centre of the overlap. A distance has no derivatives by which a polynomial that comes close to it could be compared
+  /// with it everywhere.
+  double sampledDifference(const NodeBox& leaf, const NodeBox& other, const Overlap& both) {
+    constexpr double kMargin = 4;
+    const NodeBox& exact = isExact(leaf) ? leaf : other;
+    const NodeBox& polynomial = isExact(leaf) ? other : leaf;
+    restrict(ofOther_, polynomial, both, degree(polynomial) + 1);
+    double most = 0;
+    for (int n = 0; n < 9; ++n) {
+      const Vector3 local = n == 8 ? Vector3(0, 0, 0) : Vector3(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1);
+      const Vector3 at = 0.5 * (both.lo + both.hi) + 0.5 * local.cwiseProduct(both.hi - both.lo);
+      const Vector3 x = space_.lo + at.cwiseProduct(smallestCell());
+      const double distance = evaluateExactLeaf(field_.exact, field_.nodes[exact.node], x).value;
+      most = std::max(most, std::abs(distance - ofOther_.valueAtSigns(local)));
     }
+    return kMargin * most;
+  }
+
+  /// An upper bound of the gradient of a leaf's function in an overlap, in local coordinates of `leaf`.
+  double slope(const NodeBox& from, const NodeBox& leaf, const Overlap& both) {
+    if (isExact(from)) return 0.5 * double(leaf.width()) * smallestCell().maxCoeff() * (1 + kFloatRounding);
     restrict(ofOther_, from, both, degree(from) + 1);
-    const double middle = ofOther_.at(0, 0, 0), magnitude = ofOther_.magnitude();
     const Vector3 perUnit = double(leaf.width()) * (both.hi - both.lo).cwiseInverse();
-    return {middle, magnitude - std::abs(middle) + kFloatRounding * magnitude,
-            ofOther_.gradientBound(perUnit) * (1 + kFloatRounding) + kFloatRounding * magnitude};
+    return ofOther_.gradientBound(perUnit) * (1 + kFloatRounding) + kFloatRounding * ofOther_.magnitude();
   }
 
   /// The edges of the smallest possible cell, world units.

@@ -10,7 +10,8 @@ namespace hpsdf::render {
 constexpr double kFloatRounding = 4e-6;
 
 /// Bounds of the blended field F within a leaf. F = f + (Σ wₙ dₙ) / (Σ wₙ), where f is the polynomial or
-/// exact distance of this leaf, wₙ is the blending weight of leaf n, and dₙ is the function of leaf n minus f.
+/// exact distance of this leaf, wₙ is the blending weight of leaf n, and dₙ is the function of leaf n minus f. Where a
+/// polynomial meets an exact distance, the bound of their difference is an estimate from samples.
 struct BlendZoneBounds {
   float valueDifference = 0;     ///< upper bound of |dₙ| where wₙ > 0, and therefore of |F − f|
   float gradientDifference = 0;  ///< upper bound of |∇dₙ| where wₙ > 0, in local coordinates

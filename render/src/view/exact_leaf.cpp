@@ -48,7 +48,8 @@ Closest closestOnTriangle(const std::array<Vector3, 3>& v, const Vector3& x) {
 struct NearestFeature {
   double distance = std::numeric_limits<double>::infinity();
   Vector3 point;
-  std::vector<std::uint32_t> vertices;  ///< one for a vertex, two for an edge, three for a face
+  std::array<std::uint32_t, 3> vertices;  ///< the first one for a vertex, two for an edge, all three for a face
+  int count;                              ///< number of vertices of the feature
 };
 
 NearestFeature nearestFeature(const ExactTriangles& exact, std::uint64_t bits, const Vector3& x) {
@@ -57,9 +58,9 @@ NearestFeature nearestFeature(const ExactTriangles& exact, std::uint64_t bits, c
     const Closest closest = closestOnTriangle(cornersOf(exact, triangle), x);
     const double distance = (x - closest.point).norm();
     if (!(distance < nearest.distance)) return;
-    nearest = {distance, closest.point, {}};
+    nearest = {distance, closest.point, {}, 0};
     for (int k = 0; k < 3; ++k)
-      if (closest.corners[k]) nearest.vertices.push_back(exact.triangles[triangle][k]);
+      if (closest.corners[k]) nearest.vertices[nearest.count++] = exact.triangles[triangle][k];
   });
   return nearest;
 }
@@ -69,10 +70,10 @@ Vector3 pseudonormal(const ExactTriangles& exact, std::uint64_t bits, const Near
   Vector3 sum = Vector3::Zero();
   forEachListed(exact, bits, [&](std::uint32_t triangle) {
     const auto& corners = exact.triangles[triangle];
-    const auto has = [&](std::uint32_t vertex) { return std::ranges::find(corners, vertex) != corners.end(); };
-    if (!std::ranges::all_of(feature.vertices, has)) return;
+    for (int i = 0; i < feature.count; ++i)
+      if (std::ranges::find(corners, feature.vertices[i]) == corners.end()) return;
     double weight = 1;
-    if (feature.vertices.size() == 1) {
+    if (feature.count == 1) {
       const auto k = std::ranges::find(corners, feature.vertices[0]) - corners.begin();
       const std::array<Vector3, 3> v = cornersOf(exact, triangle);
       const Vector3 a = v[(k + 1) % 3] - v[k], b = v[(k + 2) % 3] - v[k];
@@ -109,7 +110,7 @@ ValueAndGradient evaluateExactLeaf(const ExactTriangles& exact, std::uint64_t bi
   const ExactSign rule = node::exactSign(bits);
   const bool positive = rule == ExactSign::pseudonormal ? outside : rule == ExactSign::positive;
   const double value = positive ? nearest.distance : -nearest.distance;
-  if (nearest.vertices.size() == 3 || !(nearest.distance > 0))
+  if (nearest.count == 3 || !(nearest.distance > 0))
     return {value - exact.offset, positive == outside ? normal : Vector3(-normal)};
   return {value - exact.offset, away / value};
 }

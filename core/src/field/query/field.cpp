@@ -176,6 +176,11 @@ void Field::forEachCell(const std::function<void(const Cell&)>& visit) const {
   });
 }
 
+std::string levelName(int level) {
+  static_assert(kExactDegree > kMaxDepth);
+  return level == kExactDegree ? "exact" : std::to_string(level);
+}
+
 FieldStatistics statistics(const Field& field) {
   FieldStatistics s;
   const double domainVolume = (field.domain().max() - field.domain().min()).prod();
