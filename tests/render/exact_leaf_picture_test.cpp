@@ -59,7 +59,8 @@ std::vector<SliceView> slices(const Field& field) {
       axisSlice(domain, 2, domain.center().z() + 0.013 * domain.sizes().z(), kWidth, kHeight),
       axisSlice(domain, 0, domain.center().x(), kWidth, kHeight),
       planeSlice(domain, domain.center(), Vector3(1, -2, 0.5), kWidth, kHeight)};
-  for (SliceView& view : views) view.origin += 0.00137 * view.right + 0.00211 * view.up;  // no samples on faces of cells
+  for (SliceView& view : views)
+    view.origin += 0.00137 * view.right + 0.00211 * view.up;  // no samples on faces of cells
   return views;
 }
 
@@ -229,8 +230,11 @@ TEST_P(ExactLeafPicture, differsForAWrongTriangle) {
   HPSDF_REQUIRE_GL();
   const Field& field = part().field;
   FieldData data = field.data();
-  std::visit([&](auto& vertices) { for (auto& v : vertices) v.array() += float(2e-5 * part().size); },
-             data.exact.vertices);
+  std::visit(
+      [&](auto& vertices) {
+        for (auto& v : vertices) v.array() += float(2e-5 * part().size);
+      },
+      data.exact.vertices);
   const Field wrong(std::move(data));
   const Camera camera = cameras(field, 1, 5).front();
   const SliceView slice = slices(field).front();

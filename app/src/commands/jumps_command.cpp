@@ -98,8 +98,8 @@ std::string worstText(const Jumps& jumps, JumpKind by, std::size_t count) {
     const Interface& face = jumps.interfaces[n];
     text += fmt::format("  {:>4} {:>10} {:>10}  {:<34} {:>4}  {:<16} {}\n", ++rank, shortNumber(face.value.max),
                         shortNumber(face.gradient.max), vectorText(face.worst), "xyz"[face.axis],
-                        fmt::format("{}|{}, {}|{}", levelName(face.degrees[0]), levelName(face.degrees[1]), face.depths[0],
-                                    face.depths[1]),
+                        fmt::format("{}|{}, {}|{}", levelName(face.degrees[0]), levelName(face.degrees[1]),
+                                    face.depths[0], face.depths[1]),
                         fmt::format("{}|{}", face.cells[0], face.cells[1]));
   }
   return text;
@@ -124,9 +124,9 @@ void writeTable(const Jumps& jumps, const std::string& file) {
   for (const Interface& face : jumps.interfaces)
     out.write(fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", face.cells[0], face.cells[1],
                           levelName(face.degrees[0]), levelName(face.degrees[1]), face.depths[0], face.depths[1],
-                          face.axis, face.area,
-                          face.center.x(), face.center.y(), face.center.z(), face.value.rms, face.value.max,
-                          face.gradient.rms, face.gradient.max, face.worst.x(), face.worst.y(), face.worst.z()));
+                          face.axis, face.area, face.center.x(), face.center.y(), face.center.z(), face.value.rms,
+                          face.value.max, face.gradient.rms, face.gradient.max, face.worst.x(), face.worst.y(),
+                          face.worst.z()));
   out.commit();
 }
 

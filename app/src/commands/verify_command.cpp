@@ -254,7 +254,8 @@ std::string worstScript(const Session& session, const Verified& verified, const 
   text += fmt::format("show slice\ncolor error mesh={}\n", scriptWord(verified.surface));
   int rank = 0;
   for (const WorstPoint& at : verified.figures.worst) {
-    text += fmt::format("# {}: error {}, degree {}, depth {}\n", ++rank, shortNumber(at.error()), levelName(at.degree), at.depth);
+    text += fmt::format("# {}: error {}, degree {}, depth {}\n", ++rank, shortNumber(at.error()), levelName(at.degree),
+                        at.depth);
     text += fmt::format("fly to={},{},{}\nshot output={}\n", at.point.x(), at.point.y(), at.point.z(),
                         scriptWord(fmt::format("{}-{}.png", file.stem().string(), rank)));
   }

@@ -16,12 +16,8 @@ namespace {
 /// Returns the value, gradient and cell of a field at a point, as JSON.
 Json pointFigures(const Vector3& position, double value, std::uint32_t cell, int degree, int depth,
                   const Vector3& gradient) {
-  return {{"position", vectorJson(position)},
-          {"value", value},
-          {"cell", cell},
-          {"degree", degreeJson(degree)},
-          {"depth", depth},
-          {"gradient", vectorJson(gradient)},
+  return {{"position", vectorJson(position)}, {"value", value}, {"cell", cell},
+          {"degree", degreeJson(degree)},     {"depth", depth}, {"gradient", vectorJson(gradient)},
           {"slope", gradient.norm()}};
 }
 

@@ -57,9 +57,9 @@ std::vector<std::string> readoutText(const Readout& r) {
   const Vector3& x = r.pick.position;
   std::string first = fmt::format("({:.5g}, {:.5g}, {:.5g})   f {:.6g}", x.x(), x.y(), x.z(), r.value);
   if (r.exact) first += fmt::format("   exact {:.6g}   error {:.3g}", *r.exact, r.value - *r.exact);
-  std::string second =
-      fmt::format("cell {}   degree {}   depth {}   gradient ({:.4g}, {:.4g}, {:.4g}), length {:.4g}", r.pick.cell,
-                  levelName(r.pick.degree), r.pick.depth, r.gradient.x(), r.gradient.y(), r.gradient.z(), r.gradient.norm());
+  std::string second = fmt::format("cell {}   degree {}   depth {}   gradient ({:.4g}, {:.4g}, {:.4g}), length {:.4g}",
+                                   r.pick.cell, levelName(r.pick.degree), r.pick.depth, r.gradient.x(), r.gradient.y(),
+                                   r.gradient.z(), r.gradient.norm());
   if (std::isfinite(r.toFace))
     second += fmt::format("   nearest face: jump {} of f, {} of its gradient", shortNumber(r.valueJump.max),
                           shortNumber(r.gradientJump.max));

@@ -23,8 +23,8 @@ std::string histogram(std::string_view name, const std::map<int, double>& volume
   std::string text = fmt::format("\n  {:<8} {:>8} {:>12}\n", name, "volume", "leaves");
   for (const auto& [level, share] : volume) {
     const int cells = share > 0 ? std::max(1, static_cast<int>(std::lround(share * kHistogramColumns))) : 0;
-    text +=
-        fmt::format("  {:>8} {:>6.2f} % {:>12}  {:▇<{}}\n", levelName(level), 100 * share, grouped(leaves.at(level)), "", cells);
+    text += fmt::format("  {:>8} {:>6.2f} % {:>12}  {:▇<{}}\n", levelName(level), 100 * share,
+                        grouped(leaves.at(level)), "", cells);
   }
   return text;
 }

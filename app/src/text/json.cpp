@@ -2,7 +2,6 @@
 
 #include "hpsdf/field.h"
 
-
 namespace hpsdf::app {
 
 Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }

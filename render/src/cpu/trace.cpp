@@ -384,8 +384,8 @@ class TraceField::March {
     const Vector3 direction = ray_.direction.cwiseProduct(field_.space_.size).cwiseQuotient(field_.space_.grid);
     const RayPart part{field_.worldPoint(pointAt(t_)), direction, -std::min(t_, kBack * nudge_), toExit + nudge_};
     const bool hasCrossing = node::exactSign(field_.field_.nodes[leaf.at.node]) == ExactSign::pseudonormal;
-    const auto crossing = hasCrossing ? firstCrossing(field_.field_.exact, field_.field_.nodes[leaf.at.node], part, side_)
-                                      : std::nullopt;
+    const auto crossing =
+        hasCrossing ? firstCrossing(field_.field_.exact, field_.field_.nodes[leaf.at.node], part, side_) : std::nullopt;
     if (crossing) {
       const double t = t_ + crossing->t;
       return Hit{t, leaf.at, localAt(leaf.at, t), false, crossing->triangle};

@@ -79,8 +79,8 @@ class TraceField {
   /// Returns true if leaves other than the one that contains the point may have a blending weight there.
   bool inBlendZone(const CellPoint& at) const;
 
-  /// The function of one leaf, without blending, at the point `p`, in grid coordinates. `local` are the local coordinates
-  /// of this point.
+  /// The function of one leaf, without blending, at the point `p`, in grid coordinates. `local` are the local
+  /// coordinates of this point.
   Sample sampleLeaf(std::uint32_t leaf, int depth, const Vector3& local, const Vector3& p) const;
   /// The blended field by its definition: the weighted mean of the functions of all leaves whose blending weights at
   /// the point are above 0.
@@ -102,7 +102,8 @@ class TraceField {
   void descend(CellPoint& at) const;
   /// Descends to the leaf at a point, but stops earlier at a node whose range of field values excludes `offset`.
   CellPoint relevantNodeAt(const Vector3& p, double offset) const;
-  /// The derivative of the linear part of a leaf's polynomial along a direction in local coordinates; 0 for an exact leaf.
+  /// The derivative of the linear part of a leaf's polynomial along a direction in local coordinates; 0 for an exact
+  /// leaf.
   double linearSlope(std::uint32_t leaf, const Vector3& direction) const;
   bool excludes(std::uint32_t node, double offset) const;
   /// Returns true if f crosses `offset` within a leaf where the triangles of the leaf are, and nowhere else.

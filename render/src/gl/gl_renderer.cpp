@@ -84,8 +84,10 @@ struct Resources {
   Resources(const Field& whole, const std::vector<SurfaceBounds>& bounds, const std::vector<BlendZoneBounds>& zones)
       : field(whole, bounds, zones),
         slice(linkedProgram({"full_screen.vert"}, {"field.glsl", functions(whole), leaves(whole), "slice.frag"})),
-        march(linkedProgram({"surface.vert"}, {"field.glsl", functions(whole), leaves(whole), "surface.glsl", "surface_march.frag"})),
-        hit(linkedProgram({"surface.vert"}, {"field.glsl", functions(whole), leaves(whole), "surface.glsl", "surface_hit.frag"})) {
+        march(linkedProgram({"surface.vert"},
+                            {"field.glsl", functions(whole), leaves(whole), "surface.glsl", "surface_march.frag"})),
+        hit(linkedProgram({"surface.vert"},
+                          {"field.glsl", functions(whole), leaves(whole), "surface.glsl", "surface_hit.frag"})) {
     const FieldData& data = whole.data();
     for (const GlProgram* program : {&slice, &march, &hit}) {
       glProgramUniform3ui(program->name(), kGrid, data.grid[0], data.grid[1], data.grid[2]);
@@ -316,10 +318,10 @@ class GlRenderer final : public Renderer {
   std::vector<SurfaceBounds> bounds_;
   std::unique_ptr<Resources> resources_;
   std::optional<double> triangleLevel_;  ///< value of the field on the triangles of exact leaves, if it has such leaves
-  int stepsInPass_;                   ///< greatest number of steps of a ray in one pass of the march
-  int refinements_;                   ///< greatest number of iterations that refine a root
-  std::vector<Texel> integers_;       ///< integer outputs of the shaders for the last tile
-  std::vector<NormalTexel> normals_;  ///< normals for the last tile
+  int stepsInPass_;                      ///< greatest number of steps of a ray in one pass of the march
+  int refinements_;                      ///< greatest number of iterations that refine a root
+  std::vector<Texel> integers_;          ///< integer outputs of the shaders for the last tile
+  std::vector<NormalTexel> normals_;     ///< normals for the last tile
 };
 
 }  // namespace

@@ -13,8 +13,8 @@ namespace hpsdf::render {
 /// rises monotonically.
 LinearColor orderedColor(double t);
 
-/// The colour of exact leaves: a brick red. It is far from all colours of the ordered colour map, and stays so for people
-/// with protanopia, deuteranopia or tritanopia.
+/// The colour of exact leaves: a brick red. It is far from all colours of the ordered colour map, and stays so for
+/// people with protanopia, deuteranopia or tritanopia.
 LinearColor exactColor();
 
 /// Colours for levels (polynomial degrees or octree depths, 0 to 255), spread evenly over the colour map. The degree of

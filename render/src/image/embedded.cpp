@@ -23,13 +23,13 @@
   __attribute__((visibility("hidden"))) extern const unsigned char hpsdf_embedded_##symbol##_end[]; \
   }
 
-#define HPSDF_FOR_EACH_SHADER(use)                                                              \
-  use(bodies_frag, "bodies.frag") use(bodies_vert, "bodies.vert") use(field_glsl, "field.glsl") \
-      use(full_screen_vert, "full_screen.vert") use(leaves_alone_glsl, "leaves_alone.glsl")     \
+#define HPSDF_FOR_EACH_SHADER(use)                                                                    \
+  use(bodies_frag, "bodies.frag") use(bodies_vert, "bodies.vert") use(field_glsl, "field.glsl")       \
+      use(full_screen_vert, "full_screen.vert") use(leaves_alone_glsl, "leaves_alone.glsl")           \
           use(leaves_blended_glsl, "leaves_blended.glsl") use(leaves_exact_glsl, "leaves_exact.glsl") \
-          use(leaves_polynomial_glsl, "leaves_polynomial.glsl") use(slice_frag, "slice.frag")         \
-              use(surface_glsl, "surface.glsl") use(surface_vert, "surface.vert")               \
-                  use(surface_hit_frag, "surface_hit.frag") use(surface_march_frag, "surface_march.frag")
+              use(leaves_polynomial_glsl, "leaves_polynomial.glsl") use(slice_frag, "slice.frag")     \
+                  use(surface_glsl, "surface.glsl") use(surface_vert, "surface.vert")                 \
+                      use(surface_hit_frag, "surface_hit.frag") use(surface_march_frag, "surface_march.frag")
 #define HPSDF_EMBED_SHADER(symbol, name) HPSDF_EMBED(symbol, HPSDF_SHADER_DIR "/" name)
 
 HPSDF_EMBED(font, HPSDF_FONT_FILE)

@@ -7,8 +7,8 @@ namespace {
 std::string describeRuns(const std::vector<int>& levels) {
   std::string text;
   for (std::size_t i = 0, last; i < levels.size(); i = last + 1) {
-    for (last = i; last + 1 < levels.size() && levels[last + 1] == levels[last] + 1 &&
-                   levels[last + 1] != kExactDegree;)
+    for (last = i;
+         last + 1 < levels.size() && levels[last + 1] == levels[last] + 1 && levels[last + 1] != kExactDegree;)
       ++last;
     text += (i == 0 ? "" : ", ") + levelName(levels[i]);
     if (last > i) text += "–" + levelName(levels[last]);

@@ -129,8 +129,8 @@ class Polynomial {
     for (int i = 0; i < size_; ++i)
       for (int j = 0; j < size_; ++j)
         for (int k = 0; k < size_; ++k)
-          value += c_[next++] * legendreAtSign(i, local.x()) * legendreAtSign(j, local.y()) *
-                   legendreAtSign(k, local.z());
+          value +=
+              c_[next++] * legendreAtSign(i, local.x()) * legendreAtSign(j, local.y()) * legendreAtSign(k, local.z());
     return value;
   }
 
@@ -245,20 +245,21 @@ class LeafBounder {
   /// Bounds the difference where one or both leaves are exact.
   Difference exactDifference(const NodeBox& leaf, const NodeBox& other) {
     const Overlap both = overlap(leaf, other);
-    const double value = isExact(leaf) && isExact(other) ? mostBeyond(leaf, other) : sampledDifference(leaf, other, both);
+    const double value =
+        isExact(leaf) && isExact(other) ? mostBeyond(leaf, other) : sampledDifference(leaf, other, both);
     return {value * (1 + kFloatRounding) + kFloatRounding * space_.diagonal,
             slope(leaf, leaf, both) + slope(other, leaf, both)};
   }
 
-  /// An exact leaf knows the triangles that are nearest to its own box. At a distance from the box, the nearest of them is
-  /// at most twice this distance farther than the nearest triangle of all.
+  /// An exact leaf knows the triangles that are nearest to its own box. At a distance from the box, the nearest of them
+  /// is at most twice this distance farther than the nearest triangle of all.
   double mostBeyond(const NodeBox& leaf, const NodeBox& other) const {
     return 2 * field_.blend * double(std::min(leaf.width(), other.width())) * smallestCell().norm();
   }
 
-  /// Estimates the greatest difference between an exact distance and a polynomial from its values at the corners and the
-  /// centre of the overlap. A distance has no derivatives by which a polynomial that comes close to it could be compared
-  /// with it everywhere.
+  /// Estimates the greatest difference between an exact distance and a polynomial from its values at the corners and
+  /// the centre of the overlap. A distance has no derivatives by which a polynomial that comes close to it could be
+  /// compared with it everywhere.
   double sampledDifference(const NodeBox& leaf, const NodeBox& other, const Overlap& both) {
     constexpr double kMargin = 4;
     const NodeBox& exact = isExact(leaf) ? leaf : other;

@@ -115,7 +115,8 @@ ValueAndGradient evaluateExactLeaf(const ExactTriangles& exact, std::uint64_t bi
   return {value - exact.offset, away / value};
 }
 
-std::optional<Crossing> firstCrossing(const ExactTriangles& exact, std::uint64_t bits, const RayPart& ray, double side) {
+std::optional<Crossing> firstCrossing(const ExactTriangles& exact, std::uint64_t bits, const RayPart& ray,
+                                      double side) {
   std::optional<Crossing> first;
   forEachListed(exact, bits, [&](std::uint32_t triangle) {
     std::array<Vector3, 3> v = cornersOf(exact, triangle);

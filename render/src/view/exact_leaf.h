@@ -1,6 +1,6 @@
 #pragma once
-// Exact leaves in double precision, for bounds and for the CPU renderer. This code is simpler than the queries of a field
-// and shares nothing with them, so that tests can compare the two.
+// Exact leaves in double precision, for bounds and for the CPU renderer. This code is simpler than the queries of a
+// field and shares nothing with them, so that tests can compare the two.
 
 #include <cstdint>
 #include <optional>
@@ -41,8 +41,8 @@ struct RayPart {
   double first, last;
 };
 
-/// Finds the first crossing of a ray through a listed triangle, from its outer to its inner side if `side` is positive, or
-/// the other way if it is negative. A ray through a common edge of triangles crosses at least one of them.
+/// Finds the first crossing of a ray through a listed triangle, from its outer to its inner side if `side` is positive,
+/// or the other way if it is negative. A ray through a common edge of triangles crosses at least one of them.
 std::optional<Crossing> firstCrossing(const ExactTriangles& exact, std::uint64_t bits, const RayPart& ray, double side);
 
 }  // namespace hpsdf::render

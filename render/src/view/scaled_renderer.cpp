@@ -18,7 +18,9 @@ Field scaled(const Field& field, double factor) {
       data.coefficients);
   std::visit(
       [&](auto& vertices) {
-        for (auto& v : vertices) v = (factor * v.template cast<double>()).template cast<typename std::remove_reference_t<decltype(v)>::Scalar>();
+        for (auto& v : vertices)
+          v = (factor * v.template cast<double>())
+                  .template cast<typename std::remove_reference_t<decltype(v)>::Scalar>();
       },
       data.exact.vertices);
   data.exact.offset *= factor;

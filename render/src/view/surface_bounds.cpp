@@ -60,8 +60,8 @@ SurfaceBounds leafBounds(const T* c, int degree) {
           .linear = linearPart(c, degree)};
 }
 
-/// Bounds of an exact leaf whose distance at the centre is `central`. `half` is half of the leaf's box. A distance changes
-/// by at most the length of the way, so that the linear part is the value at the centre alone.
+/// Bounds of an exact leaf whose distance at the centre is `central`. `half` is half of the leaf's box. A distance
+/// changes by at most the length of the way, so that the linear part is the value at the centre alone.
 SurfaceBounds exactLeafBounds(double central, const Vector3& half, double rounding) {
   const double range = half.norm() * (1 + kFloatRounding) + rounding;
   return {.lo = static_cast<float>(central - range),

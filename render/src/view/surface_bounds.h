@@ -15,8 +15,8 @@ constexpr float kExactCurve = 1e30F;
 /// Bounds of the field within a node. With them, a ray can skip a node without an evaluation of the field, and step
 /// within a leaf without missing a root. All bounds except the range [lo, hi] are for the leaf's polynomial, before
 /// blending. They follow from the coefficients and from bounds of the Legendre polynomials L_i on [−1, 1]: |L_i| ≤ 1,
-/// |L_i'| ≤ i(i+1)/2 and |L_i''| ≤ (i−1)i(i+1)(i+2)/8. In an exact leaf, whose distance changes by at most the length of
-/// the way, the linear part is the value at the centre alone.
+/// |L_i'| ≤ i(i+1)/2 and |L_i''| ≤ (i−1)i(i+1)(i+2)/8. In an exact leaf, whose distance changes by at most the length
+/// of the way, the linear part is the value at the centre alone.
 struct SurfaceBounds {
   float lo;  ///< lower bound of the field within the node, including any blending
   float hi;  ///< upper bound of the field within the node, including any blending
