@@ -165,6 +165,25 @@ TEST(ExactLeafContinuity, leavesExactLeavesAlone) {
   EXPECT_EQ(alone.data().coefficients, made.data().coefficients);
 }
 
+TEST(ExactLeafContinuity, changesNothingNearTheSurface) {
+  for (const CoefficientType type : {CoefficientType::float64, CoefficientType::float32}) {
+    BuildOptions options = hpx();
+    options.coefficients = type;
+    options.exactTriangles = 6;
+    const Built built(options);
+    const Field made = weaklyContinuous(built.field, {.weight = 0.1}).field;
+    int planes = 0;
+    for (const Vector3& place : placesIn(made.domain(), 5000)) {
+      const Vector3 x = place - (1 - 1e-3) * (place - built.exact.closestPoint(place).point);
+      const Cell cell = made.cellAt(x);
+      if (!made.domain().contains(x) || cell.degree == kExactDegree || std::abs(built.exact(x)) > 0.009) continue;
+      ++planes;
+      EXPECT_NEAR(made.value(x), built.exact(x), type == CoefficientType::float32 ? 1e-6 : 1e-12);
+    }
+    EXPECT_GT(planes, 100) << "where the surface is plane, leaves are linear polynomials";
+  }
+}
+
 TEST(ExactLeafContinuity, isAppliedDuringTheConstruction) {
   BuildOptions options = hpx();
   options.continuityWeight = 0.1;

@@ -22,7 +22,8 @@ struct WeaklyContinuous {
 /// `threads` (0: all that the machine offers). Float coefficients are converted to double and rounded again at the end.
 /// In the metadata of the result, the weight λ is stored, and the error estimates grow by the change of the field and
 /// by the second rounding. The proven bounds of `field` are dropped because they do not hold for the new polynomials.
-/// Exact leaves do not change, and their neighbours adapt to them.
+/// Exact leaves, and the linear polynomials in their place where the surface is plane, do not change; their neighbours
+/// adapt to them.
 ///
 /// Throws `Error` for options out of range; for a field that is weakly continuous already, because its original
 /// polynomials f₀ are lost; and if the tolerance is not reached within `maxIterations`. Throws `Cancelled` when

@@ -179,9 +179,12 @@ double ByteBudget::growthLimit(double exactBytes) const {
 void ByteBudget::requireRoomForFirstCells(double bytes, double leastBytes, double exactBytes) const {
   const double missing = std::max(leastBytes - limit_, bytes - growthLimit(exactBytes));
   if (!(missing > 0)) return;
-  if (exactBytes > 0 && exactBytes > missing)
+  const double cells = double(options_.grid[0]) * options_.grid[1] * options_.grid[2];
+  const bool mayLower = options_.criterion == Criterion::optimal;
+  const double baseGrid = cells * leafBytes(mayLower ? leastDegree(options_) : startDegree(options_));
+  if (exactBytes > 0 && baseGrid <= limit_)
     refuse("the exact cells near the surface and the cells around them take more than ", *options_.maxBytes,
-           " bytes: allow about ", std::ceil(double(*options_.maxBytes) * (1 + missing / limit_)),
+           " bytes: allow ", static_cast<std::uint64_t>(double(*options_.maxBytes) * (1 + missing / limit_)) + 1,
            ", more exact-triangles a cell, or a smaller exact-within");
   refuse("the base grid alone takes more than ", *options_.maxBytes, " bytes: allow more, or take a coarser grid");
 }

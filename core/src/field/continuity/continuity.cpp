@@ -40,8 +40,8 @@ void report(const Progress& progress, double fraction) {
 }
 
 /// Solves (M + λI)d = −Mx₀ − e by conjugate gradients with the matrix's diagonal as preconditioner. x₀ holds the
-/// coefficients of a field, and d is their change. The matrix M measures jumps, and the vector e belongs to the exact
-/// leaves, see `FaceCoupling`. λ is the weight of the change.
+/// coefficients of a field, and d is their change. The matrix M measures jumps, and the vector e belongs to the leaves
+/// that do not change, see `FaceCoupling`. λ is the weight of the change.
 class ConjugateGradients {
  public:
   ConjugateGradients(FaceCoupling& coupling, const WeakContinuity& options, const std::vector<double>& x0)
@@ -50,7 +50,7 @@ class ConjugateGradients {
       preconditioner_.push_back(static_cast<float>(1 / (entry + options.weight)));
     coupling_.apply(0, x0, residual_);
     for (double& r : residual_) r = -r;
-    for (std::size_t i = 0; i < coupling.exactPart().size(); ++i) residual_[i] -= coupling.exactPart()[i];
+    for (std::size_t i = 0; i < coupling.fixedPart().size(); ++i) residual_[i] -= coupling.fixedPart()[i];
   }
 
   /// Returns the solution d. Throws `Error` if the iteration does not reach the tolerance.

@@ -10,6 +10,7 @@
 
 #include "basis/legendre.h"
 #include "basis/projection.h"
+#include "field/query/blend.h"
 #include "field/query/evaluate.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
@@ -161,9 +162,20 @@ int quarterOf(const std::array<std::uint32_t, 2>& along, int level) {
   return static_cast<int>((along[0] >> level & 1) | (along[1] >> level & 1) << 1);
 }
 
+/// Returns true for the linear polynomials that strategy hpx makes where the surface is plane. They are as exact as
+/// exact leaves, and linear polynomials of slope 1 up to rounding. A fit of slope 1 is as exact.
+bool isDistanceToPlane(const FieldData& field, const query::OctreeNode& leaf) {
+  constexpr double kRounding = 1e-6;  // of coefficients that were rounded to float once
+  const std::uint64_t bits = field.nodes[leaf.node];
+  if (field.metadata.settings.strategy != Strategy::hpx || node::degree(bits) != 1) return false;
+  const double* c = &std::get<std::vector<double>>(field.coefficients)[node::offset(bits)];
+  const Vector3 slope = 2 * Vector3(c[3], c[2], c[1]).cwiseQuotient(query::cellSize(field, leaf.depth));
+  return std::abs(slope.norm() - 1) <= kRounding;
+}
+
 }  // namespace
 
-/// Gauss points along the axes of a face, with which traces of exact leaves are projected onto polynomials of a degree.
+/// Gauss points along the axes of a face, with which traces of fixed leaves are projected onto polynomials of a degree.
 struct FaceCoupling::FaceSamples {
   int degree;
   std::vector<double> points;
@@ -191,6 +203,7 @@ FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(query::allLeaves(fi
   for (const query::OctreeNode& leaf : leaves_) {
     const std::uint64_t bits = field.nodes[leaf.node];
     degree_.push_back(static_cast<std::uint8_t>(node::degree(bits)));
+    isFixed_.push_back(node::isExact(bits) || isDistanceToPlane(field, leaf));
     start_.push_back(start_.back() + (node::isExact(bits) ? 0 : coefficientCount(degree_.back())));
   }
   if (start_.back() > 0xffffffffu)
@@ -201,7 +214,7 @@ FaceCoupling::FaceCoupling(const FieldData& field) : leaves_(query::allLeaves(fi
   makeTraces();
   linkLeaves(field);
   groupLinksByLeaf();
-  findExactPart(field);
+  findFixedPart(field);
 }
 
 void FaceCoupling::makeTraces() {
@@ -224,7 +237,7 @@ void FaceCoupling::linkLeaves(const FieldData& field) {
   const auto linkChunk = [&](std::vector<Link>& links, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n)
       query::forEachInterface(field, leaves_[n], [&](int axis, int step, const query::OctreeNode& large) {
-        if (isExact(static_cast<std::uint32_t>(n)) && isExact(leafOfNode[large.node])) return;
+        if (isFixed_[n] && isFixed_[leafOfNode[large.node]]) return;
         Link& link = links.emplace_back(Link{.small = static_cast<std::uint32_t>(n),
                                              .large = leafOfNode[large.node],
                                              .along = {},
@@ -246,8 +259,8 @@ void FaceCoupling::linkLeaves(const FieldData& field) {
 /// Returns the degree of the jump across a face, as far as it depends on polynomials.
 int FaceCoupling::faceDegree(const Link& link) const {
   const int small = degree_[link.small], large = degree_[link.large];
-  if (isExact(link.small)) return large;
-  return isExact(link.large) ? small : std::max(small, large);
+  if (isFixed_[link.small]) return large;
+  return isFixed_[link.large] ? small : std::max(small, large);
 }
 
 void FaceCoupling::groupLinksByLeaf() {
@@ -317,18 +330,18 @@ void FaceCoupling::addFromFace(const Link& link, std::uint32_t leaf, int side, d
 /// Computes the jump across the face of link n: the small leaf's polynomial minus the large leaf's polynomial, as
 /// coefficients on the small leaf's face. The coefficients are scaled so that their squares sum to the face's part of
 /// xᵀMx. The numbers in x contain the square root of their leaf's volume as a factor; `scale` replaces the large leaf's
-/// volume by the small leaf's volume. An exact leaf counts as 0.
+/// volume by the small leaf's volume. A fixed leaf counts as 0.
 void FaceCoupling::computeJump(std::size_t n, const double* x) {
   const Link& link = links_[n];
   double* const jump = &jumps_[jumpStart_[n]];
-  if (isExact(link.large)) return restrictToFace(link, link.small, link.side, x, jump);
+  if (isFixed_[link.large]) return restrictToFace(link, link.small, link.side, x, jump);
   std::array<double, kMaxFaceCoefficients> large;
   restrictToFace(link, link.large, 1 - link.side, x, large.data());
   for (int level = link.levels; level-- > 0;)
     query::withDegree(degree_[link.large], [&](auto degree) {
       kQuarterRestriction.apply(large.data(), degree, quarterOf(link.along, level));
     });
-  const std::size_t smallCount = isExact(link.small) ? 0 : faceCoefficientCount(degree_[link.small]);
+  const std::size_t smallCount = isFixed_[link.small] ? 0 : faceCoefficientCount(degree_[link.small]);
   const std::size_t largeCount = faceCoefficientCount(degree_[link.large]);
   if (smallCount > 0) restrictToFace(link, link.small, link.side, x, jump);
   for (std::size_t c = smallCount; c < largeCount; ++c) jump[c] = 0;
@@ -354,20 +367,20 @@ void FaceCoupling::addJump(std::uint32_t leaf, std::size_t n, double* out) const
   addFromFace(link, leaf, 1 - link.side, -scale_[link.levels] / scale_[0], face, out);
 }
 
-/// Computes the part of the jump across the face of link n that comes from an exact leaf, in the same form as
-/// `computeJump`: the trace of the exact leaf with the sign that it has in the jump, projected onto the polynomials of
+/// Computes the part of the jump across the face of link n that comes from a fixed leaf, in the same form as
+/// `computeJump`: the trace of the fixed leaf with the sign that it has in the jump, projected onto the polynomials of
 /// the face's degree. The rest of the trace is orthogonal to the trace of the other leaf's polynomial. It adds a
 /// constant to the energy, which does not matter.
-void FaceCoupling::computeExactJump(const FieldData& field, std::size_t n, const FaceSamples& samples) {
+void FaceCoupling::computeFixedJump(const FieldData& field, std::size_t n, const FaceSamples& samples) {
   const Link& link = links_[n];
   double* const jump = &jumps_[jumpStart_[n]];
   const query::OctreeNode& small = leaves_[link.small];
-  const std::uint64_t exact = field.nodes[leaves_[isExact(link.small) ? link.small : link.large].node];
+  const query::OctreeNode& fixed = leaves_[isFixed_[link.small] ? link.small : link.large];
   const GridFrame frame = query::gridFrame(field);
   const auto coordinate = [&](int axis, double local) {
     return std::ldexp(static_cast<double>(small.cellIndex[axis]) + (local + 1) / 2, -small.depth);
   };
-  const double scale = (isExact(link.small) ? 1 : -1) * scale_[small.depth];
+  const double scale = (isFixed_[link.small] ? 1 : -1) * scale_[small.depth];
   const int axis0 = link.axis == 0 ? 1 : 0, axis1 = link.axis == 2 ? 1 : 2;
   std::array<double, 3> at;
   at[link.axis] = coordinate(link.axis, link.side == 0 ? -1 : 1);
@@ -376,34 +389,34 @@ void FaceCoupling::computeExactJump(const FieldData& field, std::size_t n, const
     for (std::size_t s1 = 0; s1 < samples.points.size(); ++s1) {
       at[axis0] = coordinate(axis0, samples.points[s0]);
       at[axis1] = coordinate(axis1, samples.points[s1]);
-      double distance = 0;
-      query::evaluateExact(field.exact, exact, query::worldPoint(frame, at), distance);
-      samples.project(s0, s1, scale * distance, jump);
+      const query::LeafPoint point =
+          query::leafPoint(field.nodes[fixed.node], fixed.depth, fixed.node, fixed.cellIndex, at);
+      samples.project(s0, s1, scale * query::evaluateLeaf<double>(field, frame, at, point), jump);
     }
 }
 
-/// Sets `exactPart_`. For x = 0, the jumps consist of their parts from exact leaves, and half of the gradient of their
+/// Sets `fixedPart_`. For x = 0, the jumps consist of their parts from fixed leaves, and half of the gradient of their
 /// energy is Jᵀ times these parts.
-void FaceCoupling::findExactPart(const FieldData& field) {
-  const auto hasExact = [&](const Link& link) { return isExact(link.small) || isExact(link.large); };
-  if (std::ranges::none_of(links_, hasExact)) return;
+void FaceCoupling::findFixedPart(const FieldData& field) {
+  const auto hasFixed = [&](const Link& link) { return isFixed_[link.small] || isFixed_[link.large]; };
+  if (std::ranges::none_of(links_, hasFixed)) return;
   std::vector<std::optional<FaceSamples>> samples(kMaxDegree + 1);
   for (const Link& link : links_)
-    if (auto& made = samples[faceDegree(link)]; hasExact(link) && !made) made.emplace(faceDegree(link));
+    if (auto& made = samples[faceDegree(link)]; hasFixed(link) && !made) made.emplace(faceDegree(link));
   std::ranges::fill(jumps_, 0.0);
   detail::forEachChunk(links_.size(), kLeavesPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
     for (std::size_t n = first; n < first + count; ++n)
-      if (hasExact(links_[n])) computeExactJump(field, n, *samples[faceDegree(links_[n])]);
+      if (hasFixed(links_[n])) computeFixedJump(field, n, *samples[faceDegree(links_[n])]);
   });
-  exactPart_.assign(start_.back(), 0.0);
+  fixedPart_.assign(start_.back(), 0.0);
   detail::forEachChunk(leaves_.size(), kLeavesPerTask,
-                       [&](std::size_t, std::size_t first, std::size_t count) { addJumps(first, count, exactPart_); });
+                       [&](std::size_t, std::size_t first, std::size_t count) { addJumps(first, count, fixedPart_); });
 }
 
 /// Adds the parts of some leaves in Jᵀ(Jx) to `out`, for all links of these leaves.
 void FaceCoupling::addJumps(std::size_t firstLeaf, std::size_t count, std::vector<double>& out) const {
   for (std::size_t leaf = firstLeaf; leaf < firstLeaf + count; ++leaf) {
-    if (degree_[leaf] == kExactDegree) continue;
+    if (isFixed_[leaf]) continue;
     for (std::size_t n = linksOfLeafStart_[leaf]; n < linksOfLeafStart_[leaf + 1]; ++n)
       addJump(static_cast<std::uint32_t>(leaf), linksOfLeaf_[n], out.data());
   }
@@ -427,7 +440,7 @@ std::vector<double> FaceCoupling::diagonal() const {
   std::vector<double> result(start_.back(), 0.0);
   for (const Link& link : links_)
     for (const std::uint32_t leaf : {link.small, link.large}) {
-      if (isExact(leaf)) continue;
+      if (isFixed_[leaf]) continue;
       const double share = leaf == link.small ? 1 : std::ldexp(1.0, -3 * link.levels);
       const auto& factor = traces_[degree_[leaf]][link.axis].factor[0];
       for (std::size_t c = 0; c < factor.size(); ++c) result[start_[leaf] + c] += share * factor[c] * factor[c];

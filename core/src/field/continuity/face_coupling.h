@@ -21,14 +21,16 @@ namespace hpsdf::continuity {
 /// restricted to the smaller face by repeated halving. This is exact, because the restriction does not raise the
 /// degree.
 ///
-/// Exact leaves have no coefficients in x and do not change. A face between a polynomial p and an exact leaf e
-/// contributes w_F ∫_F p² dA / |Ω| to xᵀMx. The rest of w_F ∫_F (p − e)² dA / |Ω| is linear in x or constant; half of
-/// the gradient of the linear part, summed over all such faces, is `exactPart`. Faces between two exact leaves are left
-/// out. Hence half of the gradient of the jumps' energy is Mx + exactPart.
+/// Some leaves are fixed: exact leaves, which have no coefficients in x, and the linear polynomials that take their
+/// place where the surface is plane. A face between a polynomial p and a fixed leaf e contributes w_F ∫_F p² dA / |Ω|
+/// to xᵀMx. The rest of w_F ∫_F (p − e)² dA / |Ω| is linear in x or constant; half of the gradient of the linear part,
+/// summed over all such faces, is `fixedPart`. Faces between two fixed leaves are left out. Hence half of the gradient
+/// of the jumps' energy is Mx + fixedPart.
 ///
 /// The methods run on TBB. Their results do not depend on the number of threads.
 class FaceCoupling {
  public:
+  /// The coefficients of the field must be double.
   explicit FaceCoupling(const FieldData& field);
 
   /// Returns the vector x of scaled coefficients of a field. The field must have the same octree as the field
@@ -43,7 +45,7 @@ class FaceCoupling {
 
   /// Returns the vector by which exact leaves add to half of the gradient of the jumps' energy. It is empty if the
   /// field has no exact leaves next to polynomials.
-  const std::vector<double>& exactPart() const { return exactPart_; }
+  const std::vector<double>& fixedPart() const { return fixedPart_; }
 
   /// Returns the diagonal of M. It is approximate for a leaf with smaller neighbours: each neighbour contributes
   /// a share of the integral over the leaf's whole face.
@@ -72,10 +74,9 @@ class FaceCoupling {
   void groupLinksByLeaf();
   void restrictToFace(const Link& link, std::uint32_t leaf, int side, const double* x, double* face) const;
   void addFromFace(const Link& link, std::uint32_t leaf, int side, double scale, const double* face, double* out) const;
-  bool isExact(std::uint32_t leaf) const { return degree_[leaf] == kExactDegree; }
   int faceDegree(const Link& link) const;
-  void findExactPart(const FieldData& field);
-  void computeExactJump(const FieldData& field, std::size_t link, const FaceSamples& samples);
+  void findFixedPart(const FieldData& field);
+  void computeFixedJump(const FieldData& field, std::size_t link, const FaceSamples& samples);
   void addJumps(std::size_t firstLeaf, std::size_t count, std::vector<double>& out) const;
   void computeJump(std::size_t link, const double* x);
   void addJump(std::uint32_t leaf, std::size_t link, double* out) const;
@@ -84,7 +85,8 @@ class FaceCoupling {
   std::vector<std::uint8_t> degree_;           ///< polynomial degree of each leaf, or `kExactDegree`
   std::vector<std::size_t> start_;             ///< index of each leaf's first entry in x; last, the length of x
   std::vector<double> scale_;                  ///< √(leaf volume V / domain volume |Ω|), by depth in the octree
-  std::vector<double> exactPart_;              ///< see `exactPart`
+  std::vector<double> fixedPart_;              ///< see `fixedPart`
+  std::vector<char> isFixed_;                  ///< for each leaf, whether it does not change
   std::vector<Link> links_;                    ///< the faces, in the order of their small leaves
   std::vector<double> jumps_;                  ///< face coefficients of the jumps for the x given to `apply` last
   std::vector<std::size_t> jumpStart_;         ///< by link: index of its first entry in `jumps_`; last, `jumps_.size()`
