@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "exact_leaf_bound.h"
 #include "hpsdf/detail/legendre_part.h"
 
 namespace hpsdf::physics {
@@ -16,14 +17,29 @@ constexpr double kUnits = 32;        // bounds are stored in 1/32 of the shortes
 constexpr double kTolerance = 0.05;  // accepted error of bounds of polynomials, in shortest cell edges
 constexpr double kRounding = 1e-12;  // upper bound of the relative rounding error of sums
 
-/// A polynomial in the local coordinates [−1, 1]³ of a box.
-struct Piece {
-  std::array<double, 3> lower, upper;  ///< corners of the box, in cells of the table
-  int degree;                          ///< at least 1, so that linear terms exist
-  std::vector<double> c;               ///< (degree + 1)³ coefficients, z fastest; 0 beyond the total degree
-  double rest = 0;                     ///< bound of the sum of terms that were left out
+/// A box in cells of the table.
+struct Extent {
+  std::array<double, 3> lower, upper;
 
   double width(int axis) const { return upper[axis] - lower[axis]; }
+  int widestAxis() const {
+    const auto widths = {width(0), width(1), width(2)};
+    return static_cast<int>(std::ranges::max_element(widths) - widths.begin());
+  }
+  double middle(int axis) const { return (lower[axis] + upper[axis]) / 2; }
+};
+
+/// A part of an exact leaf, with the triangles that can be nearest to points of the part.
+struct ExactPiece : Extent {
+  ExactLeafBound::Positions triangles;
+};
+
+/// A polynomial in the local coordinates [−1, 1]³ of a box.
+struct Piece : Extent {
+  int degree;             ///< at least 1, so that linear terms exist
+  std::vector<double> c;  ///< (degree + 1)³ coefficients, z fastest; 0 beyond the total degree
+  double rest = 0;        ///< bound of the sum of terms that were left out
+
   double at(int i, int j, int k) const { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
   double& at(int i, int j, int k) { return c[(std::size_t(i) * (degree + 1) + j) * (degree + 1) + k]; }
 
@@ -50,7 +66,7 @@ struct Piece {
     }
     if (kept == degree) return;
     rest += leftOut;
-    Piece smaller{lower, upper, kept, std::vector<double>(std::size_t(kept + 1) * (kept + 1) * (kept + 1), 0.0), rest};
+    Piece smaller{*this, kept, std::vector<double>(std::size_t(kept + 1) * (kept + 1) * (kept + 1), 0.0), rest};
     forEachTerm(0, kept, [&](int i, int j, int k) { smaller.at(i, j, k) = at(i, j, k); });
     *this = std::move(smaller);
   }
@@ -75,40 +91,72 @@ class LowerBounds {
         least_(std::size_t(size[0] * size[1] * size[2]), std::numeric_limits<double>::infinity()) {}
 
   std::vector<double> find() {
-    field_.forEachCell([&](const Cell& leaf) { bound(pieceOf(leaf)); });
+    field_.forEachCell([&](const Cell& leaf) {
+      const std::uint64_t bits = field_.data().nodes[leaf.id];
+      if (node::isExact(bits)) {
+        ExactLeafBound exact(field_.data().exact, bits);
+        return bound(exact, {extentOf(leaf), exact.all()});
+      }
+      bound(pieceOf(leaf, bits));
+    });
     return std::move(least_);
   }
 
  private:
-  /// Returns a leaf's polynomial over the box in which the leaf has a weight. A blended field is a weighted
-  /// mean of the polynomials of several leaves.
-  Piece pieceOf(const Cell& leaf) const {
-    const FieldData& data = field_.data();
+  /// Greatest width, in cells, of a part of an exact leaf that is not divided. A cell with the widest blended zones on
+  /// both sides has this width.
+  static constexpr double kPartWidth = 1 + 2 * kMaxBlend;
+
+  double edgeOf(const Cell& leaf) const { return std::ldexp(1.0, depth_ - leaf.depth); }
+
+  /// Returns how far a leaf has a weight beyond one of its faces, in cells of the table.
+  double extentBeyond(const Cell& leaf, int axis, bool upper) const {
+    const double blend = field_.data().blend;
+    if (blend == 0) return 0;
+    const int depth = blend_extent::depth(field_.lookupGrid().blendExtents[leaf.id], axis, upper);
+    return depth == blend_extent::kDomainFace ? 0 : blend * std::ldexp(1.0, depth_ - depth);
+  }
+
+  /// Returns the box in which a leaf has a weight. A blended field is a weighted mean of several leaves.
+  Extent extentOf(const Cell& leaf) const {
     const GridFrame& frame = field_.lookupGrid().frame;
-    const std::uint64_t bits = data.nodes[leaf.id];
+    Extent extent{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double from = leaf.box.min()[axis] - frame.lower[axis];
+      const double index = std::round(std::ldexp(from / frame.size[axis] * frame.cells[axis], leaf.depth));
+      extent.lower[axis] = index * edgeOf(leaf) - extentBeyond(leaf, axis, false);
+      extent.upper[axis] = (index + 1) * edgeOf(leaf) + extentBeyond(leaf, axis, true);
+    }
+    return extent;
+  }
+
+  Box worldBox(const Extent& extent) const {
+    const GridFrame& frame = field_.lookupGrid().frame;
+    Box box;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double cell = frame.size[axis] / double(size_[axis]);
+      box.min()[axis] = frame.lower[axis] + extent.lower[axis] * cell;
+      box.max()[axis] = frame.lower[axis] + extent.upper[axis] * cell;
+    }
+    return box;
+  }
+
+  /// Returns a leaf's polynomial over the box in which the leaf has a weight.
+  Piece pieceOf(const Cell& leaf, std::uint64_t bits) const {
+    const FieldData& data = field_.data();
     const int stored = node::degree(bits), degree = std::max(stored, 1);
-    Piece piece{{}, {}, degree, std::vector<double>(std::size_t(degree + 1) * (degree + 1) * (degree + 1))};
+    Piece piece{extentOf(leaf), degree, std::vector<double>(std::size_t(degree + 1) * (degree + 1) * (degree + 1))};
     std::visit(
         [&](const auto& coefficients) {
           std::size_t next = node::offset(bits);
           Piece::forEachTerm(0, stored, [&](int i, int j, int k) { piece.at(i, j, k) = coefficients[next++]; });
         },
         data.coefficients);
-    const double edge = std::ldexp(1.0, depth_ - leaf.depth);
+    if (data.blend == 0) return piece;
     for (int axis = 0; axis < 3; ++axis) {
-      const double from = leaf.box.min()[axis] - frame.lower[axis];
-      const double index = std::round(std::ldexp(from / frame.size[axis] * frame.cells[axis], leaf.depth));
-      piece.lower[axis] = index * edge;
-      piece.upper[axis] = piece.lower[axis] + edge;
-      if (data.blend == 0) continue;
-      const auto extentBeyond = [&](bool upper) {
-        const int depth = blend_extent::depth(field_.lookupGrid().blendExtents[leaf.id], axis, upper);
-        return depth == blend_extent::kDomainFace ? 0 : data.blend * std::ldexp(1.0, depth_ - depth);
-      };
-      const double below = extentBeyond(false), above = extentBeyond(true);
-      piece.lower[axis] -= below;
-      piece.upper[axis] += above;
-      piece.restrict(axis, detail::legendreOfPart((above - below) / edge, piece.width(axis) / edge, degree));
+      const double below = extentBeyond(leaf, axis, false), above = extentBeyond(leaf, axis, true);
+      piece.restrict(axis,
+                     detail::legendreOfPart((above - below) / edgeOf(leaf), piece.width(axis) / edgeOf(leaf), degree));
     }
     return piece;
   }
@@ -118,11 +166,9 @@ class LowerBounds {
   void bound(Piece piece) {
     piece.trim(tolerance_ / 8);
     const double nonlinear = piece.nonlinearBound();
-    const auto widths = {piece.width(0), piece.width(1), piece.width(2)};
-    const auto widest = std::ranges::max_element(widths);
-    if (nonlinear <= tolerance_ || *widest <= 1) return fill(piece, nonlinear);
-    const auto axis = static_cast<int>(widest - widths.begin());
-    const double middle = (piece.lower[axis] + piece.upper[axis]) / 2;
+    const int axis = piece.widestAxis();
+    if (nonlinear <= tolerance_ || piece.width(axis) <= 1) return fill(piece, nonlinear);
+    const double middle = piece.middle(axis);
     Piece upper = piece;
     upper.lower[axis] = middle;
     upper.restrict(axis, upperHalf_);
@@ -131,6 +177,23 @@ class LowerBounds {
     piece.restrict(axis, lowerHalf_);
     bound(std::move(piece));
   }
+
+  /// Divides the part of an exact leaf recursively until it is hardly larger than a cell of the table. Then lowers the
+  /// bounds of the cells that it overlaps.
+  void bound(ExactLeafBound& exact, ExactPiece piece) {
+    const int axis = piece.widestAxis();
+    const bool isSmall = piece.width(axis) <= kPartWidth;
+    const double least = exact.leastIn(worldBox(piece), isSmall, piece.triangles);
+    if (isSmall) return fill(constantPiece(piece, least), 0);
+    const double middle = std::round(piece.middle(axis));  // between cells, so that no part overlaps more than it must
+    ExactPiece upper = piece;
+    upper.lower[axis] = middle;
+    bound(exact, std::move(upper));
+    piece.upper[axis] = middle;
+    bound(exact, std::move(piece));
+  }
+
+  static Piece constantPiece(const Extent& extent, double value) { return {extent, 1, {value, 0, 0, 0, 0, 0, 0, 0}}; }
 
   /// Lowers the bound of each cell that the piece overlaps to the smallest value of the piece's linear part
   /// in the cell, minus `nonlinear`.

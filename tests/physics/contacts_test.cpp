@@ -18,10 +18,12 @@
 #include "hpsdf/continuity.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/safe_distance.h"
 #include "hpsdf/shapes.h"
 #include "poses.h"
 #include "support/random_field.h"
+#include "support/test_mesh.h"
 
 namespace hpsdf::physics {
 namespace contacts_test {
@@ -55,6 +57,10 @@ std::vector<Contact> unculled(const BodyPair& pair, double margin) {
 Field fieldOf(const std::string& shape, double targetError = 1e-5, bool bounds = false) {
   const TriangleMesh mesh = shapes::mesh(shape);
   return build(ExactDistance(mesh), domainAround(mesh), {.targetError = targetError, .bounds = bounds});
+}
+
+Field exactFieldOf(const TriangleMesh& mesh, Strategy strategy = Strategy::hpx) {
+  return build(ExactDistance(mesh), domainAround(mesh), {.strategy = strategy});
 }
 
 struct Compared {
@@ -117,6 +123,79 @@ TEST(Contacts, equalThoseOfAllSamplesInTheCoarsestFields) {
     const Field field = randomField(seed, {.roughness = 1});
     compare(field, samples, 100, 1.6, seed);
     compare(blended(field, 0.25), samples, 100, 1.6, seed);
+  }
+}
+
+TEST(Contacts, equalThoseOfAllSamplesInExactLeaves) {
+  const SurfaceSamples samples = sampleSurface(shapes::mesh("torus"), {.count = 1500});
+  for (const char* shape : {"gear", "box"}) {
+    const Field field = exactFieldOf(shapes::mesh(shape));
+    ASSERT_GT(statistics(field).degreeLeaves[kExactDegree], 10U);
+    expectWorth(compare(field, samples, 500, 1.6, 10));
+    expectWorth(compare(blended(field, 0.2), samples, 500, 1.6, 11));
+  }
+}
+
+/// The errors of contacts' depths, by the exact distance, over the size of the field's body.
+struct DepthErrors {
+  std::size_t contacts = 0;
+  double greatest = 0, squares = 0;
+
+  void add(double error) {
+    ++contacts;
+    greatest = std::max(greatest, error);
+    squares += error * error;
+  }
+  double meanSquare() const { return squares / double(contacts); }
+};
+
+struct ErrorsByDepth {
+  DepthErrors shallow, all;  ///< up to the depth to which fields are exact by default, and up to ten times that depth
+};
+
+/// Lets copies of a body meet at random and measures the errors of the depths.
+ErrorsByDepth depthErrors(const TriangleMesh& mesh, Strategy strategy) {
+  const Field field = exactFieldOf(mesh, strategy);
+  const FieldCollider collider(field);
+  const ExactDistance exact(mesh);
+  const Vector3 center = boundingBox(mesh).center();
+  const double size = boundingBox(mesh).sizes().maxCoeff(), shallow = BuildOptions{}.exactWithin * size;
+  const SurfaceSamples samples = sampleSurface(mesh, {.count = 2000});
+  std::mt19937_64 random(12);
+  ContactQuery query;
+  ErrorsByDepth errors;
+  for (int i = 0; i < 200; ++i) {
+    Eigen::Isometry3d pose = randomPose(random, 0.8 * size);
+    pose.translation() += center - pose.linear() * center;
+    for (const Contact& contact : query.find({&samples, pose, &collider, Eigen::Isometry3d::Identity()})) {
+      const double depth = -exact(contact.position), error = std::abs(contact.depth - depth) / size;
+      if (depth <= 10 * shallow) errors.all.add(error);
+      if (std::abs(depth) <= shallow) errors.shallow.add(error);
+    }
+  }
+  return errors;
+}
+
+void expectBetterDepths(const TriangleMesh& mesh) {
+  const ErrorsByDepth plain = depthErrors(mesh, Strategy::hp), exact = depthErrors(mesh, Strategy::hpx);
+  EXPECT_GT(exact.shallow.contacts, 300U);
+  EXPECT_LT(exact.shallow.greatest, 1e-7) << "no more than the rounding of vertices to float";
+  EXPECT_LE(exact.shallow.greatest, 1e-3 * plain.shallow.greatest);
+  EXPECT_LE(exact.all.meanSquare(), plain.all.meanSquare());
+}
+
+TEST(Contacts, haveBetterDepthsByExactLeaves) {
+  for (const char* shape : {"gear", "box"}) {
+    SCOPED_TRACE(shape);
+    expectBetterDepths(shapes::mesh(shape));
+  }
+}
+
+TEST(Contacts, ofMachinePartsHaveBetterDepthsByExactLeaves) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  for (const char* part : {"cad/fandisk.obj", "cad/rocker-arm.obj"}) {
+    SCOPED_TRACE(part);
+    expectBetterDepths(loadMesh(support::testMesh(part)));
   }
 }
 

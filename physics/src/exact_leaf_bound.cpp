@@ -1,0 +1,167 @@
+#include "exact_leaf_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <variant>
+
+namespace hpsdf::physics {
+namespace {
+
+constexpr double kExactRounding = 1e-12;  // upper bound of the relative rounding error of a distance
+
+/// Collects on which side of the surface the points of a ball lie, as seen from several features.
+class Sides {
+ public:
+  explicit Sides(double radius) : radius_(radius) {}
+
+  /// Adds a feature by its height, the distance of the ball's centre from it along its unit normal.
+  void add(double height) {
+    allPositive_ = allPositive_ && height > radius_;
+    allNegative_ = allNegative_ && height < -radius_;
+  }
+
+  bool areMixed() const { return !allPositive_ && !allNegative_; }
+  int sign() const { return allPositive_ == allNegative_ ? 0 : allPositive_ ? 1 : -1; }
+
+ private:
+  double radius_;
+  bool allPositive_ = true, allNegative_ = true;
+};
+
+}  // namespace
+
+ExactLeafBound::ExactLeafBound(const ExactTriangles& exact, std::uint64_t leaf)
+    : sign_(node::exactSign(leaf)), offset_(exact.offset) {
+  const auto vertex = [&](std::uint32_t index) {
+    return std::visit([&](const auto& vertices) { return Vector3(vertices[index].template cast<double>()); },
+                      exact.vertices);
+  };
+  for (const std::uint32_t* run = &exact.lists[node::offset(leaf)];; ++run) {
+    for (std::uint32_t i = 0; i < triangle_run::length(*run); ++i) {
+      const auto& index = exact.triangles[triangle_run::first(*run) + i];
+      triangles_.push_back(triangleOf(index, {vertex(index[0]), vertex(index[1]), vertex(index[2])}));
+    }
+    if (triangle_run::isLast(*run)) return;
+  }
+}
+
+ExactLeafBound::Triangle ExactLeafBound::triangleOf(const std::array<std::uint32_t, 3>& index,
+                                                    const std::array<Vector3, 3>& corner) {
+  Triangle triangle{index, corner, {}, {}, {}};
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 side = corner[(k + 1) % 3] - corner[k];
+    triangle.length[k] = side.norm();
+    triangle.direction[k] = side.normalized();
+  }
+  triangle.normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
+  return triangle;
+}
+
+ExactLeafBound::Positions ExactLeafBound::all() const {
+  Positions positions(triangles_.size());
+  std::iota(positions.begin(), positions.end(), 0U);
+  return positions;
+}
+
+double ExactLeafBound::leastIn(const Box& box, bool withSign, Positions& candidates) {
+  const double size = box.max().cwiseAbs().cwiseMax(box.min().cwiseAbs()).maxCoeff();
+  const Ball ball{box.center(), box.diagonal().norm() / 2 + kExactRounding * size};
+
+  // No triangle farther from the centre than the nearest one plus the ball's diameter can be nearest in the ball.
+  distances_.clear();
+  for (const std::uint32_t position : candidates) distances_.push_back(distanceTo(triangles_[position], ball.center));
+  const double nearest = *std::ranges::min_element(distances_);
+  const double reach = (nearest + 2 * ball.radius) * (1 + kExactRounding);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (distances_[i] <= reach) candidates[kept++] = candidates[i];
+  candidates.resize(kept);
+
+  // The unsigned distance to the triangles lies between these bounds.
+  const double rounding = kExactRounding * (nearest + size);
+  const double least = nearest - ball.radius - rounding, most = nearest + ball.radius + rounding;
+  int sign = sign_ == ExactSign::positive ? 1 : sign_ == ExactSign::negative ? -1 : 0;
+  if (sign == 0 && withSign && least > 0) sign = signIn(ball, candidates);
+  return (sign > 0 ? least : -most) - offset_;
+}
+
+double ExactLeafBound::distanceTo(const Triangle& triangle, const Vector3& x) {
+  const Vector3 fromCorner = x - triangle.corner[0];
+  bool isAbove = triangle.normal.squaredNorm() > 0;
+  double squaredToSides = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 difference = x - triangle.corner[k];
+    const double along = std::clamp(difference.dot(triangle.direction[k]), 0.0, triangle.length[k]);
+    isAbove = isAbove && triangle.normal.dot(triangle.direction[k].cross(difference)) > 0;
+    squaredToSides = std::min(squaredToSides, (difference - along * triangle.direction[k]).squaredNorm());
+  }
+  return isAbove ? std::abs(fromCorner.dot(triangle.normal)) : std::sqrt(squaredToSides);
+}
+
+int ExactLeafBound::signIn(const Ball& ball, const Positions& candidates) {
+  const auto [center, radius] = ball;
+  Sides sides(radius);
+  for (const std::uint32_t position : candidates) {
+    Triangle& triangle = triangles_[position];
+    if (triangle.features.empty()) findFeatures(triangle);
+    for (const Feature& feature : triangle.features) {
+      const Vector3 difference = center - feature.at;
+      const auto reaches = [&](const Feature::HalfSpace& part) {
+        return part.outwards.dot(difference) <= part.limit + radius;
+      };
+      if (std::ranges::all_of(feature.region, reaches)) sides.add(difference.dot(feature.normal));
+    }
+    if (sides.areMixed()) return 0;
+  }
+  return sides.sign();
+}
+
+void ExactLeafBound::findFeatures(Triangle& triangle) const {
+  if (triangle.normal.squaredNorm() > 0) triangle.features.push_back(faceOf(triangle));
+  for (int k = 0; k < 3; ++k) {
+    triangle.features.push_back(sideOf(triangle, k));
+    triangle.features.push_back(cornerOf(triangle, k));
+  }
+}
+
+ExactLeafBound::Feature ExactLeafBound::faceOf(const Triangle& triangle) {
+  Feature face{triangle.corner[0], triangle.normal};
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 outwards = -triangle.inwards(k);
+    face.region.push_back({outwards, outwards.dot(triangle.corner[k] - face.at)});
+  }
+  return face;
+}
+
+ExactLeafBound::Feature ExactLeafBound::sideOf(const Triangle& triangle, int side) const {
+  const std::uint32_t from = triangle.index[side], to = triangle.index[(side + 1) % 3];
+  const Vector3& along = triangle.direction[side];
+  Feature feature{triangle.corner[side], Vector3::Zero(), {{-along, 0}, {along, triangle.length[side]}}};
+  for (const Triangle& other : triangles_)
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t start = other.index[k], end = other.index[(k + 1) % 3];
+      if (!(start == from && end == to) && !(start == to && end == from)) continue;
+      feature.normal += other.normal;
+      feature.region.push_back({other.inwards(k), 0});
+    }
+  feature.normal.normalize();
+  return feature;
+}
+
+ExactLeafBound::Feature ExactLeafBound::cornerOf(const Triangle& triangle, int corner) const {
+  Feature feature{triangle.corner[corner], Vector3::Zero()};
+  for (const Triangle& other : triangles_)
+    for (int k = 0; k < 3; ++k) {
+      if (other.index[k] != triangle.index[corner]) continue;
+      const Vector3 &next = other.direction[k], previous = -other.direction[(k + 2) % 3];
+      feature.normal += std::acos(std::clamp(next.dot(previous), -1.0, 1.0)) * other.normal;
+      feature.region.push_back({next, 0});
+      feature.region.push_back({previous, 0});
+    }
+  feature.normal.normalize();
+  return feature;
+}
+
+}  // namespace hpsdf::physics
