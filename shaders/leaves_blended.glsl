@@ -1,5 +1,5 @@
 // The field with blending (core/src/field/query/blend.h): near the faces of a leaf the field is the weighted
-// mean of the polynomials of several leaves.
+// mean of the functions of several leaves: their polynomials or exact distances.
 
 layout(binding = 6) uniform usamplerBuffer zones;  // blend extents and bounds of each leaf; see FieldUpload
 layout(location = 18) uniform float blend;         // width of the blend zones as a share of a leaf's edge
@@ -71,15 +71,15 @@ vec3 localInOther(ivec4 other, ivec3 cellIndex, int depth, vec3 local) {
 ivec3 candidateOffset(int n, ivec3 more) { return ivec3(n, n >> more.x, n >> (more.x + more.y)) & more; }
 int candidateNumber(ivec3 offset) { return offset.x + 2 * offset.y + 4 * offset.z; }
 
-// The weighted sum of leaf polynomials at a point. The first polynomial is subtracted from all others to reduce
+// The weighted sum of the functions of leaves at a point. The first one is subtracted from all others to reduce
 // rounding errors in single precision. Each vec4 holds a gradient (xyz), in the local coordinates of the leaf that
 // contains the point, and a value (w).
 struct LeafSum {
   vec4 first, sum, weights;
-  float lowest, highest;  // value range of the polynomials whose weights, widened by `margin`, reach the point
+  float lowest, highest;  // value range of the leaves whose weights, widened by `margin`, reach the point
 };
 
-// Adds the polynomial of `leaf` to the weighted sum. The leaf has the cell index other.xyz and the depth other.w.
+// Adds the function of `leaf` to the weighted sum. The leaf has the cell index other.xyz and the depth other.w.
 void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int depth, vec3 local, float margin,
              bool withGradient) {
   bool own = other.w == depth && other.xyz == cellIndex;
@@ -88,22 +88,22 @@ void addLeaf(inout LeafSum total, Node leaf, ivec4 other, ivec3 cellIndex, int d
   vec3 t = rampPosition(extents, other.w, inOther);
   if (any(lessThanEqual(t, vec3(-1.0 - margin)))) return;
   float scale = ldexp(1.0, other.w - depth);  // derivative of `inOther` with respect to `local`
-  vec4 polynomial;
+  vec4 ofLeaf;
   if (withGradient) {
-    polynomial = leafWithGradient(leaf, uint(other.w), uvec3(other.xyz), inOther);
-    polynomial.xyz *= scale;
+    ofLeaf = leafWithGradient(leaf, uint(other.w), uvec3(other.xyz), inOther);
+    ofLeaf.xyz *= scale;
   } else {
-    polynomial = vec4(vec3(0.0), leafValue(leaf, uint(other.w), uvec3(other.xyz), inOther));
+    ofLeaf = vec4(vec3(0.0), leafValue(leaf, uint(other.w), uvec3(other.xyz), inOther));
   }
-  total.lowest = min(total.lowest, polynomial.w);
-  total.highest = max(total.highest, polynomial.w);
+  total.lowest = min(total.lowest, ofLeaf.w);
+  total.highest = max(total.highest, ofLeaf.w);
   t = clamp(t, vec3(-1.0), vec3(1.0));
   vec3 ramps = 0.5 + t * (0.75 - 0.25 * t * t);
   vec3 slopes = withGradient ? scale * rampSlopes(extents, other.w, inOther, t) : vec3(0.0);
   vec4 weight = vec4(slopes * ramps.yzx * ramps.zxy, ramps.x * ramps.y * ramps.z);
   if (!(weight.w > 0.0)) return;
-  if (total.weights.w == 0.0) total.first = polynomial;
-  vec4 difference = polynomial - total.first;
+  if (total.weights.w == 0.0) total.first = ofLeaf;
+  vec4 difference = ofLeaf - total.first;
   total.weights += weight;
   total.sum += vec4(weight.xyz * difference.w + weight.w * difference.xyz, weight.w * difference.w);
 }
@@ -132,7 +132,7 @@ bool nodeBelow(uint parents[8], ivec3 parentFirst, ivec3 parentMore, ivec3 cell,
   return true;
 }
 
-// Sums the polynomials of all leaves whose weights reach a point. Descends level by level through the nodes near the
+// Sums the functions of all leaves whose weights reach a point. Descends level by level through the nodes near the
 // point. Nodes are found by integer cell indices, so that single precision is enough. Leaves are not collected in an
 // array before they are evaluated, because drivers would unroll loops over the array and take seconds to compile.
 LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margin, bool withGradient) {
@@ -172,8 +172,8 @@ LeafSum leafSumAt(Node leaf, ivec3 cellIndex, int depth, vec3 local, float margi
   return total;
 }
 
-// Returns the value of the blended field at a point, and the range of values that nearby leaf polynomials have at the
-// point. A leaf is nearby if its weight would reach the point after its blend zone is widened by the share `margin`.
+// Returns the value of the blended field at a point, and the range of values that the functions of nearby leaves have at
+// the point. A leaf is nearby if its weight would reach the point after its blend zone is widened by the share `margin`.
 FieldRange blendedRange(Node leaf, uint depth, uvec3 cellIndex, vec3 local, float margin) {
   LeafSum total = leafSumAt(leaf, ivec3(cellIndex), int(depth), local, margin, false);
   return FieldRange(total.first.w + total.sum.w / total.weights.w, total.lowest, total.highest);

@@ -153,9 +153,10 @@ TEST(FieldCollider, losesFewCells) {
   EXPECT_LT(collider.bytes(), 4u << 20);
 }
 
-/// Bounds in exact leaves must be close to the field, too. Some two cells are lost beside edges, where it takes as much
-/// to be certain of the sign.
+/// Bounds in exact leaves near the surface must be close to the field, too. Some two cells are lost beside edges, where
+/// it takes as much to be certain of the sign. Far from the surface, the sign is often not certain at all.
 TEST(FieldCollider, losesFewCellsInExactLeaves) {
+  constexpr double kNear = 0.02;
   for (const char* shape : {"box", "gear"}) {
     const TriangleMesh mesh = shapes::mesh(shape);
     const Field field = exactField(mesh, {}, 0.02);
@@ -167,10 +168,11 @@ TEST(FieldCollider, losesFewCellsInExactLeaves) {
       const Vector3 x = pointAround(field.domain(), random, 1);
       if (field.cellAt(x).degree != kExactDegree) continue;
       const double value = field.value(x);
+      if (std::abs(value) > kNear) continue;
       ASSERT_GT(collider.lowerBound(x), value - 2.5 * cell) << shape << " at " << x.transpose();
       ++count;
     }
-    EXPECT_GT(count, 1000U) << shape;
+    EXPECT_GT(count, 500U) << shape;
   }
 }
 

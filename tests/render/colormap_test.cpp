@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "hpsdf/types.h"
 #include "picture/cracks.h"
 
 namespace hpsdf::render {
@@ -94,11 +95,29 @@ TEST(LevelMap, hasNeighboursThatEveryEyeDistinguishes) {
     }
 }
 
+/// Exact leaves must stand out among the leaves of all degrees, which keep their colours.
+TEST(LevelMap, hasAColorForExactLeavesThatEveryEyeDistinguishes) {
+  for (int count = 1; count <= 30; ++count) {
+    std::vector<int> levels(count);
+    std::iota(levels.begin(), levels.end(), 1);
+    const LevelMap without(levels);
+    levels.push_back(kExactDegree);
+    const LevelMap map(levels);
+    for (int level = 1; level <= count; ++level) {
+      EXPECT_EQ(map(level), without(level));
+      for (Vision vision : {Vision::normal, Vision::protan, Vision::deutan, Vision::tritan})
+        EXPECT_GT(colorDifference(toOklab(seen(map(kExactDegree), vision)), toOklab(seen(map(level), vision))), 0.15)
+            << count << " levels, level " << level << ", vision " << static_cast<int>(vision);
+    }
+  }
+}
+
 /// Cracks must differ from the shaded colours of levels and quantities, and from clay (the plain surface) in any light.
 TEST(CrackColor, differsFromEveryOtherForEveryEye) {
   std::vector<LinearColor> others;
   for (double t = 0; t <= 1; t += 0.02)
     for (const float light : {0.5F, 0.75F, 1.0F, 1.08F}) others.push_back(orderedColor(t) * light);
+  for (const float light : {0.5F, 0.75F, 1.0F, 1.08F}) others.push_back(exactColor() * light);
   for (const float light : {0.15F, 0.25F, 0.4F, 0.6F, 0.8F, 1.0F, 1.2F})
     others.push_back(decodeSrgb({210, 153, 119}) * light);
   const LinearColor crack = decodeSrgb(kCrackColor);

@@ -12,6 +12,7 @@
 #include "coloring/color_view.h"
 #include "expect_tidy.h"
 #include "hpsdf/error.h"
+#include "picture/describe.h"
 #include "picture/legend.h"
 
 namespace hpsdf::render {
@@ -264,6 +265,26 @@ TEST(Legend, namesEachLevelAndItsShare) {
   for (const TextItem& item : overlay.texts) texts.push_back(item.text);
   EXPECT_EQ(texts, (std::vector<std::string>{"polynomial degree", "share of the volume", "12", "<0.1 %", "5", "22.0 %",
                                              "3", "64.0 %", "2", "14.0 %"}));
+}
+
+TEST(Legend, namesExactLeaves) {
+  const std::map<int, double> shares = {{2, 0.75}, {kExactDegree, 0.25}};
+  static const std::string titles[] = {"polynomial degree", "degree"};
+  for (const int width : {640, 1280}) {
+    Overlay overlay;
+    addLevelLegend(overlay, frame(width, width * 9 / 16), titles, shares, LevelMap(std::vector<int>{2, kExactDegree}));
+    const auto text = std::ranges::find(overlay.texts, "exact", &TextItem::text);
+    ASSERT_NE(text, overlay.texts.end()) << width;
+    const auto under = std::ranges::find_if(overlay.boxes, [&](const BoxItem& box) {
+      return box.color == encodeSrgb(exactColor()) && box.y0 <= text->baseline && text->baseline <= box.y1;
+    });
+    ASSERT_NE(under, overlay.boxes.end()) << width;
+    EXPECT_GE(text->x, under->x0);
+    EXPECT_LE(text->x + advanceOf(text->text, text->size), under->x1);
+  }
+  EXPECT_EQ(describeLevels(shares), "2, exact");
+  EXPECT_EQ(describeLevels({{2, 0.5}, {4, 0.25}, {kExactDegree, 0.25}}), "2–4, exact");
+  EXPECT_EQ(describeLevels({{kExactDegree, 1}}), "exact");
 }
 
 TEST(Picture, differsForAnotherField) {

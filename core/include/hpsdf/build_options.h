@@ -150,7 +150,7 @@ struct BuildOptions {
   /// For `Strategy::hpx`: greatest error, as a share of L, of a polynomial that stands for the triangles of a leaf
   /// close to the surface, 0 to 1. It is estimated from 512 points in the leaf, as for `maxError`. With 0, all leaves
   /// close to the surface have triangles or are linear.
-  double exactTolerance = 5e-5;
+  double exactTolerance = 0;
   /// For `Strategy::hpx`: greatest number of triangles of an exact leaf, 1 to 4096. A leaf of the greatest depth may
   /// have more.
   int exactTriangles = 64;

@@ -120,6 +120,7 @@ std::vector<std::array<float, 4>> cornerTexels(const FieldData& field) {
 
 template <typename T>
 void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum format, const std::vector<T>& data) {
+  if (data.empty()) return upload(buffer, texture, format, std::vector<T>(1));  // a buffer cannot be empty
   const std::size_t bytes = data.size() * sizeof(T);
   // Discard OpenGL errors of earlier calls.
   while (glGetError() != GL_NO_ERROR) {

@@ -40,10 +40,12 @@ std::string describePlane(const std::string& name, const Plane& plane) {
 }
 
 std::string describeCells(const ShownCells& cells) {
-  std::string text = cells.style == CellStyle::lines ? "edges of cells" : "cells";
-  if (!cells.degrees.empty()) text += " of degree " + describeRuns(cells.degrees);
+  const bool onlyExact = cells.degrees == std::vector<int>{kExactDegree};
+  std::string text = cells.style == CellStyle::lines ? "edges of " : "";
+  text += onlyExact ? "exact cells" : "cells";
+  if (!cells.degrees.empty() && !onlyExact) text += " of degree " + describeRuns(cells.degrees);
   if (!cells.depths.empty())
-    text += std::string(cells.degrees.empty() ? " of" : ",") + " depth " + describeRuns(cells.depths);
+    text += std::string(cells.degrees.empty() || onlyExact ? " of" : ",") + " depth " + describeRuns(cells.depths);
   return text;
 }
 

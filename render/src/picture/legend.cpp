@@ -83,10 +83,18 @@ void addSwatch(Overlay& overlay, const LevelRow& row, double left, double width,
   overlay.boxes.push_back({left, std::round(row.top), left + width, std::round(row.top + row.height - gap), color});
 }
 
+// Returns the size of a level's name. The word for exact leaves is longer than a number, and smaller where there is
+// little room.
+double nameSize(int level, double size, bool roomy) {
+  return roomy || level != kExactDegree ? size : std::max(kSmallestText, 0.72 * size);
+}
+
 // Returns the width of the swatches in which the levels' names stand.
-double swatchWidth(const std::map<int, double>& shares, double size) {
-  const bool hasExact = shares.contains(kExactDegree);
-  return std::round(hasExact ? advanceOf(levelName(kExactDegree), size) + 0.5 * size : 2.1 * size);
+double swatchWidth(const std::map<int, double>& shares, double size, bool roomy) {
+  const double forNumber = 2.1 * size;
+  if (!shares.contains(kExactDegree)) return std::round(forNumber);
+  const double forWord = advanceOf(levelName(kExactDegree), nameSize(kExactDegree, size, roomy));
+  return std::round(std::max(forNumber, forWord + (roomy ? 0.5 : 0.2) * size));
 }
 
 // Adds a row for a level: a swatch with the level's name, and the level's share of the volume as text. In a roomy
@@ -99,8 +107,9 @@ void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, dou
   LevelRow box = row;
   box.height -= gap;
   const std::string name = levelName(row.level);
-  const double baseline = std::round(box.baseline(size));
-  addText(overlay, name, size, left + (swatch - advanceOf(name, size)) / 2, baseline, inkOn(color));
+  const double baseline = std::round(box.baseline(size)), ofName = nameSize(row.level, size, roomy);
+  addText(overlay, name, ofName, left + (swatch - advanceOf(name, ofName)) / 2, std::round(box.baseline(ofName)),
+          inkOn(color));
 
   const double shareRight = left + swatch + 0.5 * size + advanceOf("99.9 %", size);
   if (shareRight > column.right) return;
@@ -242,7 +251,7 @@ void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::s
     largestShare = std::max(largestShare, level->second);
   }
   if (size < kSmallestText) return addNarrowRows(overlay, column, rows, map);
-  const double swatch = swatchWidth(shares, size);
+  const double swatch = swatchWidth(shares, size, frame.roomy);
   for (const LevelRow& row : rows)
     addWideRow(overlay, column, row, size, swatch, largestShare, frame.roomy, map(row.level));
 }

@@ -17,8 +17,7 @@ namespace hpsdf {
 /// A list is a sequence of runs in `lists`, from the leaf's offset up to the first run that is marked as the last one.
 /// A run is a sequence of triangles with successive indices.
 struct ExactTriangles {
-  /// Vertices in world units: doubles, or floats where these suffice. The last one is not part of a triangle: thanks to
-  /// it, a query can load four floats at any other vertex.
+  /// Vertices in world units: doubles, or floats where these suffice.
   std::variant<std::vector<Eigen::Vector3d>, std::vector<Eigen::Vector3f>> vertices;
   /// Three indices into `vertices` each, counter-clockwise as seen from outside. Triangles that are close in space are
   /// close in this list.

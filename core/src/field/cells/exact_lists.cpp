@@ -64,7 +64,6 @@ ExactTriangles ExactListPacker::finish() {
     }
     exact.triangles.push_back(corners);
   }
-  vertices.push_back(vertices.back());  // see `ExactTriangles::vertices`
   exact.vertices = std::move(vertices);
   return exact;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -13,6 +14,12 @@ namespace hpsdf::query {
 namespace {
 
 using mesh::TriangleChunk;
+
+/// Returns a number without the last 29 of its 52 binary digits, which is a float.
+double leadingDigits(double number) {
+  constexpr std::uint64_t kLast = (std::uint64_t{1} << 29) - 1;
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(number) & ~kLast);
+}
 
 /// The nearest feature (face, edge or vertex) of a list of triangles.
 struct NearestFeature {
@@ -30,8 +37,13 @@ class ListSearch {
  public:
   ListSearch(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf, const Vector3& x)
       : exact_(exact), vertices_(vertices.data()), list_(&exact.lists[node::offset(leaf)]), x_(x) {
-    xHigh_ << x.cast<float>(), 0;
-    xLow_ << (x - xHigh_.head<3>().cast<double>()).cast<float>(), 0;
+    xHigh_.setZero();
+    xLow_.setZero();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double high = leadingDigits(x[axis]);
+      xHigh_[axis] = static_cast<float>(high);
+      xLow_[axis] = static_cast<float>(x[axis] - high);
+    }
   }
 
   NearestFeature nearest() {
@@ -107,7 +119,7 @@ class ListSearch {
   /// Returns a vertex minus the query point. The subtraction of the query point in two parts keeps the relative error
   /// of the result small.
   Eigen::Vector4f relative(const Eigen::Vector3f& v) const {
-    return (Eigen::Map<const Eigen::Vector4f>(v.data()) - xHigh_) - xLow_;  // reads into the next vertex
+    return (Eigen::Vector4f(v.x(), v.y(), v.z(), 0) - xHigh_) - xLow_;
   }
   Eigen::Vector4f relative(const Eigen::Vector3d& v) const {
     Eigen::Vector4f result;

@@ -76,7 +76,7 @@ void checkExact(const ExactTriangles& exact) {
   if (!isFinite) notAField("a vertex is not finite");
   for (const auto& triangle : exact.triangles)
     for (const std::uint32_t vertex : triangle)
-      if (vertex + 1 >= vertices) notAField("a triangle refers to vertex " + std::to_string(vertex));
+      if (vertex >= vertices) notAField("a triangle refers to vertex " + std::to_string(vertex));
   for (const std::uint32_t run : exact.lists)
     if (std::size_t(triangle_run::first(run)) + triangle_run::length(run) > exact.triangles.size())
       notAField("a list of triangles refers beyond their end");
