@@ -101,7 +101,8 @@ double ExactLeafBound::distanceTo(const Triangle& triangle, const Vector3& x) {
 }
 
 int ExactLeafBound::signIn(const Ball& ball, const Positions& candidates) {
-  const auto [center, radius] = ball;
+  const Vector3& center = ball.center;
+  const double radius = ball.radius;
   Sides sides(radius);
   for (const std::uint32_t position : candidates) {
     Triangle& triangle = triangles_[position];

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <span>
 #include <utility>
 
 #include "field/cells/exact_lists.h"
@@ -105,33 +107,51 @@ std::optional<Fit> ExactCells::fitOfFarCell(const Box& cell, std::size_t mostTri
   return triangles ? fitFrom(cell, box, std::move(*triangles)) : std::nullopt;
 }
 
+namespace {
+
+enum class Choice : std::uint8_t { leave, keep, split };
+
+/// Decides what becomes of a cell without a fit, and fits it if it stays whole.
+Choice chooseForCell(BuildNode& node, const Box& box, const ExactCells& cells, const SmoothFit& smoothFit,
+                     bool isDivisible) {
+  if (!cells.mustBeExact(box)) return Choice::leave;
+  ExactCells::Outcome outcome{smoothFit(box), false};
+  if (!outcome.fit) outcome = cells.makeExact(box, isDivisible);
+  if (outcome.divides) return Choice::split;
+  if (!outcome.fit) return Choice::leave;
+  node.fit = std::move(*outcome.fit);
+  return Choice::keep;
+}
+
+/// Splits the nodes for which this was chosen. Returns their children.
+std::vector<std::uint32_t> splitChosen(BuildTree& tree, std::span<const std::uint32_t> nodes,
+                                       std::span<const Choice> choices) {
+  std::vector<std::uint32_t> children;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (choices[i] != Choice::split) continue;
+    tree.split(nodes[i], {});
+    for (std::uint32_t child = 0; child < 8; ++child) children.push_back(tree.nodes[nodes[i]].firstChild + child);
+  }
+  return children;
+}
+
+}  // namespace
+
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
                       const Progress& progress) {
   constexpr std::size_t kChunk = 1024;
-  enum class Choice : std::uint8_t { leave, exact, split };
   std::vector<std::uint32_t> level(tree.nodes.size());
-  for (std::uint32_t n = 0; n < level.size(); ++n) level[n] = n;
+  std::iota(level.begin(), level.end(), 0U);
   for (int depth = 0; !level.empty(); ++depth) {
-    std::vector<Choice> choices(level.size(), Choice::leave);
+    std::vector<Choice> choices(level.size());
     for (std::size_t begin = 0; begin < level.size(); begin += kChunk) {
       progress.update("finding exact cells", double(begin) / double(level.size()));
       tbb::parallel_for(begin, std::min(begin + kChunk, level.size()), [&](std::size_t i) {
         BuildNode& node = tree.nodes[level[i]];
-        const Box box = tree.boxOf(node);
-        if (!cells.mustBeExact(box)) return;
-        ExactCells::Outcome outcome{smoothFit(box), false};
-        if (!outcome.fit) outcome = cells.makeExact(box, depth < maxDepth);
-        if (outcome.fit) node.fit = std::move(*outcome.fit);
-        if (outcome.fit || outcome.divides) choices[i] = outcome.divides ? Choice::split : Choice::exact;
+        choices[i] = chooseForCell(node, tree.boxOf(node), cells, smoothFit, depth < maxDepth);
       });
     }
-    std::vector<std::uint32_t> next;
-    for (std::size_t i = 0; i < level.size(); ++i) {
-      if (choices[i] != Choice::split) continue;
-      tree.split(level[i], {});
-      for (std::uint32_t child = 0; child < 8; ++child) next.push_back(tree.nodes[level[i]].firstChild + child);
-    }
-    level = std::move(next);
+    level = splitChosen(tree, level, choices);
   }
 }
 
