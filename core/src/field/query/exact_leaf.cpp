@@ -37,8 +37,6 @@ class ListSearch {
  public:
   ListSearch(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf, const Vector3& x)
       : exact_(exact), vertices_(vertices.data()), list_(&exact.lists[node::offset(leaf)]), x_(x) {
-    xHigh_.setZero();
-    xLow_.setZero();
     for (int axis = 0; axis < 3; ++axis) {
       const double high = leadingDigits(x[axis]);
       xHigh_[axis] = static_cast<float>(high);
@@ -112,19 +110,18 @@ class ListSearch {
   void loadCorners(TriangleChunk& chunk, const std::array<std::uint32_t, TriangleChunk::kSize>& triangles) const {
     for (std::size_t i = 0; i < chunk.count; ++i) {
       const auto& corners = exact_.triangles[triangles[i]];
-      for (int k = 0; k < 3; ++k) chunk.corners[k][i] = relative(vertices_[corners[k]]);
+      for (int k = 0; k < 3; ++k) setRelative(vertices_[corners[k]], chunk.corners[k][i]);
     }
   }
 
-  /// Returns a vertex minus the query point. The subtraction of the query point in two parts keeps the relative error
-  /// of the result small.
-  Eigen::Vector4f relative(const Eigen::Vector3f& v) const {
-    return (Eigen::Vector4f(v.x(), v.y(), v.z(), 0) - xHigh_) - xLow_;
+  /// Sets `out` to a vertex minus the query point, coordinate by coordinate, because a vector of four floats that is
+  /// put together from three is slow to store. The subtraction of the query point in two parts keeps the relative error
+  /// small.
+  void setRelative(const Eigen::Vector3f& v, Eigen::Vector4f& out) const {
+    for (int axis = 0; axis < 3; ++axis) out[axis] = (v[axis] - xHigh_[axis]) - xLow_[axis];
   }
-  Eigen::Vector4f relative(const Eigen::Vector3d& v) const {
-    Eigen::Vector4f result;
-    result << (v - x_).cast<float>(), 0;
-    return result;
+  void setRelative(const Eigen::Vector3d& v, Eigen::Vector4f& out) const {
+    for (int axis = 0; axis < 3; ++axis) out[axis] = static_cast<float>(v[axis] - x_[axis]);
   }
 
   void tryTriangle(std::uint32_t triangle) {
@@ -169,7 +166,7 @@ class ListSearch {
   const V* vertices_;
   const std::uint32_t* list_;
   Vector3 x_;
-  Eigen::Vector4f xHigh_, xLow_;  ///< x as a sum of two floats
+  Eigen::Vector3f xHigh_, xLow_;  ///< x as a sum of two floats
   NearestFeature best_;
   float limit_ = std::numeric_limits<float>::infinity();  ///< upper bound of the distance to the nearest triangle
 };
