@@ -6,6 +6,8 @@
 #include <numeric>
 #include <variant>
 
+#include "hpsdf/detail/triangle_list.h"
+
 namespace hpsdf::physics {
 namespace {
 
@@ -38,13 +40,10 @@ ExactLeafBound::ExactLeafBound(const ExactTriangles& exact, std::uint64_t leaf)
     return std::visit([&](const auto& vertices) { return Vector3(vertices[index].template cast<double>()); },
                       exact.vertices);
   };
-  for (const std::uint32_t* run = &exact.lists[node::offset(leaf)];; ++run) {
-    for (std::uint32_t i = 0; i < triangle_run::length(*run); ++i) {
-      const auto& index = exact.triangles[triangle_run::first(*run) + i];
-      triangles_.push_back(triangleOf(index, {vertex(index[0]), vertex(index[1]), vertex(index[2])}));
-    }
-    if (triangle_run::isLast(*run)) return;
-  }
+  forEachTriangle(exact, leaf, [&](std::uint32_t triangle) {
+    const auto& index = exact.triangles[triangle];
+    triangles_.push_back(triangleOf(index, {vertex(index[0]), vertex(index[1]), vertex(index[2])}));
+  });
 }
 
 ExactLeafBound::Triangle ExactLeafBound::triangleOf(const std::array<std::uint32_t, 3>& index,

@@ -206,7 +206,8 @@ bool CandidateSearch::comesWithin(const Box& box, double distance) const {
 }
 
 std::optional<ExactSign> CandidateSearch::signIn(const Box& box, std::span<const std::uint32_t> triangles) const {
-  return signs_.find(box.center(), comesWithin(box, -offset_), triangles);
+  return signs_.find(
+      box.center(), [&] { return comesWithin(box, -offset_); }, triangles);
 }
 
 std::optional<std::vector<std::uint32_t>> CandidateSearch::nearestTo(const Box& box, std::size_t most) const {

@@ -12,12 +12,12 @@ bool ExactLeafSigns::any() const {
          (insideTest_ == InsideTest::winding && winding_.isClosed());
 }
 
-std::optional<ExactSign> ExactLeafSigns::find(const Vector3& centre, bool isCrossed,
+std::optional<ExactSign> ExactLeafSigns::find(const Vector3& centre, const std::function<bool()>& isCrossed,
                                               std::span<const std::uint32_t> slots) const {
   if (!any()) return std::nullopt;
   if (insideTest_ == InsideTest::pseudonormal) return ExactSign::pseudonormal;
   if (insideTest_ == InsideTest::shell) return ExactSign::positive;
-  if (!isCrossed) return winding_.isInside(centre) ? ExactSign::negative : ExactSign::positive;
+  if (!isCrossed()) return winding_.isInside(centre) ? ExactSign::negative : ExactSign::positive;
   const auto allAre = [&](Sides sides) {
     return std::ranges::all_of(slots, [&](std::uint32_t slot) { return sidesOf(slot) == sides; });
   };

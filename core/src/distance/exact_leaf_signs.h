@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -35,9 +36,11 @@ class ExactLeafSigns {
   /// Returns false if no leaf has a sign: for open meshes and outer hulls.
   bool any() const;
 
-  /// Returns the sign in a leaf. `isCrossed` says whether a triangle may reach into the leaf, `slots` are the triangles
-  /// that can be nearest to its points. Returns std::nullopt if the sign does not follow from these.
-  std::optional<ExactSign> find(const Vector3& centre, bool isCrossed, std::span<const std::uint32_t> slots) const;
+  /// Returns the sign in a leaf. `isCrossed` says whether a triangle may reach into the leaf; it is called only where
+  /// the sign depends on it. `slots` are the triangles that can be nearest to its points. Returns std::nullopt if the
+  /// sign does not follow from these.
+  std::optional<ExactSign> find(const Vector3& centre, const std::function<bool()>& isCrossed,
+                                std::span<const std::uint32_t> slots) const;
 
  private:
   using Sides = sign::WindingSign::Sides;

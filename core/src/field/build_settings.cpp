@@ -222,8 +222,7 @@ const std::vector<Row> kRows = {
     {"exact-triangles", kMethod, wholeNumber().within(1, 4096).stored(15).advanced(),
      member<&BuildOptions::exactTriangles>,
      "Greatest number of triangles that an exact cell of strategy hpx keeps, unless it cannot be divided further: more "
-     "make a smaller "
-     "field, fewer a faster one."},
+     "make a smaller field, fewer a faster one."},
     {"coefficients", kResult, choice({"auto", "float", "double"}).advanced(), member<&BuildOptions::coefficients>,
      "Precision of the coefficients. auto takes float where that changes the error by less than 1 %."},
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,

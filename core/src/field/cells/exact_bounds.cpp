@@ -10,6 +10,7 @@
 #include "field/cells/exact_lists.h"
 #include "field/query/evaluate.h"
 #include "field/query/float_coefficients.h"
+#include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/detail/triangle_search.h"
 
 namespace hpsdf::detail {
@@ -29,16 +30,6 @@ double roundingOf(const Eigen::Vector3f& vertex) {
     steps[axis] = double(std::nextafter(size, std::numeric_limits<float>::infinity())) - double(size);
   }
   return steps.norm() / 2;
-}
-
-/// Calls f(triangle) for each triangle of an exact leaf.
-template <typename F>
-void forEachTriangle(const ExactTriangles& exact, std::uint64_t leaf, const F& f) {
-  for (const std::uint32_t* run = &exact.lists[node::offset(leaf)];; ++run) {
-    const std::uint32_t first = triangle_run::first(*run);
-    for (std::uint32_t n = 0; n < triangle_run::length(*run); ++n) f(exact.triangles[first + n]);
-    if (triangle_run::isLast(*run)) return;
-  }
 }
 
 }  // namespace
@@ -75,7 +66,8 @@ ExactBounds::ExactBounds(const FieldData& field, const DistanceFunction& distanc
 double ExactBounds::error(const query::OctreeNode& leaf) const {
   constexpr double kEpsilon = 16 * std::numeric_limits<double>::epsilon();
   double thinnest = 1;
-  forEachTriangle(field_.exact, field_.nodes[leaf.node], [&](const std::array<std::uint32_t, 3>& corners) {
+  forEachTriangle(field_.exact, field_.nodes[leaf.node], [&](std::uint32_t triangle) {
+    const auto& corners = field_.exact.triangles[triangle];
     const Vector3 &a = vertices_[corners[0]], &b = vertices_[corners[1]], &c = vertices_[corners[2]];
     const double normal = (b - a).cross(c - a).norm();
     const double longest = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
@@ -89,7 +81,8 @@ bool ExactBounds::isComplete(const query::OctreeNode& leaf, const Box& around) c
   if (search_ == nullptr) return false;
   const bool isSingle = std::holds_alternative<std::vector<Eigen::Vector3f>>(field_.exact.vertices);
   std::vector<Corners> listed;
-  forEachTriangle(field_.exact, field_.nodes[leaf.node], [&](const std::array<std::uint32_t, 3>& triangle) {
+  forEachTriangle(field_.exact, field_.nodes[leaf.node], [&](std::uint32_t index) {
+    const auto& triangle = field_.exact.triangles[index];
     Corners& corners = listed.emplace_back();
     for (int k = 0; k < 3; ++k) Vector3::Map(corners[k].data()) = vertices_[triangle[k]];
   });

@@ -26,7 +26,7 @@ class ExactCells {
   /// Returns true if a point of the cell may be so close to the surface that the field must be exact there.
   bool mustBeExact(const Box& cell) const { return search_.comesWithin(cell, within_); }
 
-  /// What becomes of a cell that must be exact.
+  /// The result of making a cell exact.
   struct Outcome {
     std::optional<Fit> fit;  ///< without error: a list of triangles or, if these lie in one plane, a linear polynomial
     bool divides = false;    ///< there is no such fit, but there may be fits of the cell's parts

@@ -8,6 +8,7 @@
 #include <limits>
 #include <variant>
 
+#include "hpsdf/detail/triangle_list.h"
 #include "mesh/triangle_bounds.h"
 
 namespace hpsdf::query {
@@ -36,7 +37,7 @@ template <typename V>
 class ListSearch {
  public:
   ListSearch(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf, const Vector3& x)
-      : exact_(exact), vertices_(vertices.data()), list_(&exact.lists[node::offset(leaf)]), x_(x) {
+      : exact_(exact), vertices_(vertices.data()), leaf_(leaf), x_(x) {
     for (int axis = 0; axis < 3; ++axis) {
       const double high = leadingDigits(x[axis]);
       xHigh_[axis] = static_cast<float>(high);
@@ -47,7 +48,7 @@ class ListSearch {
   NearestFeature nearest() {
     TriangleChunk chunk;
     std::array<std::uint32_t, TriangleChunk::kSize> triangles;
-    forEachTriangle([&](std::uint32_t triangle) {
+    forEachTriangle(exact_, leaf_, [&](std::uint32_t triangle) {
       if (chunk.count == TriangleChunk::kSize) search(chunk, triangles);
       triangles[chunk.count++] = triangle;
     });
@@ -59,7 +60,7 @@ class ListSearch {
   Vector3 pseudonormal(const NearestFeature& feature) const {
     if (feature.corners == 3) return feature.normal;
     Vector3 sum = Vector3::Zero();
-    forEachTriangle([&](std::uint32_t triangle) {
+    forEachTriangle(exact_, leaf_, [&](std::uint32_t triangle) {
       const auto& corners = exact_.triangles[triangle];
       int at = -1;
       for (int k = 0; k < 3; ++k)
@@ -80,15 +81,6 @@ class ListSearch {
 
  private:
   Vector3 vertex(std::uint32_t index) const { return vertices_[index].template cast<double>(); }
-
-  template <typename F>
-  void forEachTriangle(const F& f) const {
-    for (const std::uint32_t* run = list_;; ++run) {
-      const std::uint32_t first = triangle_run::first(*run), end = first + triangle_run::length(*run);
-      for (std::uint32_t triangle = first; triangle < end; ++triangle) f(triangle);
-      if (triangle_run::isLast(*run)) return;
-    }
-  }
 
   /// Finds the nearest triangle of a chunk in double precision, among those that single precision cannot exclude.
   /// Empties the chunk.
@@ -164,7 +156,7 @@ class ListSearch {
 
   const ExactTriangles& exact_;
   const V* vertices_;
-  const std::uint32_t* list_;
+  std::uint64_t leaf_;
   Vector3 x_;
   Eigen::Vector3f xHigh_, xLow_;  ///< x as a sum of two floats
   NearestFeature best_;
