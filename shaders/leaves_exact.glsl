@@ -1,7 +1,7 @@
 // Exact leaves (core/src/field/query/exact_leaf.h): the signed distance to the nearest triangle of a list. Positions are
 // in world units from the domain's lower corner, or relative to a query point, so that single precision is enough.
 
-layout(binding = 7) uniform usamplerBuffer exactLists;   // runs of triangles, as in ExactTriangles::lists
+layout(binding = 7) uniform usamplerBuffer exactLists;   // ExactTriangles::lists
 layout(binding = 8) uniform samplerBuffer exactCorners;  // three texels for each triangle; see FieldUpload
 layout(location = 20) uniform vec3 baseCell;             // edges of a base cell, world units
 layout(location = 21) uniform float exactOffset;         // subtracted from all distances

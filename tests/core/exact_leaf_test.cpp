@@ -1,6 +1,7 @@
 // Tests exact leaves: leaves that keep the triangles nearest to their points.
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -9,6 +10,8 @@
 #include "../support/temporary_directory.h"
 #include "../support/test_mesh.h"
 #include "hpsdf/build.h"
+#include "hpsdf/detail/triangle_list.h"
+#include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_file.h"
@@ -95,7 +98,10 @@ TEST_P(ExactLeaf, isTheSameInBatches) {
   for (const double blend : {0.0, kDefaultBlend}) {
     options.blend = blend;
     const Field field = build(exact, domainAround(part.mesh), options);
-    const std::vector<Vector3> points = placesIn(field.domain(), 5000);
+    std::vector<Vector3> points = placesIn(field.domain(), 5000);
+    for (std::size_t i = 0; i < 200; ++i)  // groups of points close to the surface and to each other
+      for (const Vector3& offset : placesIn(Box(-Vector3::Ones(), Vector3::Ones()), 16))
+        points.push_back(part.mesh.vertices[i * 7 % part.mesh.vertices.size()] + 0.003 * offset);
     std::vector<double> values(points.size());
     std::vector<ValueAndGradient> both(points.size());
     field.values(points, values);
@@ -146,6 +152,46 @@ TEST(ExactLeaves, ofACubeNeedFewBytes) {
   const Field field = build(ExactDistance(cube), domainAround(cube), hpx());
   EXPECT_LT(field.data().exact.lists.size(), 1000U);
   EXPECT_EQ(field.data().exact.triangles.size(), cube.triangles.size());
+}
+
+TEST(ExactLeaves, listEveryTriangleForSomeOctantAndFewForEach) {
+  const TriangleMesh gear = shapes::mesh("gear");
+  const Field field = build(ExactDistance(gear), domainAround(gear), hpx());
+  std::size_t listed = 0, ofOctants = 0;
+  for (const std::uint64_t leaf : field.data().nodes) {
+    if (!node::isExact(leaf)) continue;
+    const TriangleListView list(field.data().exact, leaf);
+    for (std::uint32_t i = 0; i < list.count(); ++i) {
+      ASSERT_NE(list.octants(i), 0);
+      ofOctants += std::popcount(list.octants(i));
+    }
+    listed += list.count();
+  }
+  EXPECT_LT(double(ofOctants) / 8, 0.75 * double(listed));
+}
+
+TEST(ExactLeaves, withDamagedListsAreRefused) {
+  const auto fieldOf = [](std::vector<std::uint32_t> lists, std::uint32_t offset) {
+    FieldData data;
+    data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
+    data.nodes = {node::exactLeaf(ExactSign::positive, offset)};
+    data.exact.vertices = std::vector<Vector3>{{0, 0, 0}, {0.5, 0, 0}, {0, 0.5, 0}, {0.5, 0.5, 0}};
+    data.exact.triangles = {{0, 1, 2}, {1, 3, 2}};
+    data.exact.lists = std::move(lists);
+    return Field(std::move(data));
+  };
+  const std::uint32_t both = triangle_run::packed(0, 2) | triangle_run::kLast;
+  EXPECT_NEAR(fieldOf({2, 0xffff, both}, 0).value({0.1, 0.1, 0.25}), 0.25, 1e-12);
+  EXPECT_NEAR(fieldOf({2, 0x0ff0, both}, 0).value({0.1, 0.1, 0.25}), 0.25, 1e-12);
+  EXPECT_NEAR(fieldOf({2, 0xf00f, both}, 0).value({0.1, 0.1, 0.25}), std::hypot(0.25, 0.3 / std::sqrt(2)), 1e-12)
+      << "the distance to the triangle of the other octants";
+  EXPECT_THROW(fieldOf({2, 0xff0f, both}, 1), Error) << "no list begins there";
+  EXPECT_THROW(fieldOf({2, 0x7f7f, both}, 0), Error) << "an octant without triangles";
+  EXPECT_THROW(fieldOf({1, 0xff, both}, 0), Error) << "a number that differs from that of the runs";
+  EXPECT_THROW(fieldOf({2, 0xffff, triangle_run::packed(0, 2)}, 0), Error) << "no end";
+  EXPECT_THROW(fieldOf({2, 0xffff, triangle_run::packed(1, 2) | triangle_run::kLast}, 0), Error) << "no such triangle";
+  EXPECT_THROW(fieldOf({0xffffffff, 0xffff, both}, 0), Error) << "longer than all lists";
+  EXPECT_THROW(fieldOf({0}, 0), Error) << "an empty list";
 }
 
 TEST(ExactLeaves, needADistanceToTriangles) {

@@ -77,7 +77,7 @@ Field scatteredField(unsigned seed) {
   for (Vector3& x : vertices) x = Vector3(uniform(random), uniform(random), uniform(random));
   data.exact.vertices = std::move(vertices);
   data.exact.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {7, 8, 9}, {9, 10, 11}};
-  data.exact.lists = {triangle_run::packed(0, 5) | triangle_run::kLast};
+  data.exact.lists = {5, 0xffffffff, 0xff, triangle_run::packed(0, 5) | triangle_run::kLast};
   return Field(std::move(data));
 }
 

@@ -112,22 +112,26 @@ class Sifter {
 
   /// Returns the places, among the triangles, of those that can be nearest to a point of the box; or std::nullopt as
   /// soon as there are more than `most`.
-  std::optional<std::vector<std::uint32_t>> sift() {
+  std::optional<TriangleList> sift() {
     kept_[kLevels + 1].resize(corners_.size());
     std::iota(kept_[kLevels + 1].begin(), kept_[kLevels + 1].end(), 0U);
-    if (!sift(Eigen::Vector3f::Zero(), kLevels)) return std::nullopt;
-    std::vector<std::uint32_t> places;
-    for (std::uint32_t i = 0; i < found_.size(); ++i)
-      if (found_[i] != 0) places.push_back(i);
-    return places;
+    constexpr std::uint8_t kAllOctants = 0xff;
+    if (!sift(Eigen::Vector3f::Zero(), kLevels, kAllOctants)) return std::nullopt;
+    TriangleList list;
+    for (std::uint32_t i = 0; i < found_.size(); ++i) {
+      if (found_[i] == 0) continue;
+      list.triangles.push_back(i);
+      list.octants.push_back(found_[i]);
+    }
+    return list;
   }
 
  private:
   static constexpr int kLevels = 3;  ///< the box is divided into 8³ smaller boxes
 
-  /// Sifts the triangles that remain from the level above for the box around `centre`. Returns false as soon as more
-  /// than `most` triangles are found.
-  bool sift(const Eigen::Vector3f& centre, int level) {
+  /// Sifts the triangles that remain from the level above for the box around `centre`, which lies in these octants of
+  /// the whole box. Returns false as soon as more than `most` triangles are found.
+  bool sift(const Eigen::Vector3f& centre, int level, std::uint8_t octants) {
     const float part = std::ldexp(1.0F, level - kLevels);  // size of this box relative to the whole one
     const float nearest = bound(centre, kept_[level + 1]);
     // The last term allows for the rounding of corners relative to the centre of the whole box.
@@ -139,13 +143,14 @@ class Sifter {
       const std::uint32_t place = kept_[level + 1][i];
       if (lower_[i] > limit) continue;
       kept.push_back(place);
-      allKnown = allKnown && found_[place] != 0;
+      allKnown = allKnown && (octants & ~found_[place]) == 0;
     }
     if (allKnown) return true;
-    if (level == 0) return add(kept);
+    if (level == 0) return add(kept, octants);
     for (int octant = 0; octant < 8; ++octant) {
       const Eigen::Vector3f side((octant & 1) != 0 ? 1 : -1, (octant & 2) != 0 ? 1 : -1, (octant & 4) != 0 ? 1 : -1);
-      if (!sift(centre + (part / 2 * halfSize_).cwiseProduct(side), level - 1)) return false;
+      const auto octantsOfPart = level == kLevels ? static_cast<std::uint8_t>(1 << octant) : octants;
+      if (!sift(centre + (part / 2 * halfSize_).cwiseProduct(side), level - 1, octantsOfPart)) return false;
     }
     return true;
   }
@@ -170,10 +175,10 @@ class Sifter {
     return nearest;
   }
 
-  bool add(const std::vector<std::uint32_t>& places) {
+  bool add(const std::vector<std::uint32_t>& places, std::uint8_t octants) {
     for (const std::uint32_t place : places) {
       count_ += found_[place] == 0 ? 1 : 0;
-      found_[place] = 1;
+      found_[place] |= octants;
     }
     return count_ <= most_;
   }
@@ -182,7 +187,7 @@ class Sifter {
 
   std::size_t most_, count_ = 0;
   Eigen::Vector3f halfSize_;
-  std::vector<std::uint8_t> found_;                           ///< 1 for each triangle that is found
+  std::vector<std::uint8_t> found_;                           ///< for each triangle, the octants in which it is found
   std::vector<std::array<Eigen::Vector4f, 3>> corners_;       ///< relative to the centre of the box
   std::array<std::vector<std::uint32_t>, kLevels + 2> kept_;  ///< places that remain at each level
   std::vector<float> lower_;
@@ -210,17 +215,17 @@ std::optional<ExactSign> CandidateSearch::signIn(const Box& box, std::span<const
       box.center(), [&] { return comesWithin(box, -offset_); }, triangles);
 }
 
-std::optional<std::vector<std::uint32_t>> CandidateSearch::nearestTo(const Box& box, std::size_t most) const {
+std::optional<TriangleList> CandidateSearch::nearestTo(const Box& box, std::size_t most) const {
   // The balls around whole boxes reach about so many times more triangles than those that are found in the end.
   constexpr std::size_t kCoarse = 32;
   const double radius = halfDiagonal(box);
   const double reach = (distanceTo(hierarchy_, box.center()) + 2 * radius) * (1 + kRounding);
   const auto coarse = Collector(hierarchy_, box.center(), reach, kCoarse * most).collect();
   if (!coarse) return std::nullopt;
-  auto places = Sifter(hierarchy_, box, *coarse, most).sift();
-  if (!places) return std::nullopt;
-  for (std::uint32_t& place : *places) place = (*coarse)[place];
-  return places;
+  auto list = Sifter(hierarchy_, box, *coarse, most).sift();
+  if (!list) return std::nullopt;
+  for (std::uint32_t& triangle : list->triangles) triangle = (*coarse)[triangle];
+  return list;
 }
 
 }  // namespace hpsdf::distance

@@ -26,7 +26,7 @@ class CandidateSearch final : public TriangleSearch {
   std::span<const std::array<std::uint32_t, 3>> triangles() const override { return hierarchy_.triangles(); }
   double offset() const override { return offset_; }
   bool comesWithin(const Box& box, double distance) const override;
-  std::optional<std::vector<std::uint32_t>> nearestTo(const Box& box, std::size_t most) const override;
+  std::optional<TriangleList> nearestTo(const Box& box, std::size_t most) const override;
   bool hasSigns() const override { return signs_.any(); }
   std::optional<ExactSign> signIn(const Box& box, std::span<const std::uint32_t> triangles) const override;
 

@@ -43,17 +43,22 @@ HWY_INLINE Vec squaredToSegment(const Vec3& from, const Vec3& along, Vec squared
   return dot(to, to);
 }
 
+/// Computes the bounds of the distances from `point` or, if `Moves` is false, from the origin.
+///
 /// The error of a computed distance is bounded by a multiple of the distance to the farthest corner. For a triangle of
 /// little height, whose normal is less accurate, the multiple is greater.
-void findBoundsOnTarget(TriangleChunk& chunk) {
+template <bool Moves>
+HWY_INLINE void findBoundsFrom(TriangleChunk& chunk, const Eigen::Vector3f& point) {
   const Tag d;
+  const Vec3 origin = {hn::Set(d, point.x()), hn::Set(d, point.y()), hn::Set(d, point.z())};
+  const Vec moved = hn::Set(d, Moves ? point.norm() : 0.0F);
   constexpr float kRounding = 32 * std::numeric_limits<float>::epsilon();
   for (std::size_t i = 0; i < chunk.count; i += kLanes) {
     const auto load = [&](int corner) HWY_ATTR {
       Vec3 v;
       Vec unused;
       hn::LoadInterleaved4(d, chunk.corners[corner][i].data(), v.x, v.y, v.z, unused);
-      return v;
+      return Moves ? minus(v, origin) : v;
     };
     const Vec3 a = load(0), b = load(1), c = load(2);
     const Vec3 ab = minus(b, a), bc = minus(c, b), ca = minus(a, c);
@@ -67,13 +72,17 @@ void findBoundsOnTarget(TriangleChunk& chunk) {
     const Vec toSides =
         hn::Min(hn::Min(squaredToSegment(a, ab, abab), squaredToSegment(b, bc, bcbc)), squaredToSegment(c, ca, caca));
     const Vec distance = hn::Sqrt(hn::IfThenElse(isOutside, toSides, toPlane));
-    const Vec farthest = hn::Sqrt(hn::Max(hn::Max(dot(a, a), dot(b, b)), dot(c, c)));
+    const Vec farthest = hn::Add(hn::Sqrt(hn::Max(hn::Max(dot(a, a), dot(b, b)), dot(c, c))), moved);
     const Vec longest = hn::Max(hn::Max(abab, bcbc), caca);
     const Vec error = hn::Mul(hn::Mul(hn::Set(d, kRounding), farthest), hn::Div(longest, hn::Sqrt(nn)));
     hn::Store(hn::Sub(distance, error), d, chunk.lower.data() + i);
     hn::Store(hn::Add(distance, error), d, chunk.upper.data() + i);
   }
 }
+
+void findBoundsOnTarget(TriangleChunk& chunk) { findBoundsFrom<false>(chunk, Eigen::Vector3f::Zero()); }
+
+void findMovedBoundsOnTarget(TriangleChunk& chunk, const Eigen::Vector3f& point) { findBoundsFrom<true>(chunk, point); }
 
 }  // namespace
 }  // namespace HWY_NAMESPACE
@@ -84,13 +93,23 @@ HWY_AFTER_NAMESPACE();
 namespace hpsdf::mesh {
 
 HWY_EXPORT(findBoundsOnTarget);
+HWY_EXPORT(findMovedBoundsOnTarget);
 
-void findBounds(TriangleChunk& chunk) {
-  // Copies of the last triangle fill the last vector of the widest instruction set.
+/// Fills the last vector of the widest instruction set with copies of the last triangle.
+static void fillLastVector(TriangleChunk& chunk) {
   constexpr std::size_t kMostLanes = 16;
   for (std::size_t i = chunk.count; i % kMostLanes != 0; ++i)
     for (auto& corner : chunk.corners) corner[i] = corner[chunk.count - 1];
+}
+
+void findBounds(TriangleChunk& chunk) {
+  fillLastVector(chunk);
   HWY_DYNAMIC_DISPATCH(findBoundsOnTarget)(chunk);
+}
+
+void findBounds(TriangleChunk& chunk, const Eigen::Vector3f& point) {
+  fillLastVector(chunk);
+  HWY_DYNAMIC_DISPATCH(findMovedBoundsOnTarget)(chunk, point);
 }
 
 }  // namespace hpsdf::mesh

@@ -9,7 +9,7 @@ namespace hpsdf::mesh {
 
 /// Some triangles in single precision, relative to a point, and bounds of their distances from this point.
 struct TriangleChunk {
-  static constexpr std::size_t kSize = 64;
+  static constexpr std::size_t kSize = 128;
 
   std::size_t count = 0;
   /// The corners A, B and C of each triangle, minus the point. The fourth coordinates do not matter.
@@ -21,5 +21,9 @@ struct TriangleChunk {
 /// Computes the bounds of the distances from the point to the triangles. The bounds allow for rounding in this function
 /// and of the corners, relative to their distances from the point. `count` must be above 0.
 void findBounds(TriangleChunk& chunk);
+
+/// Computes the bounds of the distances from another point, which is given relative to the first one. The bounds also
+/// allow for rounding of the corners relative to the first point.
+void findBounds(TriangleChunk& chunk, const Eigen::Vector3f& point);
 
 }  // namespace hpsdf::mesh

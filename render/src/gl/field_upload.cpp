@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/error.h"
 #include "view/exact_leaf.h"
 
@@ -77,7 +78,9 @@ std::vector<NodeTexel> nodeTexels(const FieldData& field, const std::vector<Surf
     NodeTexel& texel = texels[n];
     texel[3] = bitsOf(bound.secondDerivative);
     if (node::isExact(bits)) {
-      texel[0] = std::uint32_t(kExactDegree) << kOffsetBits | node::offset(bits);
+      const std::uint32_t* runs = TriangleListView(field.exact, bits).runs();
+      texel[0] =
+          std::uint32_t(kExactDegree) << kOffsetBits | static_cast<std::uint32_t>(runs - field.exact.lists.data());
       texel[1] = bitsOf(bound.valueDeviation);
       texel[3] = (texel[3] & ~std::uint32_t{3}) | std::uint32_t(node::exactSign(bits));
     } else if (node::isLeaf(bits)) {

@@ -12,7 +12,7 @@ namespace hpsdf::render {
 /// * nodes, RGBA32UI. In a leaf, x is degree · 2^27 + index of the first coefficient, and y is the valueDeviation. In
 ///   an internal node, x is the index of the first child, and y is the packed range of values (`packOutwards`). In any
 ///   node, z is the gradientDeviation, and w is the secondDerivative (`SurfaceBounds`).
-///   In an exact leaf, x is 31 · 2^27 + offset of its list, and the two lowest bits of w are its `ExactSign`.
+///   In an exact leaf, x is 31 · 2^27 + offset of its runs, and the two lowest bits of w are its `ExactSign`.
 /// * coefficients, R32F: the leaves' coefficients in the order of the nodes, padded for each leaf to a multiple of
 ///   four. Leaves up to degree 4 have the order of `LowDegree` in field.glsl.
 /// * coefficientQuads, RGBA32F: the same buffer of coefficients, four per texel.

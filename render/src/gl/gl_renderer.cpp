@@ -9,6 +9,7 @@
 #include "gl/field_upload.h"
 #include "gl/gl_objects.h"
 #include "gl/render_target.h"
+#include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/render/renderer.h"
 #include "view/grid_space.h"
 #include "view/scaled_renderer.h"
@@ -69,12 +70,15 @@ int highestDegree(const FieldData& field) {
 }
 
 /// The greatest number of loop iterations in a search through the list of an exact leaf; 0 without exact leaves.
-int longestSearch(const ExactTriangles& exact) {
-  int longest = 0, iterations = 0;
-  for (const std::uint32_t run : exact.lists) {
-    iterations += int(triangle_run::length(run)) + 2;
-    longest = std::max(longest, iterations + 1);
-    if (triangle_run::isLast(run)) iterations = 0;
+int longestSearch(const FieldData& field) {
+  int longest = 0;
+  for (const std::uint64_t bits : field.nodes) {
+    if (!node::isExact(bits)) continue;
+    int iterations = 1;
+    TriangleListView(field.exact, bits).forEachRun([&](std::uint32_t run) {
+      iterations += int(triangle_run::length(run)) + 2;
+    });
+    longest = std::max(longest, iterations);
   }
   return longest;
 }
@@ -154,7 +158,7 @@ class GlRenderer final : public Renderer {
     const std::vector<BlendZoneBounds> zones = blendZoneBounds(field);
     bounds_ = surfaceBounds(field.data(), zones);
     // Limit the steps and the root refinements in one pass, so that the shaders stay within kLoopBudget.
-    const int search = longestSearch(field.data().exact);
+    const int search = longestSearch(field.data());
     const int unblended = evaluationLoops(highestDegree(field.data())) + search;
     const int evaluation = zones.empty() ? unblended : blendedEvaluationLoops(unblended);
     const int loopsOfStep = unblended + search + kMaxDepth + 4;

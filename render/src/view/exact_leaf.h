@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "hpsdf/detail/field_data.h"
+#include "hpsdf/detail/triangle_list.h"
 
 namespace hpsdf::render {
 
@@ -22,7 +23,7 @@ std::array<Vector3, 3> cornersOf(const ExactTriangles& exact, std::uint32_t tria
 /// Calls f(triangle) for each triangle in the list of an exact leaf.
 template <typename F>
 void forEachListed(const ExactTriangles& exact, std::uint64_t bits, const F& f) {
-  for (const std::uint32_t* run = &exact.lists[node::offset(bits)];; ++run) {
+  for (const std::uint32_t* run = TriangleListView(exact, bits).runs();; ++run) {
     const std::uint32_t first = triangle_run::first(*run), end = first + triangle_run::length(*run);
     for (std::uint32_t triangle = first; triangle < end; ++triangle) f(triangle);
     if (triangle_run::isLast(*run)) return;

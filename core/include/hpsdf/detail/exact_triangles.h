@@ -14,16 +14,19 @@ namespace hpsdf {
 /// triangle that is nearest to any point of the leaf, and all triangles that share a nearest edge or vertex. In an
 /// exact leaf, the field is the exact signed distance to the listed triangles.
 ///
-/// A list is a sequence of runs in `lists`, from the leaf's offset up to the first run that is marked as the last one.
-/// A run is a sequence of triangles with successive indices.
+/// A list is a part of `lists`, from the leaf's offset. It begins with the number of its triangles. Then come their
+/// octants, one byte for each triangle and four bytes in a word, lowest byte first. The octants of a triangle are those
+/// octants of the leaf, including the blend zone beyond its faces, in which the triangle can be nearest: bit x + 2y +
+/// 4z stands for the octant in the place of child number x + 2y + 4z. Last come the triangles as runs, up to the first
+/// run that is marked as the last one. A run is a sequence of triangles with successive indices.
 struct ExactTriangles {
   /// Vertices in world units: doubles, or floats where these suffice.
   std::variant<std::vector<Eigen::Vector3d>, std::vector<Eigen::Vector3f>> vertices;
   /// Three indices into `vertices` each, counter-clockwise as seen from outside. Triangles that are close in space are
   /// close in this list.
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::uint32_t> lists;  ///< runs, see `namespace triangle_run`
-  double offset = 0;                 ///< subtracted from every distance: half of the thickness of a shell
+  std::vector<std::uint32_t> lists;
+  double offset = 0;  ///< subtracted from every distance: half of the thickness of a shell
 
   bool empty() const { return lists.empty(); }
 };
@@ -40,7 +43,7 @@ constexpr std::uint32_t length(std::uint32_t run) { return (run >> 27 & 15) + 1;
 constexpr bool isLast(std::uint32_t run) { return (run & kLast) != 0; }
 }  // namespace triangle_run
 
-/// How the sign of the distance in an exact leaf is found.
+/// The way in which the distance in an exact leaf gets its sign.
 enum class ExactSign : std::uint8_t {
   pseudonormal,  ///< by the angle-weighted pseudonormal of the nearest face, edge or vertex (Bærentzen & Aanæs 2005)
   positive,      ///< the distance is positive throughout the leaf

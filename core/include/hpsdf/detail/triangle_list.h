@@ -1,19 +1,47 @@
 #pragma once
+// Access to the triangles of exact leaves.
 
+#include <cstddef>
 #include <cstdint>
 
 #include "hpsdf/detail/field_data.h"
 
 namespace hpsdf {
 
+/// The list of an exact leaf within `ExactTriangles::lists`.
+class TriangleListView {
+ public:
+  TriangleListView(const ExactTriangles& exact, std::uint64_t leaf) : from_(&exact.lists[node::offset(leaf)]) {}
+  explicit TriangleListView(const std::uint32_t* from) : from_(from) {}
+
+  std::uint32_t count() const { return *from_; }
+  /// Returns the octants of the triangle at place i of the list.
+  std::uint8_t octants(std::uint32_t i) const { return static_cast<std::uint8_t>(from_[1 + i / 4] >> (8 * (i % 4))); }
+  const std::uint32_t* runs() const { return from_ + runsAt(count()); }
+
+  /// Returns the offset of the runs in a list of `count` triangles, that is behind their number and their octants.
+  static std::size_t runsAt(std::uint32_t count) { return 1 + (std::size_t{count} + 3) / 4; }
+
+  /// Calls f(run) for each run.
+  template <typename F>
+  void forEachRun(const F& f) const {
+    for (const std::uint32_t* run = runs();; ++run) {
+      f(*run);
+      if (triangle_run::isLast(*run)) return;
+    }
+  }
+
+ private:
+  const std::uint32_t* from_;
+};
+
 /// Calls f(index) for each triangle of an exact leaf's list. `leaf` is the packed node.
 template <typename F>
 void forEachTriangle(const ExactTriangles& exact, std::uint64_t leaf, const F& f) {
-  for (const std::uint32_t* run = &exact.lists[node::offset(leaf)];; ++run) {
-    const std::uint32_t first = triangle_run::first(*run), end = first + triangle_run::length(*run);
+  TriangleListView(exact, leaf).forEachRun([&](std::uint32_t run) {
+    const std::uint32_t first = triangle_run::first(run), end = first + triangle_run::length(run);
     for (std::uint32_t triangle = first; triangle < end; ++triangle) f(triangle);
-    if (triangle_run::isLast(*run)) return;
-  }
+  });
 }
 
 }  // namespace hpsdf

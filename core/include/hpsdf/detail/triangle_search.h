@@ -13,6 +13,13 @@
 
 namespace hpsdf {
 
+/// Triangles that can be nearest to points of a box.
+struct TriangleList {
+  std::vector<std::uint32_t> triangles;  ///< indices in ascending order
+  /// For each triangle, the octants of the box in which it can be nearest, as in `ExactTriangles`.
+  std::vector<std::uint8_t> octants;
+};
+
 /// A search for the triangles that can be nearest to the points of a box. A signed distance that is measured to
 /// triangles offers such a search, from which the construction of a field makes exact leaves. Thread-safe.
 class TriangleSearch {
@@ -31,9 +38,9 @@ class TriangleSearch {
   /// this is certain not to happen.
   virtual bool comesWithin(const Box& box, double distance) const = 0;
 
-  /// Returns the indices, in ascending order, of triangles among which are all triangles that can be nearest to a point
-  /// of the box. Returns std::nullopt if more than `most` triangles are found.
-  virtual std::optional<std::vector<std::uint32_t>> nearestTo(const Box& box, std::size_t most) const = 0;
+  /// Returns triangles among which are all triangles that can be nearest to a point of the box. Returns std::nullopt if
+  /// more than `most` triangles are found.
+  virtual std::optional<TriangleList> nearestTo(const Box& box, std::size_t most) const = 0;
 
   /// Returns false if `signIn` finds no sign anywhere.
   virtual bool hasSigns() const = 0;

@@ -142,10 +142,11 @@ void exactItems(Stream& stream, Fit& fit, std::size_t triangles) {
   stream.item(fit.sign);
   stream.require(fit.sign <= ExactSign::negative, "a cell's sign is unknown");
   finiteItem(stream, fit.error.volume);
-  stream.list(fit.triangles);
-  const bool ascends = std::ranges::adjacent_find(fit.triangles, std::greater_equal()) == fit.triangles.end();
-  stream.require(!fit.triangles.empty() && ascends && fit.triangles.back() < triangles,
-                 "an exact cell has triangles that cannot be");
+  auto& [listed, octants] = fit.list;
+  stream.list(listed);
+  const bool ascends = std::ranges::adjacent_find(listed, std::greater_equal()) == listed.end();
+  stream.require(!listed.empty() && ascends && listed.back() < triangles, "an exact cell has triangles that cannot be");
+  stream.array(octants, listed.size());
 }
 
 template <typename Stream>

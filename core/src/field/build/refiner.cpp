@@ -56,7 +56,7 @@ void Refiner::makeExact(std::uint32_t leaf, Fit&& fit) {
   Fit& before = state.tree.nodes[leaf].fit;
   state.coefficients += fit.coefficients.size();
   state.coefficients -= setup.budget.finalCoefficients(before);
-  const double listed = double(fit.triangles.size() * sizeof(fit.triangles[0]));
+  const double listed = bytesOf(fit.list);
   state.exactSize.inTree += listed;
   state.exactSize.inField += listed;
   state.totals.add(before.error, -1);

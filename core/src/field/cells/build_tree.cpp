@@ -47,6 +47,10 @@ void BuildTree::split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own
   setChildIndices(leaf);
 }
 
+double bytesOf(const TriangleList& list) {
+  return double(list.triangles.size() * (sizeof(list.triangles[0]) + sizeof(list.octants[0])));
+}
+
 static std::size_t countCoefficients(const BuildTree& tree) {
   std::size_t count = 0;
   for (const BuildNode& node : tree.nodes)
@@ -62,7 +66,7 @@ static std::optional<ExactListPacker> makePacker(const BuildTree& tree, const Tr
   for (const BuildNode& node : tree.nodes) {
     if (node.firstChild != 0 || !node.fit.isExact()) continue;
     if (!packer) packer.emplace(*search);
-    packer->mark(node.fit.triangles);
+    packer->mark(node.fit.list);
   }
   return packer;
 }
@@ -73,8 +77,8 @@ ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, Coeffic
   if (!packer) return size;
   for (const BuildNode& node : tree.nodes) {
     if (node.firstChild != 0 || !node.fit.isExact()) continue;
-    packer->pack(node.fit.triangles);
-    size.inTree += double(node.fit.triangles.size() * sizeof(node.fit.triangles[0]));
+    packer->pack(node.fit.list);
+    size.inTree += bytesOf(node.fit.list);
   }
   const ExactTriangles exact = packer->finish();
   const bool isFloat =
@@ -108,7 +112,7 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch*
       stack.pop_back();
       BuildNode& node = tree.nodes[pair.from];
       if (node.firstChild == 0 && node.fit.isExact()) {
-        data.nodes[pair.to] = node::exactLeaf(node.fit.sign, packer->pack(node.fit.triangles));
+        data.nodes[pair.to] = node::exactLeaf(node.fit.sign, packer->pack(node.fit.list));
         node.fit = Fit{};
         continue;
       }

@@ -46,6 +46,9 @@ struct ExactSize {
   double inTree = 0;   ///< in the octree of the construction
 };
 
+/// Returns the bytes that the list of an exact leaf takes during the construction.
+double bytesOf(const TriangleList& list);
+
 /// Computes the memory of the exact leaves of a tree. In the finished field, the vertices have the precision of
 /// coefficients of type `type`.
 ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, CoefficientType type);

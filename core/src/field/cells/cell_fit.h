@@ -14,6 +14,7 @@
 #include "field/nearness.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/detail/exact_triangles.h"
+#include "hpsdf/detail/triangle_search.h"
 #include "hpsdf/distance_function.h"
 
 namespace hpsdf::detail {
@@ -37,8 +38,8 @@ struct Fit {
   bool isFinal = false;     ///< without error: an exact leaf, or a polynomial that equals Φ; never refined or pruned
   CachedProjection cached;  ///< projection of at least the fit's degree; kept for pruning
   /// For an exact leaf, whose degree is `kExactDegree`: its triangles, as `TriangleSearch::nearestTo` returns them, and
-  /// how their distance gets its sign.
-  std::vector<std::uint32_t> triangles = {};
+  /// the way in which their distance gets its sign.
+  TriangleList list = {};
   ExactSign sign = ExactSign::pseudonormal;
 
   bool isExact() const { return degree == kExactDegree; }

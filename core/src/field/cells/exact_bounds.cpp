@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <span>
+#include <map>
 #include <variant>
 
 #include "field/cells/exact_lists.h"
@@ -15,8 +15,6 @@
 
 namespace hpsdf::detail {
 namespace {
-
-using Corners = std::array<std::array<double, 3>, 3>;
 
 bool hasOnlyFloats(const TriangleSearch& search) {
   return std::ranges::all_of(search.vertices(), [](const Vector3& v) { return query::throughFloat(v) == v; });
@@ -52,6 +50,12 @@ ExactBounds::ExactBounds(const FieldData& field, const DistanceFunction& distanc
                      (all.min().cwiseAbs().cwiseMax(all.max().cwiseAbs()).norm() + reach_);
 }
 
+ExactBounds::Corners ExactBounds::cornersOf(std::uint32_t triangle) const {
+  Corners corners;
+  for (int k = 0; k < 3; ++k) Vector3::Map(corners[k].data()) = vertices_[field_.exact.triangles[triangle][k]];
+  return corners;
+}
+
 /// The error has three parts.
 ///
 /// A vertex that is moved by δ moves no point of its triangles by more than δ, and hence changes no distance by more
@@ -76,27 +80,29 @@ double ExactBounds::error(const query::OctreeNode& leaf) const {
   return vertexError_ + coordinateError_ + std::min(kEpsilon * thinnest, 1.0) * reach_;
 }
 
-/// Returns true if the leaf's list contains all triangles that can be nearest to a point of the box `around`.
+/// Returns true if the leaf's list contains all triangles that can be nearest to a point of the box `around`, for each
+/// of its octants.
 bool ExactBounds::isComplete(const query::OctreeNode& leaf, const Box& around) const {
   if (search_ == nullptr) return false;
   const bool isSingle = std::holds_alternative<std::vector<Eigen::Vector3f>>(field_.exact.vertices);
-  std::vector<Corners> listed;
-  forEachTriangle(field_.exact, field_.nodes[leaf.node], [&](std::uint32_t index) {
-    const auto& triangle = field_.exact.triangles[index];
-    Corners& corners = listed.emplace_back();
-    for (int k = 0; k < 3; ++k) Vector3::Map(corners[k].data()) = vertices_[triangle[k]];
-  });
-  const auto nearest = search_->nearestTo(around, listed.size());
+  const TriangleListView list(field_.exact, field_.nodes[leaf.node]);
+  std::map<Corners, std::uint8_t> listed;  // octants by triangle
+  std::uint32_t place = 0;
+  forEachTriangle(field_.exact, field_.nodes[leaf.node],
+                  [&](std::uint32_t triangle) { listed[cornersOf(triangle)] |= list.octants(place++); });
+  const auto nearest = search_->nearestTo(around, list.count());
   if (!nearest) return false;
-  std::ranges::sort(listed);
-  return std::ranges::all_of(*nearest, [&](std::uint32_t triangle) {
+  for (std::size_t i = 0; i < nearest->triangles.size(); ++i) {
+    const auto& triangle = search_->triangles()[nearest->triangles[i]];
     Corners corners;
     for (int k = 0; k < 3; ++k) {
-      const Vector3& vertex = search_->vertices()[search_->triangles()[triangle][k]];
+      const Vector3& vertex = search_->vertices()[triangle[k]];
       Vector3::Map(corners[k].data()) = isSingle ? query::throughFloat(vertex) : vertex;
     }
-    return std::ranges::binary_search(listed, corners);
-  });
+    const auto found = listed.find(corners);
+    if (found == listed.end() || (nearest->octants[i] & ~found->second) != 0) return false;
+  }
+  return true;
 }
 
 /// Beyond the box, the list may lack the nearest triangles. Let y be the point of the box that is closest to x, at the
@@ -113,7 +119,8 @@ double ExactBounds::errorAround(const query::OctreeNode& leaf) const {
   const double beyond = 2 * field_.blend * box.sizes().norm();
   if (node::exactSign(bits) != ExactSign::pseudonormal) return rounding + beyond;
   double atCentre = 0;
-  query::evaluateExact(field_.exact, bits, box.center(), atCentre);
+  const Vector3 centre = box.center();
+  query::evaluateExact(field_.exact, bits, 0, {&centre, 1}, &atCentre);
   return rounding + beyond + 2 * (std::abs(atCentre) + around.sizes().norm() / 2 + rounding);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // Bounds of the error of exact leaves.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -25,6 +26,9 @@ class ExactBounds {
   double errorAround(const query::OctreeNode& leaf) const;
 
  private:
+  using Corners = std::array<std::array<double, 3>, 3>;
+
+  Corners cornersOf(std::uint32_t triangle) const;
   bool isComplete(const query::OctreeNode& leaf, const Box& around) const;
 
   const FieldData& field_;

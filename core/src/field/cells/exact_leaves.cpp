@@ -58,16 +58,16 @@ Fit planeFit(const Box& cell, const CommonPlane& plane) {
 
 /// Returns the fit of a cell with these triangles, which were found for `box`; or std::nullopt if they do not determine
 /// the sign.
-std::optional<Fit> ExactCells::fitFrom(const Box& cell, const Box& box, std::vector<std::uint32_t> triangles) const {
-  const std::optional<ExactSign> sign = search_.signIn(box, triangles);
+std::optional<Fit> ExactCells::fitFrom(const Box& cell, const Box& box, TriangleList list) const {
+  const std::optional<ExactSign> sign = search_.signIn(box, list.triangles);
   if (!sign) return std::nullopt;
-  const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, triangles) : std::nullopt;
+  const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, list.triangles) : std::nullopt;
   Fit fit;
   if (plane) {
     fit = planeFit(cell, *plane);
   } else {
     fit.degree = kExactDegree;
-    fit.triangles = std::move(triangles);
+    fit.list = std::move(list);
     fit.sign = *sign;
   }
   fit.isFinal = true;
@@ -80,10 +80,10 @@ ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) con
   // Lists without a sign contain triangles that intersect others. Cells with so short lists are not divided further.
   constexpr std::size_t kFew = 8;
   const Box box = boxOfWeight(cell, blend_);
-  auto triangles = search_.nearestTo(box, isDivisible ? most_ : kLonger * most_);
-  if (!triangles) return {{}, isDivisible};
-  const bool isLong = triangles->size() > kFew;
-  std::optional<Fit> fit = fitFrom(cell, box, std::move(*triangles));
+  auto list = search_.nearestTo(box, isDivisible ? most_ : kLonger * most_);
+  if (!list) return {{}, isDivisible};
+  const bool isLong = list->triangles.size() > kFew;
+  std::optional<Fit> fit = fitFrom(cell, box, std::move(*list));
   if (!fit) return {{}, isDivisible && isLong};
   fit->error.near = true;
   return {std::move(fit), false};
@@ -92,19 +92,20 @@ ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) con
 bool ExactCells::isSmooth(const Box& cell) const {
   constexpr std::size_t kMost = 512;
   constexpr double kCosine = 0.95;  // of the greatest angle between a normal and the mean normal, 18 degrees
-  const auto triangles = search_.nearestTo(boxOfWeight(cell, blend_), kMost);
-  if (!triangles) return false;
-  std::vector<Vector3> normals(triangles->size());
+  const auto list = search_.nearestTo(boxOfWeight(cell, blend_), kMost);
+  if (!list) return false;
+  std::vector<Vector3> normals(list->triangles.size());
   Vector3 sum = Vector3::Zero();
-  for (std::size_t i = 0; i < normals.size(); ++i) sum += normals[i] = normalOf(search_, (*triangles)[i]).normalized();
+  for (std::size_t i = 0; i < normals.size(); ++i)
+    sum += normals[i] = normalOf(search_, list->triangles[i]).normalized();
   const Vector3 mean = sum.normalized();
   return std::ranges::all_of(normals, [&](const Vector3& normal) { return normal.dot(mean) >= kCosine; });
 }
 
 std::optional<Fit> ExactCells::fitOfFarCell(const Box& cell, std::size_t mostTriangles) const {
   const Box box = boxOfWeight(cell, blend_);
-  auto triangles = search_.nearestTo(box, mostTriangles);
-  return triangles ? fitFrom(cell, box, std::move(*triangles)) : std::nullopt;
+  auto list = search_.nearestTo(box, mostTriangles);
+  return list ? fitFrom(cell, box, std::move(*list)) : std::nullopt;
 }
 
 namespace {

@@ -54,7 +54,7 @@ class ExactCells {
   static constexpr std::size_t kShort =
       12;  ///< triangles of a list with at most as many bytes as a quadratic polynomial
 
-  std::optional<Fit> fitFrom(const Box& cell, const Box& box, std::vector<std::uint32_t> triangles) const;
+  std::optional<Fit> fitFrom(const Box& cell, const Box& box, TriangleList list) const;
 
   const TriangleSearch& search_;
   double within_;

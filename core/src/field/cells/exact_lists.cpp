@@ -1,30 +1,13 @@
 #include "field/cells/exact_lists.h"
 
-#include <algorithm>
 #include <utility>
 
+#include "hpsdf/detail/triangle_list.h"
+
 namespace hpsdf::detail {
-namespace {
 
-/// Packs ascending triangle numbers into runs.
-std::vector<std::uint32_t> runsOf(std::span<const std::uint32_t> triangles) {
-  std::vector<std::uint32_t> runs;
-  for (std::size_t begin = 0; begin < triangles.size();) {
-    std::uint32_t length = 1;
-    while (length < triangle_run::kMostLength && begin + length < triangles.size() &&
-           triangles[begin + length] == triangles[begin] + length)
-      ++length;
-    runs.push_back(triangle_run::packed(triangles[begin], length));
-    begin += length;
-  }
-  runs.back() |= triangle_run::kLast;
-  return runs;
-}
-
-}  // namespace
-
-void ExactListPacker::mark(std::span<const std::uint32_t> triangles) {
-  for (const std::uint32_t triangle : triangles) numbers_[triangle] = 0;
+void ExactListPacker::mark(const TriangleList& list) {
+  for (const std::uint32_t triangle : list.triangles) numbers_[triangle] = 0;
 }
 
 void ExactListPacker::number() {
@@ -34,13 +17,25 @@ void ExactListPacker::number() {
   isNumbered_ = true;
 }
 
-std::uint32_t ExactListPacker::pack(std::span<const std::uint32_t> triangles) {
+std::vector<std::uint32_t> ExactListPacker::packed(const TriangleList& list) const {
+  const auto count = static_cast<std::uint32_t>(list.triangles.size());
+  std::vector<std::uint32_t> words(TriangleListView::runsAt(count));
+  words[0] = count;
+  for (std::uint32_t i = 0; i < count; ++i) words[1 + i / 4] |= std::uint32_t{list.octants[i]} << (8 * (i % 4));
+  const auto numberAt = [&](std::uint32_t i) { return numbers_[list.triangles[i]]; };
+  for (std::uint32_t begin = 0, length = 0; begin < count; begin += length) {
+    for (length = 1; length < triangle_run::kMostLength && begin + length < count; ++length)
+      if (numberAt(begin + length) != numberAt(begin) + length) break;
+    words.push_back(triangle_run::packed(numberAt(begin), length));
+  }
+  words.back() |= triangle_run::kLast;
+  return words;
+}
+
+std::uint32_t ExactListPacker::pack(const TriangleList& list) {
   if (!isNumbered_) number();
-  std::vector<std::uint32_t> numbers(triangles.size());
-  std::ranges::transform(triangles, numbers.begin(), [&](std::uint32_t triangle) { return numbers_[triangle]; });
-  std::vector<std::uint32_t> runs = runsOf(numbers);
-  const auto [entry, isNew] = offsets_.try_emplace(runs, static_cast<std::uint32_t>(lists_.size()));
-  if (isNew) lists_.insert(lists_.end(), runs.begin(), runs.end());
+  const auto [entry, isNew] = offsets_.try_emplace(packed(list), static_cast<std::uint32_t>(lists_.size()));
+  if (isNew) lists_.insert(lists_.end(), entry->first.begin(), entry->first.end());
   return entry->second;
 }
 

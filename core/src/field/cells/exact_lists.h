@@ -18,9 +18,9 @@ class ExactListPacker {
       : search_(search), numbers_(search.triangles().size(), kUnused) {}
 
   /// Marks triangles as used. All lists must be marked before the first one is packed.
-  void mark(std::span<const std::uint32_t> triangles);
+  void mark(const TriangleList& list);
   /// Packs a list and returns its offset.
-  std::uint32_t pack(std::span<const std::uint32_t> triangles);
+  std::uint32_t pack(const TriangleList& list);
   /// Returns the packed lists with the triangles and vertices to which they refer. The vertices are doubles.
   ExactTriangles finish();
 
@@ -28,12 +28,13 @@ class ExactListPacker {
   static constexpr std::uint32_t kUnused = 0xffffffff;
 
   void number();
+  std::vector<std::uint32_t> packed(const TriangleList& list) const;
 
   const TriangleSearch& search_;
   std::vector<std::uint32_t> numbers_;  ///< for each triangle of the search, its index in the field
   bool isNumbered_ = false;
   std::vector<std::uint32_t> lists_;
-  std::map<std::vector<std::uint32_t>, std::uint32_t> offsets_;  ///< offsets by list of runs
+  std::map<std::vector<std::uint32_t>, std::uint32_t> offsets_;  ///< offsets by packed list
 };
 
 /// Returns the box in which a leaf has a weight in a field whose blend zones are `blend` edges wide. The list of an

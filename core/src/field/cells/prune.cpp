@@ -97,7 +97,7 @@ class Pruning {
     const Fit& fit = tree_.nodes[n].fit;
     if (isFixed(n)) {
       chosen_[n] = static_cast<std::uint8_t>(fit.degree);
-      return lambda * (limits_.leafBytes[fit.degree] + double(sizeof(std::uint32_t)) * double(fit.triangles.size()));
+      return lambda * (limits_.leafBytes[fit.degree] + bytesOf(fit.list));
     }
     const int top = std::min<int>(limits_.mostDegree, fit.cached.degree);
     // Keep the degree of a cell outside the narrow band. Its error does not count, so that pruning would choose

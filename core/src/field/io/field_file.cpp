@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -87,10 +88,12 @@ void settingItem(Stream& stream, const BuildSetting& setting, Settings& settings
     stream.require(isKnown, ("its " + std::string(setting.name) + " is unknown").c_str());
   }
   if constexpr (!std::is_const_v<Settings>) {
-    if (number == 0 && setting.get(BuildOptions{}).empty())
+    if (number == 0 && setting.get(BuildOptions{}).empty()) {
+      stream.require(!std::signbit(number), ("its " + std::string(setting.name) + " is -0").c_str());
       setting.set(settings, {});
-    else
+    } else {
       setting.set(settings, std::array{number});
+    }
   }
 }
 

@@ -222,7 +222,8 @@ Result evaluateLeaf(const FieldData& field, const GridFrame& frame, const std::a
                     const LeafPoint& leaf) {
   Result result;
   if (node::isExact(leaf.bits)) [[unlikely]] {
-    evaluateExact(field.exact, leaf.bits, worldPoint(frame, gridCoordinates), result);
+    const Vector3 x = worldPoint(frame, gridCoordinates);
+    evaluateExact(field.exact, leaf.bits, octantOf(leaf.local), {&x, 1}, &result);
     return result;
   }
   std::visit([&](const auto& c) { evaluateLeaf(c.data(), frame, leaf, result); }, field.coefficients);

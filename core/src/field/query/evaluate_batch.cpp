@@ -271,23 +271,54 @@ void evaluateListed(const T* coefficients, const GridFrame& frame, const Batch& 
   }
 }
 
+/// A point of a batch that lies in an exact leaf. Points in the same octant of the same leaf have the same key.
+struct ExactPoint {
+  std::uint64_t key;
+  std::uint8_t index;  ///< in the batch
+};
+
+/// Packs an exact leaf and an octant. The bits 40 to 42 of a leaf in a lookup grid belong to its depth.
+std::uint64_t exactKey(std::uint64_t leaf, int octant) {
+  return node::exactLeaf(node::exactSign(leaf), node::offset(leaf)) | std::uint64_t(octant) << 40;
+}
+
+/// Evaluates the points that lie in exact leaves. Points in the same octant of a leaf are evaluated together.
+template <typename Result>
+void evaluateExactPoints(const ExactTriangles& exact, const GridFrame& frame, const Batch& batch,
+                         std::span<ExactPoint> exactPoints, Result* out) {
+  std::ranges::sort(exactPoints, {}, &ExactPoint::key);
+  std::array<Vector3, kBatch> points;
+  std::array<Result, kBatch> results;
+  for (std::size_t begin = 0, count = 0; begin < exactPoints.size(); begin += count) {
+    const std::uint64_t key = exactPoints[begin].key;
+    for (count = 0; begin + count < exactPoints.size() && exactPoints[begin + count].key == key; ++count) {
+      const std::size_t i = exactPoints[begin + count].index;
+      points[count] = worldPoint(frame, {batch.coordinates[0][i], batch.coordinates[1][i], batch.coordinates[2][i]});
+    }
+    evaluateExact(exact, key, static_cast<int>(key >> 40 & 7), std::span(points).first(count), results.data());
+    for (std::size_t n = 0; n < count; ++n) out[exactPoints[begin + n].index] = results[n];
+  }
+}
+
 /// Evaluates, at each point of a batch, the leaf that holds the point, without blending.
 template <typename T, typename Result>
 void evaluateLeaves(const FieldData& field, const T* coefficients, const GridFrame& frame, const Batch& batch,
                     Result* out) {
   forEachUpTo(Constant<kMaxVectorDegree - kMinVectorDegree>(),
               [&](auto k) { evaluateListed<kMinVectorDegree + k>(coefficients, frame, batch, out); });
+  std::array<ExactPoint, kBatch> exactPoints;
+  std::size_t exactCount = 0;
   for (std::size_t n = 0; n < batch.listedCount[kLists - 1]; ++n) {
-    const std::size_t i = batch.listed[kLists - 1][n];
+    const std::uint8_t i = batch.listed[kLists - 1][n];
+    const auto& [u, v, w] = batch.leafPoints[i].local;
     if (node::isExact(batch.bits[i])) {
-      const auto& [x, y, z] = batch.coordinates;
-      evaluateExact(field.exact, batch.bits[i], worldPoint(frame, {x[i], y[i], z[i]}), out[i]);
+      exactPoints[exactCount++] = {exactKey(batch.bits[i], octantOf({u, v, w})), i};
       continue;
     }
-    const auto& local = batch.leafPoints[i].local;
-    const LeafPoint leaf{batch.bits[i], LookupGrid::depthOf(batch.bits[i]), {local[0], local[1], local[2]}, {}, 0};
+    const LeafPoint leaf{batch.bits[i], LookupGrid::depthOf(batch.bits[i]), {u, v, w}, {}, 0};
     evaluateLeaf(coefficients, frame, leaf, out[i]);
   }
+  evaluateExactPoints(field.exact, frame, batch, std::span(exactPoints).first(exactCount), out);
 }
 
 /// Returns the i-th point of a batch as a `LeafPoint`. The cell index is not set, because `rampAlong` does not need it.

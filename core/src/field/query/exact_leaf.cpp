@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
+#include <type_traits>
+#include <utility>
 #include <variant>
 
 #include "hpsdf/detail/triangle_list.h"
@@ -32,92 +35,20 @@ struct NearestFeature {
   std::array<std::uint32_t, 2> vertex{};  ///< for an edge or a vertex: its vertices, the lower index first
 };
 
-/// Evaluates the exact leaf's list at one point.
+/// Triangles of a chunk, with room for those that are stored at once beyond its end.
+using Triangles = std::array<std::uint32_t, TriangleChunk::kSize + triangle_run::kMostLength>;
+
+/// Finds the feature that is nearest to a point, in double precision.
 template <typename V>
-class ListSearch {
+class FeatureSearch {
  public:
-  ListSearch(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf, const Vector3& x)
-      : exact_(exact), vertices_(vertices.data()), leaf_(leaf), x_(x) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double high = leadingDigits(x[axis]);
-      xHigh_[axis] = static_cast<float>(high);
-      xLow_[axis] = static_cast<float>(x[axis] - high);
-    }
-  }
+  FeatureSearch(const ExactTriangles& exact, const std::vector<V>& vertices, const Vector3& x)
+      : triangles_(exact.triangles.data()), vertices_(vertices.data()), x_(x) {}
 
-  NearestFeature nearest() {
-    TriangleChunk chunk;
-    std::array<std::uint32_t, TriangleChunk::kSize> triangles;
-    forEachTriangle(exact_, leaf_, [&](std::uint32_t triangle) {
-      if (chunk.count == TriangleChunk::kSize) search(chunk, triangles);
-      triangles[chunk.count++] = triangle;
-    });
-    search(chunk, triangles);
-    return best_;
-  }
-
-  /// Returns the pseudonormal of the nearest feature, not normalized.
-  Vector3 pseudonormal(const NearestFeature& feature) const {
-    if (feature.corners == 3) return feature.normal;
-    Vector3 sum = Vector3::Zero();
-    forEachTriangle(exact_, leaf_, [&](std::uint32_t triangle) {
-      const auto& corners = exact_.triangles[triangle];
-      int at = -1;
-      for (int k = 0; k < 3; ++k)
-        if (corners[k] == feature.vertex[0]) at = k;
-      if (at < 0) return;
-      const Vector3 origin = vertex(corners[at]);
-      const Vector3 next = vertex(corners[(at + 1) % 3]) - origin, previous = vertex(corners[(at + 2) % 3]) - origin;
-      const Vector3 normal = next.cross(previous);
-      const double length = normal.norm();
-      if (!(length > 0)) return;
-      if (feature.corners == 1)
-        sum += std::atan2(length, next.dot(previous)) / length * normal;
-      else if (corners[(at + 1) % 3] == feature.vertex[1] || corners[(at + 2) % 3] == feature.vertex[1])
-        sum += normal / length;
-    });
-    return sum;
-  }
-
- private:
-  Vector3 vertex(std::uint32_t index) const { return vertices_[index].template cast<double>(); }
-
-  /// Finds the nearest triangle of a chunk in double precision, among those that single precision cannot exclude.
-  /// Empties the chunk.
-  void search(TriangleChunk& chunk, const std::array<std::uint32_t, TriangleChunk::kSize>& triangles) {
-    constexpr std::size_t kFew = 3;  // so few triangles are tried at once
-    if (chunk.count <= kFew) {
-      for (std::size_t i = 0; i < chunk.count; ++i) tryTriangle(triangles[i]);
-    } else {
-      loadCorners(chunk, triangles);
-      findBounds(chunk);
-      for (std::size_t i = 0; i < chunk.count; ++i)
-        if (chunk.upper[i] < limit_) limit_ = chunk.upper[i];
-      for (std::size_t i = 0; i < chunk.count; ++i)
-        if (!(chunk.lower[i] > limit_)) tryTriangle(triangles[i]);
-    }
-    chunk.count = 0;
-  }
-
-  void loadCorners(TriangleChunk& chunk, const std::array<std::uint32_t, TriangleChunk::kSize>& triangles) const {
-    for (std::size_t i = 0; i < chunk.count; ++i) {
-      const auto& corners = exact_.triangles[triangles[i]];
-      for (int k = 0; k < 3; ++k) setRelative(vertices_[corners[k]], chunk.corners[k][i]);
-    }
-  }
-
-  /// Sets `out` to a vertex minus the query point, coordinate by coordinate, because a vector of four floats that is
-  /// put together from three is slow to store. The subtraction of the query point in two parts keeps the relative error
-  /// small.
-  void setRelative(const Eigen::Vector3f& v, Eigen::Vector4f& out) const {
-    for (int axis = 0; axis < 3; ++axis) out[axis] = (v[axis] - xHigh_[axis]) - xLow_[axis];
-  }
-  void setRelative(const Eigen::Vector3d& v, Eigen::Vector4f& out) const {
-    for (int axis = 0; axis < 3; ++axis) out[axis] = static_cast<float>(v[axis] - x_[axis]);
-  }
+  const NearestFeature& best() const { return best_; }
 
   void tryTriangle(std::uint32_t triangle) {
-    const auto& corners = exact_.triangles[triangle];
+    const auto& corners = triangles_[triangle];
     const std::array<Vector3, 3> v = {vertex(corners[0]), vertex(corners[1]), vertex(corners[2])};
     const Vector3 normal = (v[1] - v[0]).cross(v[2] - v[0]);
     const double squaredNormal = normal.squaredNorm();
@@ -130,6 +61,9 @@ class ListSearch {
     }
     if (inside) tryFace(normal, squaredNormal, x_ - v[0]);
   }
+
+ private:
+  Vector3 vertex(std::uint32_t index) const { return vertices_[index].template cast<double>(); }
 
   void tryFace(const Vector3& normal, double squaredNormal, const Vector3& fromCorner) {
     const double along = fromCorner.dot(normal);  // height times the length of the normal
@@ -154,13 +88,194 @@ class ListSearch {
     if (squared < best_.squared) best_ = {squared, difference, Vector3::Zero(), 0, corners, vertices};
   }
 
-  const ExactTriangles& exact_;
+  const std::array<std::uint32_t, 3>* triangles_;
   const V* vertices_;
-  std::uint64_t leaf_;
   Vector3 x_;
-  Eigen::Vector3f xHigh_, xLow_;  ///< x as a sum of two floats
   NearestFeature best_;
-  float limit_ = std::numeric_limits<float>::infinity();  ///< upper bound of the distance to the nearest triangle
+};
+
+/// Loads the corners of triangles relative to a point, in single precision.
+template <typename V>
+class CornerLoader {
+ public:
+  CornerLoader(const ExactTriangles& exact, const std::vector<V>& vertices, const Vector3& origin)
+      : triangles_(exact.triangles.data()), vertices_(vertices.data()), last_(vertices.size() - 1), origin_(origin) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double high = leadingDigits(origin[axis]);
+      high_[axis] = static_cast<float>(high);
+      low_[axis] = static_cast<float>(origin[axis] - high);
+    }
+  }
+
+  void load(const Triangles& triangles, std::uint32_t count, TriangleChunk& chunk) const {
+    chunk.count = count;
+    for (std::uint32_t i = 0; i < count; ++i)
+      for (int k = 0; k < 3; ++k) setRelative(triangles_[triangles[i]][k], chunk.corners[k][i]);
+  }
+
+ private:
+  /// Sets `out` to a vertex minus the origin.
+  void setRelative(std::uint32_t index, Eigen::Vector4f& out) const {
+    const V& vertex = vertices_[index];
+    if constexpr (std::is_same_v<V, Eigen::Vector3f>) {
+      // The subtraction in two parts keeps the relative error small. A load of four floats is much faster than three
+      // loads of one; the fourth belongs to the next vertex and does not matter.
+      if (index < last_) [[likely]]
+        out = (Eigen::Map<const Eigen::Vector4f>(vertex.data()) - high_) - low_;
+      else
+        out.head<3>() = (vertex - high_.head<3>()) - low_.head<3>();
+    } else {
+      for (int axis = 0; axis < 3; ++axis) out[axis] = static_cast<float>(vertex[axis] - origin_[axis]);
+    }
+  }
+
+  const std::array<std::uint32_t, 3>* triangles_;
+  const V* vertices_;
+  std::size_t last_;  ///< index of the last vertex
+  Vector3 origin_;
+  Eigen::Vector4f high_ = Eigen::Vector4f::Zero(), low_ = Eigen::Vector4f::Zero();  ///< sum of two floats: the origin
+};
+
+/// Keeps the items for which `keep` is true, without branches that could be mispredicted. Returns their number.
+template <typename Keep>
+std::uint32_t keepOnly(Triangles& triangles, std::uint32_t count, const Keep& keep) {
+  std::uint32_t kept = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    triangles[kept] = triangles[i];
+    kept += static_cast<std::uint32_t>(keep(i));
+  }
+  return kept;
+}
+
+float leastUpperBound(const TriangleChunk& chunk) {
+  float least = std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < chunk.count; ++i) least = chunk.upper[i] < least ? chunk.upper[i] : least;
+  return least;
+}
+
+/// The triangles that matter in one octant of an exact leaf.
+template <typename V>
+class OctantTriangles {
+ public:
+  OctantTriangles(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf, int octant)
+      : exact_(exact), vertices_(vertices), leaf_(leaf), octant_(octant) {}
+
+  NearestFeature nearestTo(const Vector3& x) const {
+    FeatureSearch<V> search(exact_, vertices_, x);
+    float limit = std::numeric_limits<float>::infinity();
+    forEachChunk([&](Triangles& triangles, std::uint32_t count) {
+      if (count > kFew) {
+        TriangleChunk chunk;
+        CornerLoader(exact_, vertices_, x).load(triangles, count, chunk);
+        findBounds(chunk);
+        limit = std::min(limit, leastUpperBound(chunk));
+        count = keepOnly(triangles, count, [&](std::uint32_t i) { return !(chunk.lower[i] > limit); });
+      }
+      for (std::uint32_t i = 0; i < count; ++i) search.tryTriangle(triangles[i]);
+    });
+    return search.best();
+  }
+
+  /// Calls f(i, feature) with the feature that is nearest to the i-th of several points. The results are those of
+  /// single queries, but come faster, because the points share the work of loading triangles.
+  template <typename F>
+  void forEachNearest(std::span<const Vector3> points, const F& f) const {
+    if (points.size() == 1 || TriangleListView(exact_, leaf_).count() > TriangleChunk::kSize) {
+      for (std::size_t i = 0; i < points.size(); ++i) f(i, nearestTo(points[i]));
+      return;
+    }
+    forEachChunk([&](Triangles& triangles, std::uint32_t count) {
+      Box box;
+      for (const Vector3& x : points) box.extend(x);
+      const Vector3 origin = box.center();
+      TriangleChunk chunk;
+      CornerLoader(exact_, vertices_, origin).load(triangles, count, chunk);
+      if (count > kFew) keepNearestToBall(static_cast<float>(box.sizes().norm() / 2), triangles, chunk);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        FeatureSearch<V> search(exact_, vertices_, points[i]);
+        const bool hasBounds = chunk.count > kFew;
+        if (hasBounds) findBounds(chunk, (points[i] - origin).template cast<float>());
+        const float limit = hasBounds ? leastUpperBound(chunk) : 0;
+        for (std::uint32_t n = 0; n < chunk.count; ++n)
+          if (!hasBounds || !(chunk.lower[n] > limit)) search.tryTriangle(triangles[n]);
+        f(i, search.best());
+      }
+    });
+  }
+
+  /// Returns the pseudonormal of the nearest feature, not normalized.
+  Vector3 pseudonormal(const NearestFeature& feature) const {
+    if (feature.corners == 3) return feature.normal;
+    const auto vertex = [&](std::uint32_t index) { return Vector3(vertices_[index].template cast<double>()); };
+    Vector3 sum = Vector3::Zero();
+    forEachTriangle(exact_, leaf_, [&](std::uint32_t triangle) {
+      const auto& corners = exact_.triangles[triangle];
+      int at = -1;
+      for (int k = 0; k < 3; ++k)
+        if (corners[k] == feature.vertex[0]) at = k;
+      if (at < 0) return;
+      const Vector3 origin = vertex(corners[at]);
+      const Vector3 next = vertex(corners[(at + 1) % 3]) - origin, previous = vertex(corners[(at + 2) % 3]) - origin;
+      const Vector3 normal = next.cross(previous);
+      const double length = normal.norm();
+      if (!(length > 0)) return;
+      if (feature.corners == 1)
+        sum += std::atan2(length, next.dot(previous)) / length * normal;
+      else if (corners[(at + 1) % 3] == feature.vertex[1] || corners[(at + 2) % 3] == feature.vertex[1])
+        sum += normal / length;
+    });
+    return sum;
+  }
+
+  ExactSign sign() const { return node::exactSign(leaf_); }
+  double offset() const { return exact_.offset; }
+
+ private:
+  static constexpr std::uint32_t kFew = 3;  ///< so few triangles are tried without bounds
+
+  /// Calls f(triangles, count) with the triangles in the octant, up to the size of a chunk at a time. `f` may change
+  /// the triangles.
+  template <typename F>
+  void forEachChunk(const F& f) const {
+    constexpr std::uint32_t kAtOnce = 8;  // so many triangles are stored without a branch that could be mispredicted
+    const TriangleListView list(exact_, leaf_);
+    Triangles triangles;
+    std::uint32_t place = 0, count = 0;
+    const auto pass = [&] {
+      f(triangles,
+        keepOnly(triangles, count, [&](std::uint32_t i) { return (list.octants(place + i) >> octant_ & 1) != 0; }));
+      place += std::exchange(count, 0);
+    };
+    list.forEachRun([&](std::uint32_t run) {
+      const std::uint32_t first = triangle_run::first(run), length = triangle_run::length(run);
+      if (count + length > TriangleChunk::kSize) pass();
+      for (std::uint32_t i = 0; i < kAtOnce; ++i) triangles[count + i] = first + i;
+      for (std::uint32_t i = kAtOnce; i < length; ++i) triangles[count + i] = first + i;
+      count += length;
+    });
+    pass();
+  }
+
+  /// Keeps the triangles of a chunk that can be nearest to a point of the ball with this radius around the origin. No
+  /// triangle farther from the origin than d + 2r can be, where d is the distance of the nearest one.
+  static void keepNearestToBall(float radius, Triangles& triangles, TriangleChunk& chunk) {
+    constexpr float kRounding = 1 + 1e-6F;
+    if (chunk.count == 0) return;
+    findBounds(chunk);
+    const float limit = (leastUpperBound(chunk) + 2 * radius) * kRounding;
+    std::uint32_t kept = 0;
+    for (std::uint32_t i = 0; i < chunk.count; ++i) {
+      for (auto& corner : chunk.corners) corner[kept] = corner[i];
+      triangles[kept] = triangles[i];
+      kept += static_cast<std::uint32_t>(!(chunk.lower[i] > limit));
+    }
+    chunk.count = kept;
+  }
+
+  const ExactTriangles& exact_;
+  const std::vector<V>& vertices_;
+  std::uint64_t leaf_;
+  int octant_;
 };
 
 /// Returns 1 if the signed distance grows along the normal of the nearest face, and -1 if it falls.
@@ -169,17 +284,14 @@ double slopeAcross(const NearestFeature& face, ExactSign sign) {
   return (face.height < 0) == (sign == ExactSign::negative) ? 1 : -1;
 }
 
-/// The signed distance to a list, before the offset is subtracted, with its gradient.
+/// Returns the signed distance, with its gradient, of a point whose nearest feature is given.
 template <typename V>
-ValueAndGradient signedDistance(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf,
-                                const Vector3& x, bool withGradient) {
-  ListSearch<V> search(exact, vertices, leaf, x);
-  const NearestFeature nearest = search.nearest();
-  const ExactSign sign = node::exactSign(leaf);
+ValueAndGradient signedDistance(const OctantTriangles<V>& triangles, const NearestFeature& nearest, bool withGradient) {
+  const ExactSign sign = triangles.sign();
   const double distance = std::sqrt(nearest.squared);
   ValueAndGradient result{distance, Vector3::Zero()};
   const bool needsNormal = sign == ExactSign::pseudonormal || (withGradient && !(distance > 0));
-  const Vector3 normal = needsNormal ? search.pseudonormal(nearest) : Vector3::Zero();
+  const Vector3 normal = needsNormal ? triangles.pseudonormal(nearest) : Vector3::Zero();
   if (sign == ExactSign::pseudonormal) {
     if (nearest.corners == 3)
       result.value = nearest.height + 0.0;
@@ -194,25 +306,36 @@ ValueAndGradient signedDistance(const ExactTriangles& exact, const std::vector<V
     else
       result.gradient = distance > 0 ? Vector3(nearest.difference / result.value) : Vector3(normal.normalized());
   }
+  result.value -= triangles.offset();
   return result;
 }
 
-template <typename V>
-ValueAndGradient evaluated(const ExactTriangles& exact, const std::vector<V>& vertices, std::uint64_t leaf,
-                           const Vector3& x, bool withGradient) {
-  ValueAndGradient result = signedDistance(exact, vertices, leaf, x, withGradient);
-  result.value -= exact.offset;
-  return result;
+template <typename Result>
+void evaluateAll(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
+                 Result* out) {
+  std::visit(
+      [&](const auto& vertices) {
+        const OctantTriangles triangles(exact, vertices, leaf, octant);
+        triangles.forEachNearest(points, [&](std::size_t i, const NearestFeature& nearest) {
+          if constexpr (std::is_same_v<Result, double>)
+            out[i] = signedDistance(triangles, nearest, false).value;
+          else
+            out[i] = signedDistance(triangles, nearest, true);
+        });
+      },
+      exact.vertices);
 }
 
 }  // namespace
 
-void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x, double& value) {
-  value = std::visit([&](const auto& v) { return evaluated(exact, v, leaf, x, false).value; }, exact.vertices);
+void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
+                   double* out) {
+  evaluateAll(exact, leaf, octant, points, out);
 }
 
-void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x, ValueAndGradient& result) {
-  result = std::visit([&](const auto& v) { return evaluated(exact, v, leaf, x, true); }, exact.vertices);
+void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
+                   ValueAndGradient* out) {
+  evaluateAll(exact, leaf, octant, points, out);
 }
 
 }  // namespace hpsdf::query

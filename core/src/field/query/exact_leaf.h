@@ -1,16 +1,27 @@
 #pragma once
 // Evaluation of exact leaves: the signed distance to the nearest of a list of triangles.
 
+#include <array>
 #include <cstdint>
+#include <span>
 
 #include "hpsdf/detail/field_data.h"
 
 namespace hpsdf::query {
 
-/// Computes the signed distance from x to the nearest of the triangles of an exact leaf; `leaf` is the packed node. The
-/// overload for `ValueAndGradient` also gives the gradient. On the surface, where the distance is 0, the gradient is
-/// the unit pseudonormal. The results do not depend on the instruction set.
-void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x, double& value);
-void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x, ValueAndGradient& result);
+/// Returns the octant, numbered like the children of a cell, of a point with these local coordinates.
+inline int octantOf(const std::array<double, 3>& local) {
+  return static_cast<int>(local[0] >= 0) | static_cast<int>(local[1] >= 0) << 1 | static_cast<int>(local[2] >= 0) << 2;
+}
+
+/// Computes the signed distances from points to the nearest of the triangles of an exact leaf. `leaf` is the packed
+/// node. All points must lie in the same octant of the leaf (`octantOf`); a point on the plane between two octants lies
+/// in both. The overload for `ValueAndGradient` also gives the gradients. On the surface, where the distance is 0, the
+/// gradient is the unit pseudonormal. The results depend neither on the instruction set nor on the number of points.
+/// Several points are faster than one if they lie close to each other.
+void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
+                   double* out);
+void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
+                   ValueAndGradient* out);
 
 }  // namespace hpsdf::query

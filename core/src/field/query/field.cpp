@@ -4,11 +4,15 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "basis/projection.h"
 #include "field/query/blend.h"
 #include "field/query/evaluate.h"
+#include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
@@ -36,9 +40,35 @@ std::size_t checkGrid(const FieldData& data) {
   return cells;
 }
 
+/// Returns where the lists of triangles begin. Throws `Error` unless the lists are whole and refer to triangles.
+std::vector<std::uint32_t> checkLists(const ExactTriangles& exact) {
+  const std::span<const std::uint32_t> words = exact.lists;
+  std::vector<std::uint32_t> starts;
+  for (std::size_t at = 0; at < words.size();) {
+    starts.push_back(static_cast<std::uint32_t>(at));
+    const TriangleListView list(&words[at]);
+    at += TriangleListView::runsAt(list.count());
+    std::size_t listed = 0;
+    bool isLast = false;
+    for (; !isLast && at < words.size(); ++at) {
+      const std::uint32_t run = words[at];
+      if (std::size_t(triangle_run::first(run)) + triangle_run::length(run) > exact.triangles.size())
+        notAField("a list of triangles refers beyond their end");
+      listed += triangle_run::length(run);
+      isLast = triangle_run::isLast(run);
+    }
+    if (!isLast || listed != list.count()) notAField("a list of triangles has a wrong length");
+    std::uint8_t octants = 0;
+    for (std::uint32_t i = 0; i < list.count(); ++i) octants |= list.octants(i);
+    if (octants != 0xff) notAField("a list has no triangle for an octant");
+  }
+  return starts;
+}
+
 /// Throws `Error` unless the nodes form trees: every group of children must belong to exactly one node, which precedes
 /// the group.
 void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coefficients) {
+  const std::vector<std::uint32_t> lists = checkLists(data.exact);
   const auto& nodes = data.nodes;
   constexpr std::uint8_t kUnreached = 0xff;
   if ((nodes.size() - baseCells) % 8 != 0) notAField("its nodes do not come in groups of eight");
@@ -48,7 +78,7 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
     if (depth[n] == kUnreached) notAField("node " + std::to_string(n) + " is no other node's child");
     if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
     if (node::isExact(nodes[n])) {
-      if (node::offset(nodes[n]) >= data.exact.lists.size()) notAField("a cell's triangles lie beyond the end");
+      if (!std::ranges::binary_search(lists, node::offset(nodes[n]))) notAField("a cell has no list of triangles");
       continue;
     }
     if (node::isLeaf(nodes[n])) {
@@ -77,10 +107,6 @@ void checkExact(const ExactTriangles& exact) {
   for (const auto& triangle : exact.triangles)
     for (const std::uint32_t vertex : triangle)
       if (vertex >= vertices) notAField("a triangle refers to vertex " + std::to_string(vertex));
-  for (const std::uint32_t run : exact.lists)
-    if (std::size_t(triangle_run::first(run)) + triangle_run::length(run) > exact.triangles.size())
-      notAField("a list of triangles refers beyond their end");
-  if (!exact.lists.empty() && !triangle_run::isLast(exact.lists.back())) notAField("a list of triangles has no end");
   if (!(exact.offset >= 0) || !std::isfinite(exact.offset)) notAField("the offset of its exact cells is out of range");
 }
 
