@@ -14,6 +14,7 @@
 
 #include "check/baseline.h"
 #include "files/data_table.h"
+#include "files/text_file.h"
 #include "hpsdf/error.h"
 #include "hpsdf/render/image.h"
 #include "outcome.h"
@@ -357,6 +358,14 @@ TEST(DataTable, nanAgreesWithNanOnly) {
   DataTable other = table;
   other.values = {1, nan};
   EXPECT_EQ(compare(table, other, 1e9).differing, 2u);
+}
+
+TEST(DataTable, readsTheDegreeOfExactLeaves) {
+  const support::TemporaryDirectory folder;
+  writeTextFile(folder / "a.csv", "value,degree,depth\n0.5,exact,3\n0.25,4,exact\n");
+  EXPECT_EQ(loadData(folder / "a.csv").values, (std::vector<double>{0.5, kExactDegree, 3, 0.25, 4, kExactDegree}));
+  writeTextFile(folder / "a.csv", "0.5,exactly,3\n1,exactly,3\n");
+  EXPECT_THROW(loadData(folder / "a.csv"), Error);
 }
 
 TEST(DataTable, brokenFilesAreRefusedByName) {

@@ -53,6 +53,27 @@ TEST_F(FieldFile, infoDescribesTheField) {
   EXPECT_THAT(text.out, HasSubstr("▇"));
 }
 
+TEST_F(FieldFile, infoTellsOfExactLeaves) {
+  const std::string box = at("box.hpsdf");
+  const Outcome built = run({{"build", "builtin:box", "-o", box, "--strategy", "hpx", "--target-error", "1e-3"}});
+  const FieldStatistics figures = statistics(load(box));
+  const FieldBytes bytes = load(box).bytesOfParts();
+  const std::string exact = std::to_string(figures.exact.leaves) + " exact";
+  ASSERT_GT(figures.exact.leaves, 0u);
+  EXPECT_THAT(built.out, AllOf(HasSubstr(exact), HasSubstr(" 12 triangles, ")));
+  EXPECT_THAT(run({{"info", box}}).out, AllOf(HasSubstr(exact), ContainsRegex("exact triangles +12; a leaf lists")));
+  const Json json = Json::parse(run({{"info", box, "--json"}}).out);
+  EXPECT_EQ(json.at("exact_leaves"), Json({{"leaves", figures.exact.leaves},
+                                           {"triangles", 12},
+                                           {"median_list", figures.exact.medianList},
+                                           {"longest_list", figures.exact.longestList}}));
+  EXPECT_EQ(json.at("bytes_of_parts").at("exact_triangles"), bytes.exactTriangles);
+  EXPECT_EQ(json.at("bytes"), bytes.total());
+
+  EXPECT_THAT(run({{"info", field()}}).out, Not(HasSubstr("exact triangles")));
+  EXPECT_FALSE(Json::parse(run({{"info", field(), "--json"}}).out).contains("exact_leaves"));
+}
+
 TEST_F(FieldFile, damagedFieldsAreRefused) {
   const std::string whole = readFile(field());
   std::mt19937_64 random(5);

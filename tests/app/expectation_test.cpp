@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "hpsdf/error.h"
+#include "hpsdf/types.h"
 
 namespace hpsdf::app {
 namespace expectation_test {
@@ -54,6 +55,13 @@ TEST(Expectation, comparesByItsOperator) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const char* text : {"jumps.max < 3", "jumps.max <= 3", "jumps.max > 3", "jumps.max >= 3", "jumps.max == 3"})
     EXPECT_FALSE(holds(text, nan)) << text;
+}
+
+TEST(Expectation, theDegreeOfAnExactLeafIsAWord) {
+  EXPECT_TRUE(parseExpectation("pick(1,2).degree == exact").holds(kExactDegree));
+  EXPECT_FALSE(parseExpectation("at(0,0,0).degree != exact").holds(kExactDegree));
+  EXPECT_TRUE(parseExpectation("at(0,0,0).degree < exact").holds(kMaxDegree));
+  EXPECT_THAT(refusal("at(0,0,0).depth == exact"), HasSubstr("a number, found 'exact'"));
 }
 
 TEST(Expectation, mistakesAreNamed) {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "hpsdf/field_file.h"
 #include "outcome.h"
 #include "simulate/scene_request.h"
 #include "support/temporary_directory.h"
@@ -277,6 +278,22 @@ TEST(Simulate, aCacheWithAnotherFieldIsRefused) {
 
   refused(words((folder / "good").string(), "1e-2"), "good: cannot be made a folder for fields");
   refused(words("/sys", "1e-2"), "cannot be written");
+}
+
+TEST(Simulate, fieldsMayHaveExactLeaves) {
+  const support::TemporaryDirectory folder;
+  const std::filesystem::path cache = folder / "fields";
+  for (const std::string strategy : {"hp", "hpx", "hpx"}) {
+    std::vector<std::string> words = inSmall("cloth", cache.string());
+    words.insert(words.end(), {"--ground", "builtin:gear", "--strategy", strategy, "--json"});
+    const Outcome outcome = runHere(words);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(Json::parse(outcome.out)["lost"], 0);
+  }
+  std::multiset<bool> haveExactLeaves;  // of the fields in the cache: ground and table, of either strategy
+  for (const auto& entry : std::filesystem::directory_iterator(cache))
+    haveExactLeaves.insert(statistics(load(entry)).exact.leaves > 0);
+  EXPECT_EQ(haveExactLeaves, (std::multiset<bool>{false, false, true, true}));
 }
 
 /// A listener that cancels the work when it reports the given task.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "hpsdf/detail/cubic_grid.h"
 #include "hpsdf/detail/face_steps.h"
 #include "hpsdf/detail/line.h"
+#include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/jumps.h"
@@ -431,6 +433,30 @@ TEST(ExactLeafRounding, looksAtEveryCoordinate) {
   const ExactDistance exact(mesh);
   const Field field = build(exact, domainAround(mesh), hpx());
   EXPECT_TRUE(std::holds_alternative<std::vector<Eigen::Vector3d>>(field.data().exact.vertices));
+}
+
+TEST(ExactLeafBuild, statisticsCountTheTrianglesOfLists) {
+  const Built built(hpx());
+  const Field& field = built.field;
+  std::vector<std::size_t> lists;
+  std::set<std::uint32_t> triangles;
+  field.forEachCell([&](const Cell& cell) {
+    if (cell.degree != kExactDegree) return;
+    lists.push_back(0);
+    forEachTriangle(field.data().exact, field.data().nodes[cell.id], [&](std::uint32_t triangle) {
+      ++lists.back();
+      triangles.insert(triangle);
+    });
+  });
+  std::ranges::sort(lists);
+  const ExactLeafStatistics figures = statistics(field).exact;
+  EXPECT_EQ(figures.leaves, lists.size());
+  EXPECT_EQ(figures.triangles, triangles.size());
+  EXPECT_EQ(figures.medianList, lists[lists.size() / 2]);
+  EXPECT_EQ(figures.longestList, lists.back());
+  const FieldBytes bytes = field.bytesOfParts();
+  EXPECT_GT(bytes.exactTriangles, 12 * triangles.size());
+  EXPECT_EQ(bytes.nodes + bytes.coefficients + bytes.exactTriangles + bytes.lookupGrid, field.bytes());
 }
 
 /// Settings of the construction that could disagree with exact leaves.

@@ -344,16 +344,18 @@ class Batch {
   Json lineOf(const BatchMesh& mesh, const Made& made, double seconds) const {
     Json field = made.field ? fieldJson(*made.field) : Json();
     const auto value = [&](const char* name) { return made.field ? field.at(name) : Json(); };
-    return {{"file", mesh.surface},
-            {"output", outputOf(mesh).string()},
-            {"status", statusName(made.status)},
-            {"seconds", std::round(1e3 * seconds) / 1e3},
-            {"leaves", value("leaves")},
-            {"bytes", value("bytes")},
-            {"file_bytes", value("file_bytes")},
-            {"rms_estimate", value("rms_estimate")},
-            {"sign", made.field ? field.at("mesh").at("sign") : Json()},
-            {"error", made.status == Status::failed ? Json(made.error) : Json()}};
+    Json line = {{"file", mesh.surface},
+                 {"output", outputOf(mesh).string()},
+                 {"status", statusName(made.status)},
+                 {"seconds", std::round(1e3 * seconds) / 1e3},
+                 {"leaves", value("leaves")},
+                 {"bytes", value("bytes")},
+                 {"file_bytes", value("file_bytes")},
+                 {"rms_estimate", value("rms_estimate")},
+                 {"sign", made.field ? field.at("mesh").at("sign") : Json()},
+                 {"error", made.status == Status::failed ? Json(made.error) : Json()}};
+    if (field.contains("exact_leaves")) line["exact_leaves"] = field["exact_leaves"];
+    return line;
   }
 
   Console console_;

@@ -337,7 +337,9 @@ void addReadingCommands(Registry& registry) {
       .summary = "Show the size, the settings and the estimated error of a field.",
       .help =
           "Prints leaves, coefficients, memory, errors, settings, the mesh from which the field was made, and the "
-          "shares of its volume by degree and depth. The estimated RMS error is √(ε/|Ω|) in mesh units, where ε is the "
+          "shares of its volume by degree and depth. For a field with exact leaves it also prints how many they are, "
+          "how many triangles the field stores for them, how many of these a leaf refers to, and the memory of each "
+          "part of the field. The estimated RMS error is √(ε/|Ω|) in mesh units, where ε is the "
           "weighted estimate of the construction; 'hpsdf verify' measures the error.",
       .examples = {"hpsdf info bunny.hpsdf", "hpsdf info bunny.hpsdf --json"},
       .parameters = {fieldParameter()},

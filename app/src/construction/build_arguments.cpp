@@ -88,6 +88,13 @@ ParameterKind settingKind(const char* name) { return kindOf(buildSetting(name));
 
 Parameter settingParameter(const char* name) { return parameterFrom(buildSetting(name)); }
 
+Strategy strategyOf(const Arguments& arguments) {
+  const BuildSetting& setting = buildSetting("strategy");
+  BuildOptions options;
+  setting.set(options, valueOf(arguments, setting));
+  return options.strategy;
+}
+
 Parameter threadsParameter(const std::string& result) {
   return {"threads", settingKind("threads").under(kGeneral),
           fmt::format("Threads to use; 0 for all. {} the same whatever their number.", result)};

@@ -25,6 +25,9 @@ std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Endin
 /// Returns the command parameter for the setting `name` of the table `buildSettings`. The function `settingKind`
 /// returns only the type, the accepted values and the default of this parameter.
 Parameter settingParameter(const char* name);
+
+/// Returns the value of the parameter `strategy`.
+Strategy strategyOf(const Arguments& arguments);
 ParameterKind settingKind(const char* name);
 
 /// Returns the parameter for the number of threads. `result` begins a sentence of its help text: "The field is" gives

@@ -129,6 +129,10 @@ void drawStatistics(Ui& ui, Explorer& explorer) {
       {"target error", shortNumber(field.metadata().settings.targetError.weighted())},
       {"RMS estimate", shortNumber(field.metadata().rmsEstimate(field.domain()))},
   };
+  if (figures.exact.leaves > 0) {
+    rows.emplace_back("exact cells", grouped(figures.exact.leaves));
+    rows.emplace_back("exact triangles", grouped(figures.exact.triangles));
+  }
   if (explorer.session().knowsJumps()) {
     const Jumps& jumps = explorer.session().jumps();
     rows.emplace_back("jump of f, RMS", shortNumber(jumps.value.rms));

@@ -12,10 +12,19 @@
 
 #include "files/text_file.h"
 #include "hpsdf/error.h"
+#include "hpsdf/field.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
+
+/// Parses a number at the beginning of `text`. The word "exact", the degree of an exact leaf, counts as `kExactDegree`.
+std::from_chars_result parseCell(std::string_view text, double& number) {
+  static const std::string exact = levelName(kExactDegree);
+  if (!text.starts_with(exact)) return std::from_chars(text.data(), text.data() + text.size(), number);
+  number = kExactDegree;
+  return {text.data() + exact.size(), std::errc()};
+}
 
 /// Parses the numbers of a line of comma-separated values, NaN and infinity included. Returns std::nullopt if
 /// a cell is not a number.
@@ -24,7 +33,7 @@ std::optional<std::vector<double>> numbersOf(const std::string& line) {
   for (const char* cell = line.data();; ++cell) {
     const char* const end = line.data() + line.size();
     double number = 0;
-    const auto [after, error] = std::from_chars(cell, end, number);
+    const auto [after, error] = parseCell({cell, end}, number);
     if (error != std::errc()) return std::nullopt;
     numbers.push_back(number);
     if (after == end) return numbers;

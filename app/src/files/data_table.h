@@ -18,6 +18,7 @@ struct DataTable {
 bool isDataFile(const std::filesystem::path& file);
 
 /// Reads a .pfm file with one channel or a .csv file of numbers. The first line of a .csv file may hold column names.
+/// The word "exact" in a .csv file, the degree of an exact leaf, is read as `kExactDegree`, as in a .pfm file.
 /// Throws `Error` naming the file.
 DataTable loadData(const std::filesystem::path& file);
 

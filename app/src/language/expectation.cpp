@@ -8,6 +8,7 @@
 
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
+#include "hpsdf/field.h"
 #include "language/registry.h"
 #include "text/text.h"
 
@@ -111,7 +112,8 @@ Expectation parseExpectation(std::string_view text) {
   for (const char* comparison : {"==", "!=", "<=", ">=", "<", ">"})
     if (expectation.comparison.empty() && reader.take(comparison)) expectation.comparison = comparison;
   if (expectation.comparison.empty()) reader.fail("expected ==, !=, <, <=, > or >= after the name");
-  expectation.wanted = reader.number();
+  const bool wantsExact = expectation.isOfDegree() && reader.take(levelName(kExactDegree));
+  expectation.wanted = wantsExact ? kExactDegree : reader.number();
   if (reader.take("within")) {
     if (expectation.comparison != "==" && expectation.comparison != "!=")
       reader.fail("'within' goes with == and != only");

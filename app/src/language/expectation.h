@@ -8,7 +8,7 @@
 
 namespace hpsdf::app {
 
-/// An expectation, written as SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER [within NUMBER].
+/// An expectation, written as SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER|exact [within NUMBER].
 struct Expectation {
   std::string source;             ///< one of stats, jumps, pick and at
   std::vector<double> arguments;  ///< the numbers in parentheses after the source
@@ -16,6 +16,10 @@ struct Expectation {
   std::string comparison;         ///< operator: == != < <= > >=
   double wanted = 0;
   double tolerance = 0;  ///< largest difference that == and != accept as equal
+
+  /// True if the expectation is about the degree of a leaf. The degree of an exact leaf is written as the word "exact"
+  /// and counts as `kExactDegree`, which is greater than all other degrees.
+  bool isOfDegree() const { return path.back() == "degree"; }
 
   bool holds(double found) const;
 };

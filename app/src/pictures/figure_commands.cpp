@@ -76,7 +76,7 @@ Json figuresOf(Session& session, const Expectation& expectation) {
 }
 
 /// Returns the number in `json` at the key path of the expectation, such as stats.leaves. If there is no such key,
-/// throws `Error` with the most similar key.
+/// throws `Error` with the most similar key. The degree of an exact leaf counts as `kExactDegree`.
 double numberAt(Json json, const Expectation& expectation) {
   std::string path = expectation.source;
   for (const std::string& key : expectation.path) {
@@ -90,6 +90,7 @@ double numberAt(Json json, const Expectation& expectation) {
     json = isElement ? Json(json[std::size_t(*parseNumber(key))]) : Json(json[key]);
     path += "." + key;
   }
+  if (expectation.isOfDegree() && json.is_string()) return kExactDegree;
   if (!json.is_number()) throw Error(fmt::format("{} is no number", path));
   return json.get<double>();
 }
@@ -119,8 +120,12 @@ void runExpect(Session& session, const Arguments& arguments) {
   const std::string text = expressionOf(arguments);
   const Expectation expectation = parseExpectation(text);
   const double found = numberAt(figuresOf(session, expectation), expectation);
-  if (!expectation.holds(found)) throw Failed(fmt::format("expected {}, found {}", text, found));
-  if (session.wantsJson(arguments)) printJson(session.console().out, {{"expected", text}, {"found", found}});
+  const bool isExact = expectation.isOfDegree() && found == kExactDegree;
+  const Json shown = isExact ? degreeJson(kExactDegree) : Json(found);
+  if (!expectation.holds(found))
+    throw Failed(
+        fmt::format("expected {}, found {}", text, isExact ? levelName(kExactDegree) : fmt::format("{}", found)));
+  if (session.wantsJson(arguments)) printJson(session.console().out, {{"expected", text}, {"found", shown}});
 }
 
 }  // namespace
@@ -149,9 +154,11 @@ jumps.NAME: interfaces, hanging, area, max, rms, gradient_max, gradient_rms;
 pick(x,y).NAME: what the last picture shows at a pixel: position.0, value, cell, degree, depth, gradient.0, slope; exact
 and error where the exact distance is known; jump.value and jump.gradient at the nearest face of its cell;
 
-at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is known.)"),
+at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is known.
+
+The degree of an exact cell is written as exact, and counts as 31, which is greater than every other degree.)"),
       .examples = {"expect stats.leaves < 60000", "expect jumps.max < 1e-2", "expect pick(640,360).degree == 4",
-                   "expect at(0,0,0.5).value == 0.1 within 1e-5"},
+                   "expect pick(640,360).degree == exact", "expect at(0,0,0.5).value == 0.1 within 1e-5"},
       .parameters = {{"expression", text("EXPRESSION").positional().repeatable().required(), "What should hold."}},
       .action = runExpect,
       .check = [](const Arguments& arguments) { parseExpectation(expressionOf(arguments)); },

@@ -211,7 +211,8 @@ their outlines; colours by distance show iso-lines and the surface as a heavy li
 
 The extension of the output decides what is written: .png is a picture with legend and caption. .csv (columns
 x,y,z,value,degree,depth, one row for each pixel in the domain) and .pfm (32-bit floats, NaN outside the domain) hold
-raw values of as many pixels as size says: distances, or in a .pfm the quantity that color names.)"),
+raw values of as many pixels as size says: distances, or in a .pfm the quantity that color names. The degree of an exact
+cell is the word exact in a .csv and the number 31 in a .pfm.)"),
       .examples = {"hpsdf slice bunny.hpsdf -o degree.png",
                    "hpsdf slice bunny.hpsdf -o distance.png --axis x --offset 0.2 --color distance",
                    "hpsdf slice bunny.hpsdf -o oblique.png --plane 0,0,0,1,1,0 --color depth",

@@ -114,10 +114,11 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   if (built != nullptr && built->mesh) rows.emplace_back("Surface", closednessText(*built->mesh));
   if (metadata.source.insideTest != InsideTest::automatic)
     rows.emplace_back("Sign by", insideTestName(metadata.source.insideTest));
-  rows.emplace_back("Leaf cells", grouped(counts.leaves));
+  rows.emplace_back("Leaf cells", grouped(counts.leaves) + exactCountText(counts));
   rows.emplace_back("Coefficients",
                     fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));
-  rows.emplace_back("Memory", bytesText(double(counts.bytes)));
+  if (counts.exact.leaves > 0) rows.emplace_back("Exact triangles", exactTrianglesText(counts.exact));
+  rows.emplace_back("Memory", memoryText(field));
   rows.emplace_back("Target error τ", shortNumber(metadata.settings.targetError.weighted()));
   rows.emplace_back("Total error ε",
                     fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));
@@ -151,8 +152,8 @@ void runReport(Session& session, const Arguments& arguments) {
 
   const FieldStatistics counts = statistics(field);
   ReportPage page{.title = fmt::format("{} as an hp-adaptive signed distance field", plainName(current.name)),
-                  .subtitle = fmt::format("{} leaf cells, {}, estimated RMS error {}", grouped(counts.leaves),
-                                          bytesText(double(counts.bytes)),
+                  .subtitle = fmt::format("{} leaf cells{}, {}, estimated RMS error {}", grouped(counts.leaves),
+                                          exactCountText(counts), bytesText(double(counts.bytes)),
                                           shortNumber(field.metadata().rmsEstimate(field.domain()))),
                   .figures = figures(field, counts, built ? &*built : nullptr),
                   .degrees = counts.degreeVolume,

@@ -68,6 +68,22 @@ void addSettings(Json& json, const BuildOptions& settings) {
   }
 }
 
+Json exactJson(const ExactLeafStatistics& exact) {
+  if (exact.leaves == 0) return {};
+  return {{"leaves", exact.leaves},
+          {"triangles", exact.triangles},
+          {"median_list", exact.medianList},
+          {"longest_list", exact.longestList}};
+}
+
+Json bytesJson(const FieldBytes& bytes) {
+  return {{"nodes", bytes.nodes},
+          {"coefficients", bytes.coefficients},
+          {"exact_triangles", bytes.exactTriangles},
+          {"lookup_grid", bytes.lookupGrid},
+          {"bounds", bytes.bounds}};
+}
+
 Json fieldJson(const CurrentField& current) {
   const Field& field = current.field;
   const FieldMetadata& metadata = field.metadata();
@@ -106,6 +122,10 @@ Json fieldJson(const CurrentField& current) {
        {"depth_volume", levelsJson(figures.depthVolume)},
        {"degree_leaves", levelsJson(figures.degreeLeaves)},
        {"depth_leaves", levelsJson(figures.depthLeaves)}});
+  if (const Json exact = exactJson(figures.exact); !exact.is_null()) {
+    json["exact_leaves"] = exact;
+    json["bytes_of_parts"] = bytesJson(field.bytesOfParts());
+  }
   return json;
 }
 
@@ -116,10 +136,38 @@ std::string unitText(const Field& field) {
                      shortNumber(field.metadata().rmsEstimate(field.domain()) / scale));
 }
 
+std::string exactCountText(const FieldStatistics& figures) {
+  return figures.exact.leaves == 0 ? "" : fmt::format(" ({} exact)", grouped(figures.exact.leaves));
+}
+
+std::string exactTrianglesText(const ExactLeafStatistics& exact) {
+  return fmt::format("{}; a leaf lists {} in the median, {} at most", grouped(exact.triangles),
+                     grouped(exact.medianList), grouped(exact.longestList));
+}
+
+std::string memoryText(const Field& field) {
+  const FieldBytes bytes = field.bytesOfParts();
+  std::string text = bytesText(double(bytes.total()));
+  if (bytes.exactTriangles == 0) return text;
+  text += " (";
+  const auto part = [&](std::string_view name, std::size_t size) {
+    if (size > 0) text += fmt::format("{}{} {}", text.ends_with('(') ? "" : ", ", name, bytesText(double(size)));
+  };
+  part("nodes", bytes.nodes);
+  part("coefficients", bytes.coefficients);
+  part("triangles", bytes.exactTriangles);
+  part("lookup grid", bytes.lookupGrid);
+  part("bounds", bytes.bounds);
+  return text + ")";
+}
+
 std::string fieldLine(const Field& field) {
   const FieldStatistics figures = statistics(field);
-  return fmt::format("{} leaves, {} coefficients ({}), {}", grouped(figures.leaves), grouped(figures.coefficients),
-                     field.singlePrecision() ? "float" : "double", bytesText(double(figures.bytes)));
+  const std::string triangles =
+      figures.exact.leaves == 0 ? "" : fmt::format("{} triangles, ", grouped(figures.exact.triangles));
+  return fmt::format("{} leaves{}, {} coefficients ({}), {}{}", grouped(figures.leaves), exactCountText(figures),
+                     grouped(figures.coefficients), field.singlePrecision() ? "float" : "double", triangles,
+                     memoryText(field));
 }
 
 /// Returns as text the build settings that a field file stores, except the target error. If `ofWords` is true, includes
@@ -154,10 +202,11 @@ std::string fieldText(const CurrentField& current) {
   if (const Normalization& n = metadata.source.normalization; !n.isIdentity())
     row("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
   row("domain", boxText(field.domain()));
-  row("leaves", grouped(figures.leaves));
+  row("leaves", grouped(figures.leaves) + exactCountText(figures));
   row("coefficients",
       fmt::format("{} ({})", grouped(figures.coefficients), field.singlePrecision() ? "float" : "double"));
-  row("memory", bytesText(double(figures.bytes)));
+  if (figures.exact.leaves > 0) row("exact triangles", exactTrianglesText(figures.exact));
+  row("memory", memoryText(field));
   if (current.fileBytes) row("file", bytesText(double(*current.fileBytes)));
   row("error, target",
       fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),

@@ -29,8 +29,23 @@ std::string fieldText(const CurrentField& current);
 /// Returns the unit of the estimated RMS error in parentheses: mesh units or normalized units.
 std::string unitText(const Field& field);
 
-/// Returns the size of a field as text: "54,935 leaves, 460,210 coefficients (float), 2.3 MB".
+/// Returns the size of a field as text: "54,935 leaves, 460,210 coefficients (float), 2.3 MB". If the field has exact
+/// leaves, the text also has their number, the number of their triangles and the bytes of the field's parts.
 std::string fieldLine(const Field& field);
+
+/// Returns the number of exact leaves as text that follows the number of all leaves: " (12,345 exact)". Returns "" if
+/// there are no exact leaves.
+std::string exactCountText(const FieldStatistics& figures);
+
+/// Returns the triangles of exact leaves as text: "5,012; a leaf lists 14 in the median, 64 at most".
+std::string exactTrianglesText(const ExactLeafStatistics& exact);
+
+/// Returns the bytes that a field takes as text. If the field has exact leaves, the text also has the bytes of its
+/// parts: "2.30 MB (nodes 439 kB, coefficients 1.06 MB, triangles 801 kB)".
+std::string memoryText(const Field& field);
+
+/// Returns the statistics of exact leaves as JSON. Returns null if there are no exact leaves.
+Json exactJson(const ExactLeafStatistics& exact);
 
 std::string strategyName(Strategy strategy);
 

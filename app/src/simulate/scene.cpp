@@ -18,6 +18,7 @@
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/shapes.h"
+#include "session/field_summary.h"
 
 namespace hpsdf::app {
 namespace {
@@ -32,14 +33,22 @@ const std::filesystem::path& cacheFolder(const std::filesystem::path& folder) {
   return folder;
 }
 
-/// Loads a field from a file of the cache. Throws `Error` unless the field has this target error and was made from the
-/// mesh whose fingerprint is `print`.
-Field cachedField(const std::filesystem::path& file, std::uint64_t print, double targetError) {
+/// Returns the name of the file in which the cache keeps the field of the mesh whose fingerprint is `print`.
+std::string cacheName(std::uint64_t print, const SceneRequest& request) {
+  const std::string strategy = request.strategy == Strategy::hp ? "" : "-" + strategyName(request.strategy);
+  return fmt::format("{:016x}-{}{}.hpsdf", print, request.targetError, strategy);
+}
+
+/// Loads a field from a file of the cache. Throws `Error` unless the field has the target error and the strategy of the
+/// request and was made from the mesh whose fingerprint is `print`.
+Field cachedField(const std::filesystem::path& file, std::uint64_t print, const SceneRequest& request) {
   try {
     Field field = load(file);
     const FieldMetadata& metadata = field.metadata();
-    if (metadata.source.fingerprint == print && metadata.settings.targetError.weighted() == targetError) return field;
-    throw Error(file.string() + ": is the field of another mesh, or of another target error");
+    const bool isSame = metadata.source.fingerprint == print && metadata.settings.strategy == request.strategy &&
+                        metadata.settings.targetError.weighted() == request.targetError;
+    if (isSame) return field;
+    throw Error(file.string() + ": is the field of another mesh, or of another target error or strategy");
   } catch (const Error& error) {
     throw Error(fmt::format("{}; remove the file to build the field again", error.what()));
   }
@@ -49,15 +58,16 @@ Field sceneField(const Console& console, const TriangleMesh& mesh, const SceneRe
   const std::uint64_t print = fingerprint(mesh);
   std::filesystem::path file;
   if (request.cache) {
-    file = cacheFolder(*request.cache) / fmt::format("{:016x}-{}.hpsdf", print, request.targetError);
+    file = cacheFolder(*request.cache) / cacheName(print, request);
     std::error_code unknown;
-    if (std::filesystem::exists(file, unknown)) return cachedField(file, print, request.targetError);
+    if (std::filesystem::exists(file, unknown)) return cachedField(file, print, request);
     checkWritable(file);  // fails now, not after the long construction
   }
   const int threads = tbb::this_task_arena::max_concurrency();
   Field field = withProgress(console, [&](const Progress& progress) {
     const ExactDistance distance(mesh, {.threads = threads});
-    return build(distance, domainAround(mesh), {.targetError = request.targetError, .threads = threads}, progress);
+    return build(distance, domainAround(mesh),
+                 {.targetError = request.targetError, .strategy = request.strategy, .threads = threads}, progress);
   });
   if (request.cache) save(field, file);
   return field;

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "hpsdf/build_options.h"
+
 namespace hpsdf::app {
 
 struct SceneRequest {
@@ -19,6 +21,7 @@ struct SceneRequest {
   std::vector<std::string> meshes = {};  ///< meshes of moving rigid bodies other than marbles; may be empty
   bool filesAreYUp = true;               ///< true if mesh files have y up; shapes always have z up
   double targetError = 1e-6;             ///< target error τ of the fields
+  Strategy strategy = Strategy::hp;      ///< how the fields are refined
   std::optional<std::filesystem::path> cache = {};  ///< folder in which fields are kept between runs
   std::uint64_t seed = 1;                           ///< seed of the random positions and orientations
   double step = 1.0 / 240;                          ///< time step, seconds of simulated time

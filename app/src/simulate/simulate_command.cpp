@@ -45,6 +45,7 @@ SceneRequest requestOf(const Arguments& arguments) {
   if (arguments.has("cache")) request.cache = arguments.text("cache");
   request.filesAreYUp = arguments.text("up") == "y";
   if (arguments.given("target-error")) request.targetError = arguments.number("target-error");
+  request.strategy = strategyOf(arguments);
   request.seed = std::uint64_t(arguments.whole("seed"));
   request.step = 1 / arguments.number("rate");
   request.iterations = int(arguments.whole("iterations"));
@@ -260,6 +261,7 @@ std::vector<Parameter> solverParameters() {
   return {
       {"target-error", number().above(0).under(setting_group::kAsked),
        "τ of the fields, as 'build' has it; 1e-6 when left out, for marbles and the slope 1e-7, and 1e-8 in the bowl."},
+      settingParameter("strategy"),
       {"cache", outputFile("FOLDER"), "A folder in which fields are kept, and taken from the next time."},
       {"rate", number().within(1, 100000).byDefault("240"), "Steps a second. Fast or small things need more."},
       {"iterations", wholeNumber().within(1, 1000).byDefault("20"), "Of Bullet's solver, in each step."},

@@ -155,7 +155,7 @@ std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
           {"faces", isMesh ? grouped(metadata.source.faces) : "–"},
           {"grid", gridText(row)},
           {"time", fmt::format("{:.1f} s", row.seconds)},
-          {"cells", grouped(row.figures.leaves)},
+          {"cells", grouped(row.figures.leaves) + exactCountText(row.figures)},
           {"τ", shortNumber(metadata.settings.targetError.weighted())},
           {"memory", bytesText(double(row.figures.bytes))},
           {"estimated RMS", shortNumber(row.estimatedRms())},
@@ -189,22 +189,24 @@ std::string markdownOf(const std::vector<TableRow>& rows) {
 
 Json jsonOf(const TableRow& row) {
   const FieldMetadata& metadata = row.field.metadata();
-  return {{"mesh", row.mesh},
-          {"name", row.name},
-          {"vertices", metadata.source.vertices},
-          {"faces", metadata.source.faces},
-          {"grid", row.field.grid()},
-          {"seconds", row.seconds},
-          {"leaves", row.figures.leaves},
-          {"degree_volume", levelsJson(row.figures.degreeVolume)},
-          {"depth_volume", levelsJson(row.figures.depthVolume)},
-          {"target_error", metadata.settings.targetError.weighted()},
-          {"coefficients", row.figures.coefficients},
-          {"precision", row.field.singlePrecision() ? "float" : "double"},
-          {"bytes", row.figures.bytes},
-          {"estimated_rms", row.estimatedRms()},
-          {"measured_rms", row.error.rms / row.scale()},
-          {"measured_max", row.error.max / row.scale()}};
+  Json json = {{"mesh", row.mesh},
+               {"name", row.name},
+               {"vertices", metadata.source.vertices},
+               {"faces", metadata.source.faces},
+               {"grid", row.field.grid()},
+               {"seconds", row.seconds},
+               {"leaves", row.figures.leaves},
+               {"degree_volume", levelsJson(row.figures.degreeVolume)},
+               {"depth_volume", levelsJson(row.figures.depthVolume)},
+               {"target_error", metadata.settings.targetError.weighted()},
+               {"coefficients", row.figures.coefficients},
+               {"precision", row.field.singlePrecision() ? "float" : "double"},
+               {"bytes", row.figures.bytes},
+               {"estimated_rms", row.estimatedRms()},
+               {"measured_rms", row.error.rms / row.scale()},
+               {"measured_max", row.error.max / row.scale()}};
+  if (const Json exact = exactJson(row.figures.exact); !exact.is_null()) json["exact_leaves"] = exact;
+  return json;
 }
 
 constexpr std::string_view kTableStyle = R"(

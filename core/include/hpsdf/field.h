@@ -14,6 +14,17 @@
 
 namespace hpsdf {
 
+/// The bytes of memory that the parts of a field take.
+struct FieldBytes {
+  std::size_t nodes = 0;
+  std::size_t coefficients = 0;
+  std::size_t exactTriangles = 0;  ///< triangles, vertices and lists of the exact leaves
+  std::size_t lookupGrid = 0;
+  std::size_t bounds = 0;
+
+  std::size_t total() const { return nodes + coefficients + exactTriangles + lookupGrid + bounds; }
+};
+
 /// A hierarchical hp-adaptive signed distance field (Koschier, Deul, Bender 2016). Fields are immutable; every query
 /// is const, thread-safe and allocation-free.
 ///
@@ -60,13 +71,22 @@ class Field {
   /// Returns the grid in which queries start their descent of the octree, for uploads to a GPU and tests.
   const LookupGrid& lookupGrid() const { return lookupGrid_; }
 
-  /// Returns the bytes that the field takes: its nodes, coefficients, lookup grid and, if it has them, bounds and the
-  /// triangles and lists of exact leaves.
-  std::size_t bytes() const;
+  /// Returns the bytes that each part of the field takes.
+  FieldBytes bytesOfParts() const;
+  /// Returns the bytes that the whole field takes.
+  std::size_t bytes() const { return bytesOfParts().total(); }
 
  private:
   FieldData data_;
   LookupGrid lookupGrid_;
+};
+
+/// Statistics of the exact leaves of a field.
+struct ExactLeafStatistics {
+  std::size_t leaves = 0;
+  std::size_t triangles = 0;    ///< triangles that the field stores; the lists of several leaves may refer to one
+  std::size_t medianList = 0;   ///< median of the number of triangles in a leaf's list
+  std::size_t longestList = 0;  ///< greatest number of triangles in a leaf's list
 };
 
 /// Statistics of a field: its sizes and the distribution of its leaves.
@@ -74,9 +94,10 @@ struct FieldStatistics {
   std::size_t leaves = 0;
   std::size_t nodes = 0;
   std::size_t coefficients = 0;
-  std::size_t bytes = 0;  ///< memory that the field takes (`Field::bytes`)
-  std::map<int, double>
-      degreeVolume;  ///< fraction of the domain's volume, by degree of the leaves; `kExactDegree` for exact ones
+  std::size_t bytes = 0;      ///< memory that the field takes (`Field::bytes`)
+  ExactLeafStatistics exact;  ///< statistics of the exact leaves, which `leaves` includes
+  /// Fraction of the domain's volume, by degree of the leaves. `kExactDegree` stands for exact leaves.
+  std::map<int, double> degreeVolume;
   std::map<int, double> depthVolume;  ///< fraction of the domain's volume, by depth of the leaves
   std::map<int, std::size_t> degreeLeaves;
   std::map<int, std::size_t> depthLeaves;

@@ -210,19 +210,27 @@ const std::vector<Row> kRows = {
      "End after so many steps of the refinement, each of which raises one cell's degree or halves it along each axis, "
      "though the target has not been reached: 0 for the base cells alone. When left out, no limit."},
     {"strategy", kMethod, choice({"hp", "h1", "h2", "hpx"}).stored(6).advanced(), member<&BuildOptions::strategy>,
-     "hp refines degree and depth; hpx also makes cells exact near the surface, which keep the triangles nearest to "
-     "them; h1 and h2 are octrees of degree 1 or 2, for comparison."},
-    {"exact-within", kResult, number().within(0, 1).in("share of the mesh's longest side").stored(14).advanced(),
+     "How cells are refined. hp raises a cell's degree or divides the cell. hpx first makes the cells near the surface "
+     "exact: instead of a polynomial they keep the triangles nearest to them. Use hpx where the surface itself must be "
+     "right, with its sharp edges and thin walls, which polynomials only approximate; queries of exact cells take "
+     "longer. It needs a mesh; for analytic:SHAPE it is hp. h1 and h2 only divide cells, all of degree 1 or 2, for "
+     "comparison."},
+    {"exact-within", kResult, number().within(0, 1).in("multiples of the mesh's longest side").stored(14).advanced(),
      member<&BuildOptions::exactWithin>,
-     "Distance from the surface up to which a field of strategy hpx is exact, as a share of the mesh's longest side."},
-    {"exact-tolerance", kResult, number().within(0, 1).in("share of the mesh's longest side").stored(16).advanced(),
+     "Distance from the surface up to which a field of strategy hpx is exact. Raise it where bodies sink in deeper or "
+     "surfaces at an offset must be exact; lower it for a smaller field. With 0, only the cells are exact through "
+     "which "
+     "the surface passes."},
+    {"exact-tolerance", kResult, number().within(0, 1).in("multiples of the mesh's longest side").stored(16).advanced(),
      member<&BuildOptions::exactTolerance>,
-     "With strategy hpx: error, as a share of the mesh's longest side, up to which a polynomial may stand for the "
-     "triangles of a cell near the surface, measured at 512 points of the cell. 0: triangles everywhere."},
+     "Error that a field of strategy hpx may have near the surface where the surface is smooth: a cell takes a "
+     "polynomial instead of triangles if its error at 512 points does not exceed this. Raise it, for instance to 1e-5, "
+     "for finely divided smooth meshes. With 0, cells near the surface take a polynomial only where the surface is "
+     "plane."},
     {"exact-triangles", kMethod, wholeNumber().within(1, 4096).stored(15).advanced(),
      member<&BuildOptions::exactTriangles>,
-     "Greatest number of triangles that an exact cell of strategy hpx keeps, unless it cannot be divided further: more "
-     "make a smaller field, fewer a faster one."},
+     "Greatest number of triangles that an exact cell of strategy hpx keeps. A cell with more is divided, down to "
+     "max-depth. Raise it for fewer cells and a smaller field, lower it for faster queries."},
     {"coefficients", kResult, choice({"auto", "float", "double"}).advanced(), member<&BuildOptions::coefficients>,
      "Precision of the coefficients. auto takes float where that changes the error by less than 1 %."},
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,

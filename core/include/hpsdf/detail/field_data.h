@@ -45,11 +45,14 @@ struct CellBound {
   float slope = 0;  ///< bound of ‖∇f‖
 };
 
-/// The finished octree as arrays. The first nodes are the base cells, x fastest, then y, then z. A node is either
-///   internal:       bit 63 is clear, the low 32 bits are the index of its first child (child number x + 2y + 4z); or
-///   a polynomial:   bit 63 is set, bits 32..39 are the degree p, the low 32 bits the offset of its n(p) coefficients;
-///   or an exact leaf:  bit 63 is set, bits 32..39 are `kExactDegree`, bits 48..49 the `ExactSign`, the low 32 bits the
-///                   offset of its list in `ExactTriangles::lists`.
+/// The finished octree as arrays. The first nodes are the base cells, x fastest, then y, then z. There are three kinds
+/// of nodes:
+/// * An internal node has bit 63 clear. Its low 32 bits are the index of its first child (child number x + 2y + 4z).
+/// * A leaf with a polynomial has bit 63 set. Its bits 32 to 39 are the degree p, and its low 32 bits are the offset of
+///   its n(p) coefficients.
+/// * An exact leaf has bit 63 set. Its bits 32 to 39 are `kExactDegree`, its bits 48 and 49 are the `ExactSign`, and
+/// its
+///   low 32 bits are the offset of its list in `ExactTriangles::lists`.
 /// All other bits are 0.
 ///
 /// The polynomial of a leaf is Σ c_ijk L_i(u) L_j(v) L_k(w) over i+j+k ≤ p. Here u, v, w are local coordinates from −1
@@ -112,8 +115,9 @@ struct Cell {
   Box box;           ///< half-open [min, max) up to rounding
   int degree;        ///< `kExactDegree` for an exact leaf
   int depth;         ///< 0 for a base cell
-  double
-      error;  ///< squared L2 error, estimated by the coefficients of the highest degree (ε_e; paper, eq. 6); 0 if exact
+  /// Squared L2 error, estimated from the coefficients of the highest degree (ε_e; paper, eq. 6). It is 0 for an exact
+  /// leaf.
+  double error;
 };
 
 struct ValueAndGradient {

@@ -144,6 +144,24 @@ Cell makeCell(const FieldData& field, const GridFrame& frame, const OctreeNode& 
   return cell;
 }
 
+/// Returns for each run the number of triangles from this run to the end of its list.
+std::vector<std::size_t> trianglesFromRuns(const std::vector<std::uint32_t>& runs) {
+  std::vector<std::size_t> triangles(runs.size());
+  for (std::size_t n = runs.size(); n-- > 0;)
+    triangles[n] = triangle_run::length(runs[n]) + (triangle_run::isLast(runs[n]) ? 0 : triangles[n + 1]);
+  return triangles;
+}
+
+/// Returns the statistics of exact leaves whose lists have these numbers of triangles.
+ExactLeafStatistics exactStatistics(std::vector<std::size_t> lists, std::size_t triangles) {
+  if (lists.empty()) return {};
+  std::ranges::sort(lists);
+  return {.leaves = lists.size(),
+          .triangles = triangles,
+          .medianList = lists[lists.size() / 2],
+          .longestList = lists.back()};
+}
+
 }  // namespace
 
 double FieldMetadata::rmsEstimate(const Box& domain) const {
@@ -166,12 +184,14 @@ Field::Field(FieldData data) : data_(std::move(data)) {
   lookupGrid_ = makeLookupGrid(data_);
 }
 
-std::size_t Field::bytes() const {
+FieldBytes Field::bytesOfParts() const {
   const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
   const ExactTriangles& exact = data_.exact;
-  return sizeOf(data_.nodes) + sizeOf(data_.bounds) + sizeOf(lookupGrid_.entries) + sizeOf(lookupGrid_.blendExtents) +
-         std::visit(sizeOf, data_.coefficients) + std::visit(sizeOf, exact.vertices) + sizeOf(exact.triangles) +
-         sizeOf(exact.lists);
+  return {.nodes = sizeOf(data_.nodes),
+          .coefficients = std::visit(sizeOf, data_.coefficients),
+          .exactTriangles = std::visit(sizeOf, exact.vertices) + sizeOf(exact.triangles) + sizeOf(exact.lists),
+          .lookupGrid = sizeOf(lookupGrid_.entries) + sizeOf(lookupGrid_.blendExtents),
+          .bounds = sizeOf(data_.bounds)};
 }
 
 double Field::value(const Vector3& x) const { return evaluateAt<double>(data_, lookupGrid_, x); }
@@ -209,6 +229,9 @@ std::string levelName(int level) {
 
 FieldStatistics statistics(const Field& field) {
   FieldStatistics s;
+  const FieldData& data = field.data();
+  const std::vector<std::size_t> trianglesFrom = trianglesFromRuns(data.exact.lists);
+  std::vector<std::size_t> exactLists;
   const double domainVolume = (field.domain().max() - field.domain().min()).prod();
   field.forEachCell([&](const Cell& cell) {
     const double share = (cell.box.max() - cell.box.min()).prod() / domainVolume;
@@ -217,10 +240,12 @@ FieldStatistics statistics(const Field& field) {
     ++s.depthLeaves[cell.depth];
     s.degreeVolume[cell.degree] += share;
     s.depthVolume[cell.depth] += share;
+    if (cell.degree == kExactDegree) exactLists.push_back(trianglesFrom[node::offset(data.nodes[cell.id])]);
   });
-  s.nodes = field.data().nodes.size();
+  s.nodes = data.nodes.size();
   s.bytes = field.bytes();
-  s.coefficients = std::visit([](const auto& c) { return c.size(); }, field.data().coefficients);
+  s.exact = exactStatistics(std::move(exactLists), data.exact.triangles.size());
+  s.coefficients = std::visit([](const auto& c) { return c.size(); }, data.coefficients);
   return s;
 }
 
