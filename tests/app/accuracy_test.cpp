@@ -43,8 +43,8 @@ constexpr const char* kMesh = "builtin:torus,segments=48,sides=24";
 void writeField(const fs::path& file, double offset) {
   const TriangleMesh mesh = shapes::mesh(kMesh);
   const ExactDistance exact(mesh);
-  FieldData data =
-      build(exact, domainAround(mesh), {.targetError = 1e-4, .coefficients = CoefficientType::float64}).data();
+  const BuildOptions options{.targetError = 1e-4, .strategy = Strategy::hp, .coefficients = CoefficientType::float64};
+  FieldData data = build(exact, domainAround(mesh), options).data();
   auto& coefficients = std::get<std::vector<double>>(data.coefficients);
   for (const std::uint64_t node : data.nodes)
     if (node::isLeaf(node)) coefficients[node::offset(node)] += offset;

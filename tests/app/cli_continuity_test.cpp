@@ -170,7 +170,7 @@ TEST_F(Continuity, continuityIsStudied) {
   EXPECT_EQ(figure(0, "jump_rms_ratio"), 1);
   EXPECT_FALSE(rows[2].at("enriched"));
   EXPECT_EQ(figure(2, "weight"), 2.5);
-  EXPECT_LT(figure(2, "jump_rms_ratio"), 0.5);
+  EXPECT_LT(figure(2, "jump_rms_ratio"), 0.65);
   EXPECT_LT(figure(2, "rms_ratio"), 1.5);
   EXPECT_TRUE(rows[7].at("enriched"));
   EXPECT_EQ(figure(7, "weight"), 0.4);

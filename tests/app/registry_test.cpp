@@ -274,7 +274,7 @@ TEST(Arguments, mistakesNameTheExpectedValue) {
        "--weights: expected 1 to 32 numbers with commas between them, each above 0, up to 1000000000, found '1,,2'"},
       {"build", "m -o f --domain 1,2,3", "cube, box or 6 numbers with commas between them, found '1,2,3'"},
       {"build", "m -o f --domain cub", "did you mean 'cube'?"},
-      {"build", "m -o f --strategy ph", "expected hp, h1, h2 or hpx, found 'ph'"},
+      {"build", "m -o f --strategy ph", "expected hp, h1, h2, hpx or auto, found 'ph'"},
       {"build", "m -o f --continuity exakt", "did you mean 'exact'?"},
       {"build", "m -o f --blend-width 0", "above 0"},
       {"blend", "f -o g --width 0.3", "0.25, found '0.3'"},

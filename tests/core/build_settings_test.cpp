@@ -49,7 +49,8 @@ TEST(BuildSettings, defaultsAreWithinTheirRanges) {
     }
   EXPECT_EQ(defaultText(buildSetting("target-error")), "1e-6");
   EXPECT_EQ(defaultText(buildSetting("grid")), "6");
-  EXPECT_EQ(defaultText(buildSetting("strategy")), "hp");
+  EXPECT_EQ(defaultText(buildSetting("strategy")), "auto");
+  EXPECT_EQ(defaultText(buildSetting("estimator")), "checked");
   EXPECT_EQ(defaultText(buildSetting("continuity-weight")), "2.5");
   EXPECT_EQ(defaultText(buildSetting("max-steps")), "");
 }

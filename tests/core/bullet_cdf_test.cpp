@@ -135,7 +135,8 @@ TEST(BulletCdf, theDomainsBoundaryBelongsToIt) {
 
 TEST(BulletCdf, aFieldIsACollisionShape) {
   const auto distance = [](const Vector3& x) { return x.norm() - 0.7; };
-  const Field field = build(distance, Box(Vector3(-1, -1, -1), Vector3(1, 1, 1)), {.targetError = 1e-8});
+  const Field field = build(distance, Box(Vector3(-1, -1, -1), Vector3(1, 1, 1)),
+                            {.targetError = 1e-8, .estimator = Estimator::embedded});
   const std::string bytes = fileOf(sampleCubicGrid(field, finestCubicGrid(field.domain(), 2'000'000)));
   btSdfCollisionShape shape;
   ASSERT_TRUE(shape.initializeSDF(bytes.data(), static_cast<int>(bytes.size())));

@@ -49,7 +49,7 @@ TEST(ContinuityFigures, bunny) {
   const ExactDistance distance(mesh);
   const Box domain = domainAround(mesh);
   const Meter meter(distance, domain);
-  BuildOptions options{.targetError = 1e-5};
+  BuildOptions options{.targetError = 1e-5, .estimator = Estimator::embedded, .strategy = Strategy::hp};
   const Field discontinuous = build(distance, domain, options);
   const Figures before = meter(discontinuous);
 

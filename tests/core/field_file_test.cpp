@@ -275,7 +275,7 @@ TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   for (const std::size_t at : {bounds, bounds + 4, bounds + 8 * count - 4})
     for (const float bound : {-1.0f, NAN}) EXPECT_TRUE(refused(at, bound)) << at;
   EXPECT_FALSE(refused(bounds, 1e30f));
-  for (const std::size_t flag : {0, 1, 2, 19}) EXPECT_TRUE(refused(since + flag, std::uint8_t{2})) << flag;
+  for (const std::size_t flag : {0, 1, 2, 19}) EXPECT_TRUE(refused(since + flag, std::uint8_t{3})) << flag;
   EXPECT_FALSE(refused(since + kSinceVersion3, InsideTest::shell));
   EXPECT_TRUE(refused(since + kSinceVersion3, std::uint8_t{5})) << "sign";
 }

@@ -57,7 +57,7 @@ TEST(PaperFigures, bunny) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const TriangleMesh mesh = paperMesh("bunny_69k.obj");
   const ExactDistance distance(mesh);
-  BuildOptions options{.targetError = 1e-6, .coefficients = CoefficientType::float64};
+  BuildOptions options{.targetError = 1e-6, .estimator = Estimator::embedded, .coefficients = CoefficientType::float64};
   const Field field = build(distance, paperDomain(), options);
   const FieldStatistics s = statistics(field);
   EXPECT_NEAR(double(s.leaves), 54935, 0.03 * 54935);  // the paper: 55k
@@ -82,7 +82,8 @@ TEST(PaperFigures, bunny) {
 TEST(PaperFigures, bunnyByProductsOfGaussRules) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const ExactDistance distance(paperMesh("bunny_69k.obj"));
-  const Field field = build(distance, paperDomain(), {.targetError = 1e-6, .cubature = CubatureKind::product});
+  const BuildOptions options{.targetError = 1e-6, .estimator = Estimator::embedded, .cubature = CubatureKind::product};
+  const Field field = build(distance, paperDomain(), options);
   EXPECT_NEAR(double(statistics(field).leaves), 54935, 0.02 * 54935);
   EXPECT_LE(field.metadata().exactEvaluations, 11'000'000u);
 }
@@ -100,8 +101,9 @@ TEST(PaperFigures, bunnyByThePapersSettings) {
 TEST(PaperFigures, dragon) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const ExactDistance distance(paperMesh("dragon_80k.obj"));
-  const Field field =
-      build(distance, paperDomain(), {.targetError = 1e-7, .grid = {10, 10, 10}, .cubature = CubatureKind::product});
+  const BuildOptions options{
+      .targetError = 1e-7, .grid = {10, 10, 10}, .estimator = Estimator::embedded, .cubature = CubatureKind::product};
+  const Field field = build(distance, paperDomain(), options);
   EXPECT_NEAR(double(statistics(field).leaves), 298542, 0.02 * 298542);  // the paper: 299k
 }
 

@@ -67,7 +67,8 @@ TEST(SafeDistance, boundsHoldAndAreTight) {
       const Field field = build(phi, cube(), {.targetError = target, .bounds = true});
       EXPECT_EQ(checkBounds(field, phi).violations, 0);
     }
-  const Field field = build(gear, domainAround(gear.source().box), {.targetError = 1e-5, .bounds = true});
+  const BuildOptions options{.targetError = 1e-5, .strategy = Strategy::hp, .bounds = true};
+  const Field field = build(gear, domainAround(gear.source().box), options);
   const BoundCheck found = checkBounds(field, [&](const Vector3& x) { return gear(x); });
   EXPECT_EQ(found.violations, 0);
   EXPECT_LT(found.medianBound, 20 * found.medianWorst);

@@ -253,7 +253,7 @@ TEST(InsideTest, holesAreClosedWithoutAJump) {
 
 TEST(InsideTest, fieldsOfOpenMeshesAreNotRefinedWithoutEnd) {
   const TriangleMesh mesh = openBox();
-  const BuildOptions options{.targetError = 1e-5};
+  const BuildOptions options{.targetError = 1e-5, .strategy = Strategy::hp};
   const Field field = build(ExactDistance(mesh, kAutomatic), domainAround(mesh), options);
   const Field unsignedField =
       build(ExactDistance(mesh, {.insideTest = InsideTest::shell, .thickness = 1e-9}), domainAround(mesh), options);

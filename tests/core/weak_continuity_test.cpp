@@ -351,7 +351,8 @@ TEST(WeakContinuity, reportsAndStops) {
 }
 
 TEST(Build, enrichesEveryLeaf) {
-  const BuildOptions usual{.targetError = 1e-4, .maxDegree = 3, .coefficients = CoefficientType::float64};
+  const BuildOptions usual{
+      .targetError = 1e-4, .estimator = Estimator::embedded, .maxDegree = 3, .coefficients = CoefficientType::float64};
   BuildOptions enriching = usual;
   enriching.enrich = true;
   const Field before = sphereField(usual), after = sphereField(enriching);

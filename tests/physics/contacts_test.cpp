@@ -202,7 +202,7 @@ TEST(Contacts, ofMachinePartsHaveBetterDepthsByExactLeaves) {
 TEST(Contacts, ofSpheresHaveTheirDepthsAndNormals) {
   constexpr double kRadius = 0.6;
   const DistanceFunction sphere = shapes::analytic("sphere,radius=0.6");
-  const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 1e-9});
+  const Field field = build(sphere, domainAround(sphere.source().box), {.targetError = 3e-10});
   const FieldCollider collider(field);
   const SurfaceSamples samples = sampleSurface(shapes::mesh("sphere,radius=0.4"), {.count = 2000});
   std::mt19937_64 random(5);

@@ -487,8 +487,9 @@ TEST(CpuTrace, hitsTheSphereOrthographically) {
       if (nearest2 > 0.98 * radius * radius) continue;
       ASSERT_TRUE(buffers.hit(i) && other.hit(i));
       EXPECT_NEAR(buffers.distance[i], toMiddle - std::sqrt(radius * radius - nearest2), 1e-3);
-      EXPECT_NEAR(field.value(hitPoint(camera, buffers, i)), 0, 1e-6);
-      EXPECT_NEAR(field.value(hitPoint(camera, other, i)), 0, 1e-5);
+      // A hit may lie in the jump between two cells.
+      EXPECT_NEAR(field.value(hitPoint(camera, buffers, i)), 0, 3e-5);
+      EXPECT_NEAR(field.value(hitPoint(camera, other, i)), 0, 3e-5);
       ++compared;
     }
     EXPECT_GT(compared, 2000) << distance;

@@ -35,7 +35,7 @@ const std::filesystem::path& cacheFolder(const std::filesystem::path& folder) {
 
 /// Returns the name of the file in which the cache keeps the field of the mesh whose fingerprint is `print`.
 std::string cacheName(std::uint64_t print, const SceneRequest& request) {
-  const std::string strategy = request.strategy == Strategy::hp ? "" : "-" + strategyName(request.strategy);
+  const std::string strategy = request.strategy == Strategy::automatic ? "" : "-" + strategyName(request.strategy);
   return fmt::format("{:016x}-{}{}.hpsdf", print, request.targetError, strategy);
 }
 
@@ -45,7 +45,8 @@ Field cachedField(const std::filesystem::path& file, std::uint64_t print, const 
   try {
     Field field = load(file);
     const FieldMetadata& metadata = field.metadata();
-    const bool isSame = metadata.source.fingerprint == print && metadata.settings.strategy == request.strategy &&
+    const bool hasStrategy = request.strategy == Strategy::automatic || metadata.settings.strategy == request.strategy;
+    const bool isSame = metadata.source.fingerprint == print && hasStrategy &&
                         metadata.settings.targetError.weighted() == request.targetError;
     if (isSame) return field;
     throw Error(file.string() + ": is the field of another mesh, or of another target error or strategy");

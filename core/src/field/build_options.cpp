@@ -12,6 +12,7 @@ BuildOptions paperOptions() {
   options.maxDegree = 30;
   options.maxDepth = 10;
   options.strategy = Strategy::hp;
+  options.estimator = Estimator::embedded;
   options.quadrature = 4;
   options.cubature = CubatureKind::product;
   options.trialSamples = TrialSamples::own;

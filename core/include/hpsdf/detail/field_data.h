@@ -21,7 +21,8 @@ struct FieldMetadata {
   /// The settings that took effect. If the target was given as `NearFarError`, `targetError` is the error τ that the
   /// construction reached, and `nearness` is the exponent θ that the construction derived. Field files store the
   /// settings whose `BuildSetting::storedAt` is not 0.
-  BuildOptions settings = {.targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .quadrature = 0};
+  BuildOptions settings = {
+      .targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .strategy = Strategy::hp, .quadrature = 0};
   double totalError = 0;               ///< weighted error ε, scaled to a surface of size 2 like the target error τ
   double referenceLength = 2;          ///< size L of the surface; ε·(L/2)^5 is the error at this size
   std::uint64_t exactEvaluations = 0;  ///< evaluations of Φ during the construction

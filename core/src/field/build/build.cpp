@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "field/build/automatic_strategy.h"
 #include "field/build/checkpoint_file.h"
 #include "field/build/refiner.h"
 #include "field/cells/cell_bounds.h"
@@ -32,6 +33,13 @@ ErrorGoal growthGoal(const BuildOptions& options, const ErrorGoal& goal) {
 double nearDistance(const BuildOptions& options, double referenceLength) {
   const double asked = options.targetError.byDistance().nearDistance;
   return asked > 0 ? asked : 0.01 * referenceLength;
+}
+
+/// Returns the settings with the strategy that takes effect.
+BuildOptions settled(BuildOptions options, const DistanceFunction& distance, const Box& domain) {
+  if (options.strategy == Strategy::automatic)
+    options.strategy = automaticStrategy(distance.triangleSearch(), referenceLength(distance.source(), domain));
+  return options;
 }
 
 std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, const Box& domain) {
@@ -183,7 +191,8 @@ Field build(const DistanceFunction& distance, const Box& domain, const BuildOpti
             const Progress& progress) {
   checkOptions(domain, options);
   return Field(withThreads(options.threads, [&] {
-    Construction construction(distance, domain, options, progress);
+    const BuildOptions settings = settled(options, distance, domain);
+    Construction construction(distance, domain, settings, progress);
     construction.grow();
     return construction.finish();
   }));
@@ -193,8 +202,9 @@ Field buildResumably(const DistanceFunction& distance, const Box& domain, const 
                      const Checkpoint& checkpoint, const Progress& progress) {
   checkOptions(domain, options);
   return Field(withThreads(options.threads, [&] {
-    CheckpointFile file(checkpoint, distance, domain, options);
-    Construction construction(distance, domain, options, progress);
+    const BuildOptions settings = settled(options, distance, domain);
+    CheckpointFile file(checkpoint, distance, domain, settings);
+    Construction construction(distance, domain, settings, progress);
     if (construction.resume(file) && checkpoint.resumed) checkpoint.resumed(construction.steps());
     construction.grow();
     return construction.finish();
@@ -206,7 +216,7 @@ void buildStages(const DistanceFunction& distance, const Box& domain, const Buil
                  const Progress& progress) {
   if (!std::ranges::is_sorted(steps)) throw Error("stages of a construction: expected steps that do not descend");
   if (steps.empty()) return;
-  BuildOptions limited = options;
+  BuildOptions limited = settled(options, distance, domain);
   limited.maxSteps = std::min(options.maxSteps.value_or(steps.back()), steps.back());
   checkOptions(domain, limited);
   withThreads(options.threads, [&] {

@@ -234,7 +234,8 @@ class Growth {
 
   void refine(std::uint32_t leaf, Trial&& trial) {
     const BuildNode& node = state_.tree.nodes[leaf];
-    const bool raises = refiner_.allowed(node) != Refinement::octree && prefersDegree(node.fit, trial);
+    const bool raises =
+        refiner_.allowed(node) != Refinement::octree && prefersDegree(node.fit, trial, setup_.options.estimator);
     refiner_.apply(leaf, std::move(trial), raises);
     if (state_.isFull) return;
     const std::uint32_t first = state_.tree.nodes[leaf].firstChild;

@@ -87,7 +87,7 @@ class MaxErrorPass {
     const bool isSurelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;
     if (mayRefine && isSurelyBad) {
       candidate.trial = refiner_.attempt(leaf, allowed);
-      candidate.raises = prefersDegree(leaf.fit, *candidate.trial);
+      candidate.raises = prefersDegree(leaf.fit, *candidate.trial, setup_.options.estimator);
       return candidate;
     }
 
@@ -105,8 +105,8 @@ class MaxErrorPass {
     // criterion of the paper.
     candidate.trial = refiner_.attempt(leaf, allowed);
     const std::optional<Fit>& raised = candidate.trial->raised;
-    candidate.raises =
-        (raised && worstError(*raised, exact, farthest) <= most) || prefersDegree(leaf.fit, *candidate.trial);
+    candidate.raises = (raised && worstError(*raised, exact, farthest) <= most) ||
+                       prefersDegree(leaf.fit, *candidate.trial, setup_.options.estimator);
     return candidate;
   }
 

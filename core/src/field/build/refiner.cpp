@@ -3,19 +3,39 @@
 #include <algorithm>
 #include <utility>
 
+#include "basis/projection.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::detail {
 
-bool prefersDegree(const Fit& current, const Trial& trial) {
-  if (!trial.raised || !trial.children) return trial.raised.has_value();
+namespace {
+
+/// Returns the weighted error of a fit by the embedded estimate.
+double embeddedError(const Fit& fit) {
+  if (!(fit.error.squared > 0)) return 0;
+  const double weight = fit.error.weighted / fit.error.squared;
+  return weight * basis::topDegreeError(fit.coefficients.data(), fit.degree, fit.error.volume);
+}
+
+template <typename ErrorOf>
+bool gainsMoreByDegree(const Fit& current, const Trial& trial, const ErrorOf& errorOf) {
   double worstChild = 0;
-  for (const Fit& child : *trial.children) worstChild = std::max(worstChild, child.error.weighted);
+  for (const Fit& child : *trial.children) worstChild = std::max(worstChild, errorOf(child));
   const int p = current.degree;
-  const double error = current.error.weighted;
-  const double mu = (error - 8 * trial.raised->error.weighted) / (coefficientCount(p + 1) - coefficientCount(p));
+  const double error = errorOf(current);
+  const double mu = (error - 8 * errorOf(*trial.raised)) / (coefficientCount(p + 1) - coefficientCount(p));
   const double nu = (error - 8 * worstChild) / (7 * coefficientCount(p));
   return mu > nu;
+}
+
+}  // namespace
+
+bool prefersDegree(const Fit& current, const Trial& trial, Estimator estimator) {
+  constexpr double kBlind = 4;  // the embedded estimate sees hardly anything of an error so many times greater
+  if (!trial.raised || !trial.children) return trial.raised.has_value();
+  if (estimator == Estimator::checked && current.error.weighted <= kBlind * embeddedError(current))
+    return gainsMoreByDegree(current, trial, embeddedError);
+  return gainsMoreByDegree(current, trial, [](const Fit& fit) { return fit.error.weighted; });
 }
 
 ErrorTotals sumOfErrors(const BuildTree& tree) {

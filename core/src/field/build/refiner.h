@@ -96,8 +96,9 @@ struct Refiner {
 
 /// Decides between a higher degree and a split (paper, eqs. 7 to 9), with errors weighted by nearness to the
 /// surface. Returns true if a higher degree reduces the error more per additional coefficient. If only one
-/// refinement was tried, the decision is for that one.
-bool prefersDegree(const Fit& current, const Trial& trial);
+/// refinement was tried, the decision is for that one. For `Estimator::checked`, the errors are those of the embedded
+/// estimate where that sees the error of the current fit.
+bool prefersDegree(const Fit& current, const Trial& trial, Estimator estimator);
 
 ErrorTotals sumOfErrors(const BuildTree& tree);
 

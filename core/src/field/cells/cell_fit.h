@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "basis/projection.h"
+#include "field/cells/surface_points.h"
 #include "field/nearness.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/detail/exact_triangles.h"
@@ -26,7 +27,7 @@ void requireFinite(std::span<const Vector3> points, std::span<const double> dist
 struct CachedProjection {
   std::vector<double> coefficients;
   int degree = 0;
-  double meanSquare = 0;  ///< mean of Φ² over the cell, by quadrature of the samples
+  double meanSquare = 0;  ///< mean of Φ² over the cell, by quadrature of the samples; raised by `Estimator::checked`
 };
 
 /// A cell's polynomial and its error.
@@ -43,6 +44,12 @@ struct Fit {
   ExactSign sign = ExactSign::pseudonormal;
 
   bool isExact() const { return degree == kExactDegree; }
+};
+
+/// Exact distances at points of a cell that are not among its samples, for `Estimator::checked`.
+struct CheckPoints {
+  std::vector<Vector3> local;  ///< the points, in local coordinates of the cell
+  std::vector<double> distances;
 };
 
 /// The fits that result from the possible refinements of a cell: a higher degree, a split into eight children, or a fit
@@ -95,7 +102,13 @@ class CellFitter {
                              std::span<const std::uint32_t> order) const;
   bool outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const;
   /// Makes a fit of the given degree by cutting off the higher degrees of a projection of samples.
-  Fit makeFit(CachedProjection projected, int degree, const Box& cell, bool outsideBand) const;
+  Fit makeFit(CachedProjection projected, int degree, const Box& cell, bool outsideBand,
+              const CheckPoints& check) const;
+  /// Evaluates the exact distance at the check points of a cell; none unless the estimator is `checked`.
+  CheckPoints checkPoints(const Box& cell) const;
+  /// Returns the mean squared error of a fit that its errors at the check points, and at the centroids of triangles in
+  /// the cell, suggest.
+  double checkedError(const Fit& fit, const Box& cell, const CheckPoints& check) const;
   double squaredError(const Fit& fit, double meanSquare) const;
   void rate(Fit& fit, double squared, const Box& cell) const;
   bool keepsProjections() const { return options_.criterion == Criterion::optimal; }
@@ -103,6 +116,7 @@ class CellFitter {
 
   const DistanceFunction& distance_;
   const BuildOptions& options_;
+  std::optional<SurfacePoints> surface_ = {};  ///< only for `Estimator::checked` and distances to triangles
   const Nearness& nearness_;
   double nearDistance_;
   const Progress& progress_;

@@ -144,14 +144,6 @@ Cell makeCell(const FieldData& field, const GridFrame& frame, const OctreeNode& 
   return cell;
 }
 
-/// Returns for each run the number of triangles from this run to the end of its list.
-std::vector<std::size_t> trianglesFromRuns(const std::vector<std::uint32_t>& runs) {
-  std::vector<std::size_t> triangles(runs.size());
-  for (std::size_t n = runs.size(); n-- > 0;)
-    triangles[n] = triangle_run::length(runs[n]) + (triangle_run::isLast(runs[n]) ? 0 : triangles[n + 1]);
-  return triangles;
-}
-
 /// Returns the statistics of exact leaves whose lists have these numbers of triangles.
 ExactLeafStatistics exactStatistics(std::vector<std::size_t> lists, std::size_t triangles) {
   if (lists.empty()) return {};
@@ -230,7 +222,6 @@ std::string levelName(int level) {
 FieldStatistics statistics(const Field& field) {
   FieldStatistics s;
   const FieldData& data = field.data();
-  const std::vector<std::size_t> trianglesFrom = trianglesFromRuns(data.exact.lists);
   std::vector<std::size_t> exactLists;
   const double domainVolume = (field.domain().max() - field.domain().min()).prod();
   field.forEachCell([&](const Cell& cell) {
@@ -240,7 +231,7 @@ FieldStatistics statistics(const Field& field) {
     ++s.depthLeaves[cell.depth];
     s.degreeVolume[cell.degree] += share;
     s.depthVolume[cell.depth] += share;
-    if (cell.degree == kExactDegree) exactLists.push_back(trianglesFrom[node::offset(data.nodes[cell.id])]);
+    if (cell.degree == kExactDegree) exactLists.push_back(TriangleListView(data.exact, data.nodes[cell.id]).count());
   });
   s.nodes = data.nodes.size();
   s.bytes = field.bytes();

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "hpsdf/build_options.h"
+#include "hpsdf/detail/triangle_search.h"
+
+namespace hpsdf::detail {
+
+/// Returns the strategy that `Strategy::automatic` stands for, with the surface's size L (`FieldMetadata`). `search` is
+/// the search of the distance to triangles, or nullptr for other distances.
+///
+/// Polynomials miss sharp edges, and the facets of a coarse mesh. The strategy is `hpx` if the edges that bend by more
+/// than 60° are together longer than L/2 and a quarter of those that bend by more than 15°, as in machine parts. It is
+/// also `hpx` for a mesh with up to 30,000 triangles whose edges that bend by more than 15° are together longer than
+/// 5 L. For other meshes, such as large scans, whose lists of triangles would take more bytes than polynomials, it is
+/// `hp`.
+Strategy automaticStrategy(const TriangleSearch* search, double referenceLength);
+
+}  // namespace hpsdf::detail
