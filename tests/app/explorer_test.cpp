@@ -279,9 +279,9 @@ std::optional<render::Pick> middleAfter(Bench& bench, const std::string& kind, c
 TEST(Explorer, flyingLooksAtTheInterface) {
   Bench bench;
   for (const char* kind : {"slice", "surface"}) {
-    const auto pick = middleAfter(bench, kind, "fly 3");
+    const auto pick = middleAfter(bench, kind, "fly 1");
     ASSERT_TRUE(pick) << kind;
-    const Interface& face = bench.session.jumps().interfaces[bench.explorer().worst(3)[2]];
+    const Interface& face = bench.session.jumps().interfaces[bench.explorer().worst(1)[0]];
     EXPECT_LT((pick->position - face.worst).norm(), 0.05) << kind;
   }
   EXPECT_THAT(bench.failure("fly 7999"), HasSubstr("rank: the field has"));

@@ -170,6 +170,27 @@ TEST(ExactLeaves, listEveryTriangleForSomeOctantAndFewForEach) {
   EXPECT_LT(double(ofOctants) / 8, 0.75 * double(listed));
 }
 
+TEST(ExactLeaves, areExactAtEverySize) {
+  for (const double size : {1e-12, 1e-7, 3e7, 1e16}) {
+    SCOPED_TRACE(size);
+    TriangleMesh gear = shapes::mesh("gear");
+    for (Vector3& x : gear.vertices) x *= size;
+    const ExactDistance exact(gear);
+    const Field field = build(exact, domainAround(gear), hpx(1e-4));
+    std::vector<Vector3> points = placesIn(field.domain(), 5000);
+    std::erase_if(points, [&](const Vector3& x) {
+      return !field.domain().contains(x) || field.cellAt(x).degree != kExactDegree;
+    });
+    ASSERT_GT(points.size(), 500U);
+    std::vector<double> values(points.size());
+    field.values(points, values);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      ASSERT_NEAR(values[i], exact(points[i]), 1e-6 * size);
+      ASSERT_EQ(values[i], field.value(points[i]));
+    }
+  }
+}
+
 TEST(ExactLeaves, withDamagedListsAreRefused) {
   const auto fieldOf = [](std::vector<std::uint32_t> lists, std::uint32_t offset) {
     FieldData data;

@@ -19,8 +19,8 @@ namespace feature_test {
 
 constexpr double kFeature = 1.0 / 300;  ///< width of the features of a plate whose sides are 1 long
 
-/// Makes a plate of 1 × 1 × 0.05 with one feature in each of 15 × 15 tiles: a hole, a slot through the plate, a pin or a
-/// rib, at a random place and in a random direction.
+/// Makes a plate of 1 × 1 × 0.05 with one feature in each of 15 × 15 tiles: a hole, a slot through the plate, a pin or
+/// a rib, at a random place and in a random direction.
 class Plate {
  public:
   explicit Plate(unsigned seed) : random_(seed) {

@@ -47,9 +47,10 @@ Field cachedField(const std::filesystem::path& file, std::uint64_t print, const 
     const FieldMetadata& metadata = field.metadata();
     const bool hasStrategy = request.strategy == Strategy::automatic || metadata.settings.strategy == request.strategy;
     const bool isSame = metadata.source.fingerprint == print && hasStrategy &&
+                        metadata.settings.estimator == BuildOptions().estimator &&
                         metadata.settings.targetError.weighted() == request.targetError;
     if (isSame) return field;
-    throw Error(file.string() + ": is the field of another mesh, or of another target error or strategy");
+    throw Error(file.string() + ": is the field of another mesh, or of another target error, strategy or estimator");
   } catch (const Error& error) {
     throw Error(fmt::format("{}; remove the file to build the field again", error.what()));
   }

@@ -21,7 +21,7 @@ namespace hpsdf {
 /// `BuildOptions::exactWithin`, a leaf keeps the triangles that are nearest to its points (`ExactTriangles`) or, if
 /// these lie in one plane, the linear polynomial of their distance. It needs a distance to triangles; for other
 /// distances it equals `hp`. `automatic` chooses `hpx` for meshes with sharp edges or coarse facets, and `hp` for
-/// smooth or very fine meshes and for distances without triangles.
+/// smooth or very fine meshes, for distances without triangles and for constructions with a limit of bytes or steps.
 enum class Strategy : std::uint8_t { hp, h1, h2, hpx, automatic };
 
 constexpr bool isHp(Strategy strategy) { return strategy != Strategy::h1 && strategy != Strategy::h2; }

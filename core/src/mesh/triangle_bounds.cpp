@@ -62,19 +62,22 @@ HWY_INLINE void findBoundsFrom(TriangleChunk& chunk, const Eigen::Vector3f& poin
     };
     const Vec3 a = load(0), b = load(1), c = load(2);
     const Vec3 ab = minus(b, a), bc = minus(c, b), ca = minus(a, c);
-    const Vec3 n = cross(ab, bc);
-    const Vec nn = dot(n, n), abab = dot(ab, ab), bcbc = dot(bc, bc), caca = dot(ca, ca);
+    const Vec abab = dot(ab, ab), bcbc = dot(bc, bc), caca = dot(ca, ca);
+    // Sides are divided by the longest one, because the fourth power of a length is soon beyond the range of float.
+    const Vec perLength = hn::Div(hn::Set(d, 1.0F), hn::Sqrt(hn::Max(hn::Max(abab, bcbc), caca)));
+    const auto unit = [&](const Vec3& v) HWY_ATTR {
+      return Vec3{hn::Mul(v.x, perLength), hn::Mul(v.y, perLength), hn::Mul(v.z, perLength)};
+    };
+    const Vec3 n = cross(unit(ab), unit(bc));
+    const Vec length = hn::Sqrt(dot(n, n));
     const auto outside = [&](const Vec3& corner, const Vec3& side)
-                             HWY_ATTR { return hn::Lt(dot(n, cross(corner, side)), hn::Zero(d)); };
+                             HWY_ATTR { return hn::Lt(dot(n, cross(corner, unit(side))), hn::Zero(d)); };
     const auto isOutside = hn::Or(hn::Or(outside(a, ab), outside(b, bc)), outside(c, ca));
-    const Vec height = dot(n, a);
-    const Vec toPlane = hn::Div(hn::Mul(height, height), nn);
     const Vec toSides =
         hn::Min(hn::Min(squaredToSegment(a, ab, abab), squaredToSegment(b, bc, bcbc)), squaredToSegment(c, ca, caca));
-    const Vec distance = hn::Sqrt(hn::IfThenElse(isOutside, toSides, toPlane));
+    const Vec distance = hn::IfThenElse(isOutside, hn::Sqrt(toSides), hn::Div(hn::Abs(dot(n, a)), length));
     const Vec farthest = hn::Add(hn::Sqrt(hn::Max(hn::Max(dot(a, a), dot(b, b)), dot(c, c))), moved);
-    const Vec longest = hn::Max(hn::Max(abab, bcbc), caca);
-    const Vec error = hn::Mul(hn::Mul(hn::Set(d, kRounding), farthest), hn::Div(longest, hn::Sqrt(nn)));
+    const Vec error = hn::Mul(hn::Mul(hn::Set(d, kRounding), farthest), hn::Div(hn::Set(d, 1.0F), length));
     hn::Store(hn::Sub(distance, error), d, chunk.lower.data() + i);
     hn::Store(hn::Add(distance, error), d, chunk.upper.data() + i);
   }

@@ -51,8 +51,7 @@ struct CellBound {
 /// * An internal node has bit 63 clear. Its low 32 bits are the index of its first child (child number x + 2y + 4z).
 /// * A leaf with a polynomial has bit 63 set. Its bits 32 to 39 are the degree p, and its low 32 bits are the offset of
 ///   its n(p) coefficients.
-/// * An exact leaf has bit 63 set. Its bits 32 to 39 are `kExactDegree`, its bits 48 and 49 are the `ExactSign`, and
-/// its
+/// * An exact leaf has bit 63 set. Its bits 32 to 39 are `kExactDegree`, its bits 48 and 49 are the `ExactSign`. Its
 ///   low 32 bits are the offset of its list in `ExactTriangles::lists`.
 /// All other bits are 0.
 ///

@@ -38,15 +38,21 @@ double nearDistance(const BuildOptions& options, double referenceLength) {
 /// Returns the settings with the strategy that takes effect.
 BuildOptions settled(BuildOptions options, const DistanceFunction& distance, const Box& domain) {
   if (options.strategy == Strategy::automatic)
-    options.strategy = automaticStrategy(distance.triangleSearch(), referenceLength(distance.source(), domain));
+    options.strategy =
+        automaticStrategy(distance.triangleSearch(), options, referenceLength(distance.source(), domain));
   return options;
 }
 
 std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, const Box& domain) {
   const bool hasTriangles = distance.triangleSearch() != nullptr && distance.triangleSearch()->hasSigns();
   if (options.strategy != Strategy::hpx || !hasTriangles) return std::nullopt;
-  return ExactCells(*distance.triangleSearch(), options.exactWithin * referenceLength(distance.source(), domain),
-                    static_cast<std::size_t>(options.exactTriangles), options.blend);
+  // Queries of exact leaves square lengths in single precision.
+  constexpr double kShortest = 1e-16, kLongest = 1e18;
+  constexpr double kLeastEdge = 1.0 / 256;  // as a share of L
+  const double length = referenceLength(distance.source(), domain);
+  if (!(length > kShortest && length < kLongest)) return std::nullopt;
+  return ExactCells(*distance.triangleSearch(), options.exactWithin * length,
+                    static_cast<std::size_t>(options.exactTriangles), options.blend, kLeastEdge * length);
 }
 
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.

@@ -147,6 +147,7 @@ void exactItems(Stream& stream, Fit& fit, std::size_t triangles) {
   const bool ascends = std::ranges::adjacent_find(listed, std::greater_equal()) == listed.end();
   stream.require(!listed.empty() && ascends && listed.back() < triangles, "an exact cell has triangles that cannot be");
   stream.array(octants, listed.size());
+  stream.require(std::ranges::find(octants, 0) == octants.end(), "a triangle of an exact cell is in no octant");
 }
 
 template <typename Stream>

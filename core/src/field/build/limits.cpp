@@ -78,7 +78,7 @@ void checkEnds(const BuildOptions& options) {
   if (options.maxError > 0 && (options.continuityWeight || options.enrich))
     refuse("a maximum error does not outlive weak continuity or one degree more: leave out one of them");
   if (options.estimator == Estimator::checked && options.trialSamples == TrialSamples::own)
-    refuse("the checked estimator needs trials by the children's samples: leave out the paper's settings");
+    refuse("the checked estimator needs trials by the children's samples: take the estimator embedded or residual");
   if (options.criterion != Criterion::optimal) return;
   if (options.trialSamples == TrialSamples::own)
     refuse("the optimal criterion needs trials by the children's samples: leave out the paper's settings");

@@ -225,13 +225,16 @@ Fit CellFitter::makeFit(CachedProjection projected, int degree, const Box& cell,
   fit.degree = degree;
   fit.outsideBand = outsideBand;
   fit.coefficients = basis::truncated(projected.coefficients, projected.degree, degree);
-  // Raise the mean square, so that the residual of the fit, and pruning, see what the check found.
-  if (options_.estimator == Estimator::checked)
-    projected.meanSquare = std::max(projected.meanSquare, meanSquareOf(fit) + checkedError(fit, cell, check));
-  rate(fit,
-       options_.trialSamples == TrialSamples::own ? basis::topDegreeError(fit.coefficients.data(), degree, 1.0)
-                                                  : squaredError(fit, projected.meanSquare),
-       cell);
+  double squared = options_.trialSamples == TrialSamples::own
+                       ? basis::topDegreeError(fit.coefficients.data(), degree, 1.0)
+                       : squaredError(fit, projected.meanSquare);
+  if (options_.estimator == Estimator::checked) {
+    const double checked = checkedError(fit, cell, check);
+    squared = std::max(squared, checked);
+    // Raise the mean square, so that pruning sees what the check found.
+    projected.meanSquare = std::max(projected.meanSquare, meanSquareOf(fit) + checked);
+  }
+  rate(fit, squared, cell);
   if (keepsProjections()) fit.cached = std::move(projected);
   return fit;
 }

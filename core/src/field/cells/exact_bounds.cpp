@@ -90,7 +90,8 @@ bool ExactBounds::isComplete(const query::OctreeNode& leaf, const Box& around) c
   std::uint32_t place = 0;
   forEachTriangle(field_.exact, field_.nodes[leaf.node],
                   [&](std::uint32_t triangle) { listed[cornersOf(triangle)] |= list.octants(place++); });
-  const auto nearest = search_->nearestTo(around, list.count());
+  constexpr std::size_t kLeast = 64;  // a search for fewer triangles gives up too early
+  const auto nearest = search_->nearestTo(around, std::max<std::size_t>(list.count(), kLeast));
   if (!nearest) return false;
   for (std::size_t i = 0; i < nearest->triangles.size(); ++i) {
     const auto& triangle = search_->triangles()[nearest->triangles[i]];

@@ -84,7 +84,7 @@ ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) con
   if (!list) return {{}, isDivisible};
   const bool isLong = list->triangles.size() > kFew;
   std::optional<Fit> fit = fitFrom(cell, box, std::move(*list));
-  if (!fit) return {{}, isDivisible && isLong};
+  if (!fit) return {{}, isDivisible && isLong && cell.sizes().maxCoeff() > leastEdge_};
   fit->error.near = true;
   return {std::move(fit), false};
 }

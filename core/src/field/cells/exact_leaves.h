@@ -19,9 +19,11 @@ class ExactCells {
  public:
   /// Keeps a reference to the search. `within` is the distance from the surface up to which the field is exact, `most`
   /// the greatest number of triangles of a leaf that could be divided further. `blend` is the width of the field's
-  /// blend zones in edges of a leaf; a leaf is exact in its blend zones too.
-  ExactCells(const TriangleSearch& search, double within, std::size_t most, double blend)
-      : search_(search), within_(within), most_(most), blend_(blend) {}
+  /// blend zones in edges of a leaf; a leaf is exact in its blend zones too. Cells whose triangles do not determine the
+  /// sign, because these intersect each other or lie upon each other, are divided as long as their edges exceed
+  /// `leastEdge`.
+  ExactCells(const TriangleSearch& search, double within, std::size_t most, double blend, double leastEdge)
+      : search_(search), within_(within), most_(most), blend_(blend), leastEdge_(leastEdge) {}
 
   /// Returns true if a point of the cell may be so close to the surface that the field must be exact there.
   bool mustBeExact(const Box& cell) const { return search_.comesWithin(cell, within_); }
@@ -51,8 +53,8 @@ class ExactCells {
   const TriangleSearch& search() const { return search_; }
 
  private:
-  static constexpr std::size_t kShort =
-      12;  ///< triangles of a list with at most as many bytes as a quadratic polynomial
+  /// Number of triangles in a list that takes at most as many bytes as a quadratic polynomial.
+  static constexpr std::size_t kShort = 12;
 
   std::optional<Fit> fitFrom(const Box& cell, const Box& box, TriangleList list) const;
 
@@ -60,15 +62,15 @@ class ExactCells {
   double within_;
   std::size_t most_;
   double blend_;
+  double leastEdge_;
 };
 
 /// Tries to make a polynomial that stands for the triangles of a cell.
 using SmoothFit = std::function<std::optional<Fit>(const Box& cell)>;
 
 /// Makes the leaves exact that may contain points close to the surface, or takes the polynomial from `smoothFit` where
-/// there is one. Starts from the base cells of a tree without
-/// fits, and divides cells whose lists are too long. Cells far from the surface remain without fits. Reports progress
-/// and throws `Cancelled`.
+/// there is one. Starts from the base cells of a tree without fits, and divides cells whose lists are too long. Cells
+/// far from the surface remain without fits. Reports progress and throws `Cancelled`.
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
                       const Progress& progress);
 

@@ -2,6 +2,7 @@
 // Points of the surface, at which the signed distance is known without a search.
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <vector>
 
@@ -15,7 +16,8 @@ class SurfacePoints {
  public:
   explicit SurfacePoints(const TriangleSearch& search);
 
-  /// Calls `visit` for every centroid in the closed box, in the order of the triangles.
+  /// Calls `visit` for centroids in the closed box, in the order of the triangles: for all of them or, where the box
+  /// contains very many, for one of sixteen.
   template <typename F>
   void forEachIn(const Box& box, const F& visit) const {
     visitNode(1, box, visit);
@@ -28,6 +30,9 @@ class SurfacePoints {
   void visitNode(std::size_t node, const Box& box, const F& visit) const {
     if (!box.intersects(boxes_[node])) return;
     const std::size_t blocks = boxes_.size() / 2;
+    constexpr std::size_t kMany = 4096;  // blocks that are visited point by point
+    if (box.contains(boxes_[node]) && (std::bit_width(blocks) - std::bit_width(node)) >= std::bit_width(kMany))
+      return visitFirstOfBlocks(node, visit);
     if (node < blocks) {
       visitNode(2 * node, box, visit);
       visitNode(2 * node + 1, box, visit);
@@ -36,6 +41,19 @@ class SurfacePoints {
     const std::size_t first = (node - blocks) * kBlock;
     for (std::size_t i = first; i < std::min(first + kBlock, points_.size()); ++i)
       if (box.contains(points_[i])) visit(points_[i]);
+  }
+
+  /// Visits the first point of each block below a node.
+  template <typename F>
+  void visitFirstOfBlocks(std::size_t node, const F& visit) const {
+    const std::size_t blocks = boxes_.size() / 2;
+    std::size_t first = node, last = node;
+    while (first < blocks) {
+      first = 2 * first;
+      last = 2 * last + 1;
+    }
+    for (std::size_t block = first; block <= last; ++block)
+      if ((block - blocks) * kBlock < points_.size()) visit(points_[(block - blocks) * kBlock]);
   }
 
   std::vector<Vector3> points_;  ///< in the order of the triangles, in which neighbours in space are close

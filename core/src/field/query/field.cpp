@@ -44,6 +44,7 @@ std::size_t checkGrid(const FieldData& data) {
 std::vector<std::uint32_t> checkLists(const ExactTriangles& exact) {
   const std::span<const std::uint32_t> words = exact.lists;
   std::vector<std::uint32_t> starts;
+  if (words.size() > 0xffffffffu) notAField("its lists of triangles are too long");
   for (std::size_t at = 0; at < words.size();) {
     starts.push_back(static_cast<std::uint32_t>(at));
     const TriangleListView list(&words[at]);
@@ -100,14 +101,16 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
 /// Throws `Error` unless all indices and coordinates of the exact leaves' triangles are in range.
 void checkExact(const ExactTriangles& exact) {
   const std::size_t vertices = std::visit([](const auto& v) { return v.size(); }, exact.vertices);
-  const bool isFinite = std::visit(
-      [](const auto& v) { return std::ranges::all_of(v, [](const auto& vertex) { return vertex.allFinite(); }); },
-      exact.vertices);
-  if (!isFinite) notAField("a vertex is not finite");
+  static constexpr double kLargest = 1e70;  // the fourth power of a length must be finite
+  const auto isInRange = [](const auto& vertex) {
+    return (vertex.template cast<double>().cwiseAbs().array() <= kLargest).all();
+  };
+  const bool areInRange = std::visit([&](const auto& v) { return std::ranges::all_of(v, isInRange); }, exact.vertices);
+  if (!areInRange) notAField("a vertex is out of range");
   for (const auto& triangle : exact.triangles)
     for (const std::uint32_t vertex : triangle)
       if (vertex >= vertices) notAField("a triangle refers to vertex " + std::to_string(vertex));
-  if (!(exact.offset >= 0) || !std::isfinite(exact.offset)) notAField("the offset of its exact cells is out of range");
+  if (!(exact.offset >= 0 && exact.offset <= kLargest)) notAField("the offset of its exact cells is out of range");
 }
 
 void checkBlendAndBounds(const FieldData& data) {

@@ -1,0 +1,59 @@
+// Tests the choice between polynomials and exact leaves for meshes.
+#include <gtest/gtest.h>
+
+#include "hpsdf/build.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/shapes.h"
+#include "support/made_meshes.h"
+
+namespace hpsdf {
+namespace automatic_strategy_test {
+
+Strategy chosenFor(const DistanceFunction& distance, const Box& domain, BuildOptions options = {}) {
+  options.targetError = 1e-2;
+  return build(distance, domain, options).metadata().settings.strategy;
+}
+
+Strategy chosenFor(const TriangleMesh& mesh, const DistanceOptions& distance = {}, const BuildOptions& options = {}) {
+  return chosenFor(ExactDistance(mesh, distance), domainAround(mesh), options);
+}
+
+TEST(AutomaticStrategy, isHpxForSharpEdgesAndCoarseFacets) {
+  EXPECT_EQ(chosenFor(shapes::mesh("gear")), Strategy::hpx);
+  EXPECT_EQ(chosenFor(support::boxOfTwo()), Strategy::hpx);
+  EXPECT_EQ(chosenFor(shapes::mesh("torus,segments=16,sides=8")), Strategy::hpx);
+}
+
+TEST(AutomaticStrategy, isHpWhereExactLeavesGainNothing) {
+  EXPECT_EQ(chosenFor(shapes::mesh("torus")), Strategy::hp) << "a smooth mesh";
+  EXPECT_EQ(chosenFor(shapes::analytic("box"), Box(-Vector3::Ones(), Vector3::Ones())), Strategy::hp);
+  EXPECT_EQ(chosenFor(support::openBox()), Strategy::hp) << "no sign follows from the triangles";
+  const TriangleMesh gear = shapes::mesh("gear");
+  EXPECT_EQ(chosenFor(support::joined(gear, support::moved(gear, {5000, 0, 0}))), Strategy::hp)
+      << "all triangles of a gear lie within a half percent of the size";
+}
+
+TEST(AutomaticStrategy, leavesRoomForLimits) {
+  const TriangleMesh gear = shapes::mesh("gear");
+  EXPECT_EQ(chosenFor(gear, {}, {.maxSteps = 0}), Strategy::hp);
+  const BuildOptions few{.targetError = 0, .maxBytes = 100'000};
+  const Field field = build(ExactDistance(gear), domainAround(gear), few);
+  EXPECT_EQ(field.metadata().settings.strategy, Strategy::hp);
+  EXPECT_LE(field.bytes(), 100'000u);
+}
+
+TEST(AutomaticStrategy, isNotMisledByTrianglesWithoutAreaOrTurnedOver) {
+  TriangleMesh sphere = shapes::mesh("sphere,subdivisions=6");
+  for (std::size_t i = 0; i < sphere.triangles.size(); i += 2)
+    std::swap(sphere.triangles[i][0], sphere.triangles[i][1]);
+  EXPECT_EQ(chosenFor(sphere, {.insideTest = InsideTest::shell, .thickness = 0.1}), Strategy::hp);
+  sphere = shapes::mesh("sphere,subdivisions=6");
+  for (std::size_t i = 0, count = sphere.triangles.size(); i < count; i += 2) {
+    const auto [a, b, c] = sphere.triangles[i];
+    sphere.triangles.push_back({a, b, b});
+  }
+  EXPECT_EQ(chosenFor(sphere, {.insideTest = InsideTest::shell, .thickness = 0.1}), Strategy::hp);
+}
+
+}  // namespace automatic_strategy_test
+}  // namespace hpsdf
