@@ -40,7 +40,8 @@ const Field& shape(const std::string& spec) {
   static std::map<std::string, Field> fields;
   const auto found = fields.find(spec);
   if (found != fields.end()) return found->second;
-  return fields.emplace(spec, build(shapes::analytic(spec), kCube, {.targetError = 1e-7})).first->second;
+  const BuildOptions options{.targetError = 1e-7, .estimator = Estimator::embedded};
+  return fields.emplace(spec, build(shapes::analytic(spec), kCube, options)).first->second;
 }
 
 const std::vector<std::string> kShapes = {"sphere", "torus", "box"};
@@ -451,9 +452,9 @@ TEST(CpuTrace, hitsTheSphereWhereTheFormulaSays) {
     const Vector3 normal = (camera.eye + expected * direction).normalized();
     ASSERT_TRUE(buffers.hit(i) && other.hit(i));
     for (const ViewBuffers* b : {&buffers, &other}) {
-      EXPECT_NEAR(b->distance[i], expected, 2e-3);
-      EXPECT_LT((b->normal[i].cast<double>() - normal).norm(), 0.05);
-      EXPECT_NEAR(b->value[i], 0, 5e-4);  // a hit may lie in the jump between two cells
+      EXPECT_NEAR(b->distance[i], expected, 1e-3);
+      EXPECT_LT((b->normal[i].cast<double>() - normal).norm(), 0.03);
+      EXPECT_NEAR(b->value[i], 0, 1e-6);
     }
     ++compared;
   }
@@ -486,10 +487,9 @@ TEST(CpuTrace, hitsTheSphereOrthographically) {
       }
       if (nearest2 > 0.98 * radius * radius) continue;
       ASSERT_TRUE(buffers.hit(i) && other.hit(i));
-      EXPECT_NEAR(buffers.distance[i], toMiddle - std::sqrt(radius * radius - nearest2), 2e-3);
-      // A hit may lie in the jump between two cells.
-      EXPECT_NEAR(field.value(hitPoint(camera, buffers, i)), 0, 3e-5);
-      EXPECT_NEAR(field.value(hitPoint(camera, other, i)), 0, 3e-5);
+      EXPECT_NEAR(buffers.distance[i], toMiddle - std::sqrt(radius * radius - nearest2), 1e-3);
+      EXPECT_NEAR(field.value(hitPoint(camera, buffers, i)), 0, 1e-6);
+      EXPECT_NEAR(field.value(hitPoint(camera, other, i)), 0, 1e-5);
       ++compared;
     }
     EXPECT_GT(compared, 2000) << distance;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <variant>
 
+#include "hpsdf/detail/triangle_list.h"
+
 namespace hpsdf::render {
 namespace {
 
@@ -54,7 +56,7 @@ struct NearestFeature {
 
 NearestFeature nearestFeature(const ExactTriangles& exact, std::uint64_t bits, const Vector3& x) {
   NearestFeature nearest;
-  forEachListed(exact, bits, [&](std::uint32_t triangle) {
+  forEachTriangle(exact, bits, [&](std::uint32_t triangle) {
     const Closest closest = closestOnTriangle(cornersOf(exact, triangle), x);
     const double distance = (x - closest.point).norm();
     if (!(distance < nearest.distance)) return;
@@ -68,7 +70,7 @@ NearestFeature nearestFeature(const ExactTriangles& exact, std::uint64_t bits, c
 /// Returns the angle-weighted pseudonormal of a feature, of unit length.
 Vector3 pseudonormal(const ExactTriangles& exact, std::uint64_t bits, const NearestFeature& feature) {
   Vector3 sum = Vector3::Zero();
-  forEachListed(exact, bits, [&](std::uint32_t triangle) {
+  forEachTriangle(exact, bits, [&](std::uint32_t triangle) {
     const auto& corners = exact.triangles[triangle];
     for (int i = 0; i < feature.count; ++i)
       if (std::ranges::find(corners, feature.vertices[i]) == corners.end()) return;
@@ -118,7 +120,7 @@ ValueAndGradient evaluateExactLeaf(const ExactTriangles& exact, std::uint64_t bi
 std::optional<Crossing> firstCrossing(const ExactTriangles& exact, std::uint64_t bits, const RayPart& ray,
                                       double side) {
   std::optional<Crossing> first;
-  forEachListed(exact, bits, [&](std::uint32_t triangle) {
+  forEachTriangle(exact, bits, [&](std::uint32_t triangle) {
     std::array<Vector3, 3> v = cornersOf(exact, triangle);
     for (Vector3& corner : v) corner -= ray.start;
     // The weight of a corner is the volume that the ray's direction spans with the opposite side. Two triangles compute

@@ -1,12 +1,11 @@
 #pragma once
 // Exact leaves in double precision, for bounds and for the CPU renderer. This code is simpler than the queries of a
-// field and shares nothing with them, so that tests can compare the two.
+// field and shares only the walk through a list with them, so that tests can compare the two.
 
 #include <cstdint>
 #include <optional>
 
 #include "hpsdf/detail/field_data.h"
-#include "hpsdf/detail/triangle_list.h"
 
 namespace hpsdf::render {
 
@@ -19,16 +18,6 @@ Vector3 unitNormal(const ExactTriangles& exact, std::uint32_t triangle);
 
 /// The corners of a triangle.
 std::array<Vector3, 3> cornersOf(const ExactTriangles& exact, std::uint32_t triangle);
-
-/// Calls f(triangle) for each triangle in the list of an exact leaf.
-template <typename F>
-void forEachListed(const ExactTriangles& exact, std::uint64_t bits, const F& f) {
-  for (const std::uint32_t* run = TriangleListView(exact, bits).runs();; ++run) {
-    const std::uint32_t first = triangle_run::first(*run), end = first + triangle_run::length(*run);
-    for (std::uint32_t triangle = first; triangle < end; ++triangle) f(triangle);
-    if (triangle_run::isLast(*run)) return;
-  }
-}
 
 /// The point where a ray crosses a triangle.
 struct Crossing {

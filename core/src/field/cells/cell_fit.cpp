@@ -208,7 +208,7 @@ double CellFitter::checkedError(const Fit& fit, const Box& cell, const CheckPoin
   double sum = 0, worst = 0;
   for (std::size_t i = 0; i < check.local.size(); ++i) sum += squaredErrorAt(fit, check.local[i], check.distances[i]);
 
-  // Of the triangles in the cell, only the worst counts: many say the same.
+  // Only the worst of the triangles in the cell counts, because many of them say the same.
   if (surface_) {
     const double exact = -distance_.triangleSearch()->offset();
     surface_->forEachIn(cell, [&](const Vector3& x) {
