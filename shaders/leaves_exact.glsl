@@ -33,11 +33,16 @@ bool isExact(Node leaf) { return leaf.degree == kExactDegree; }
 
 bool crossesAtTriangles(Node leaf) { return atTriangles && isExact(leaf); }
 
+// Returns the ExactSign of an exact leaf.
+uint signRule(Node leaf) { return floatBitsToUint(leaf.secondDerivative) & 3u; }
+
 // Returns 1 or -1 if the distance has this sign in the whole leaf, else 0.
 int constantSign(Node leaf) {
-  uint rule = floatBitsToUint(leaf.secondDerivative) & 3u;
+  uint rule = signRule(leaf);
   return rule == 1u ? 1 : rule == 2u ? -1 : 0;
 }
+
+bool signByWinding(Node leaf) { return signRule(leaf) == 3u; }
 
 // Half of the edges of a cell, world units.
 vec3 halfCell(uint depth) { return ldexp(baseCell, ivec3(-1 - int(depth))); }
@@ -111,6 +116,52 @@ void addTriangle(inout Nearest nearest, Triangle t, float tolerance) {
   }
 }
 
+// Returns true if the first of two corners comes first in an order of all positions.
+bool precedes(vec3 p, vec3 q) {
+  return p.x != q.x ? p.x < q.x : p.y != q.y ? p.y < q.y : p.z < q.z;
+}
+
+// Six times the volume that a segment from the origin spans with a side of a triangle (x), and 1 or 0 if the side runs
+// counter-clockwise around the segment or not (y). Both triangles at an edge compute these in the same order, so that no
+// segment passes between them. A segment that meets the side counts as one whose end is moved a little.
+vec2 volumeWithSide(vec3 end, vec3 from, vec3 to) {
+  bool isForward = precedes(from, to);
+  precise vec3 normal = isForward ? cross(from, to) : cross(to, from);
+  precise float volume = dot(end, normal);
+  float side = volume != 0.0 ? volume : normal.x != 0.0 ? normal.x : normal.y != 0.0 ? normal.y : normal.z;
+  return vec2(abs(volume), float(side > 0.0 == isForward));
+}
+
+// Returns 1 if the segment from the origin passes through a triangle from its outer to its inner side, -1 if it passes
+// the other way, and 0 if it does not pass through (core/src/field/query/exact_sign.cpp).
+int crossingOf(vec3 end, Triangle t) {
+  vec2 ofA = volumeWithSide(end, t.b, t.c), ofB = volumeWithSide(end, t.c, t.a), ofC = volumeWithSide(end, t.a, t.b);
+  float left = ofA.y + ofB.y + ofC.y;
+  if (left != 0.0 && left != 3.0) return 0;
+  vec3 weights = vec3(ofA.x, ofB.x, ofC.x);
+  float along = dot(weights, vec3(dot(t.a, end), dot(t.b, end), dot(t.c, end)));
+  bool isBetween = along > 0.0 && along < (weights.x + weights.y + weights.z) * dot(end, end);
+  return !isBetween ? 0 : left == 0.0 ? 1 : -1;
+}
+
+// Returns 1 or -1, the sign of the distance in a leaf whose sign comes from the winding number. The reference point and
+// its winding number follow the runs. The point is in world units from the domain's lower corner.
+int signFromWinding(Node leaf, vec3 point) {
+  int words = leaf.offset;
+  while ((texelFetch(exactLists, words).x & 0x80000000u) == 0u) ++words;
+  vec3 reference = uintBitsToFloat(uvec3(texelFetch(exactLists, words + 1).x, texelFetch(exactLists, words + 2).x,
+                                         texelFetch(exactLists, words + 3).x));
+  int winding = int(texelFetch(exactLists, words + 4).x);
+  for (int at = leaf.offset; at <= words; ++at) {
+    uint run = texelFetch(exactLists, at).x;
+    uint triangle = run & 0x7ffffffu;
+    uint end = triangle + (run >> 27 & 15u);
+    for (; triangle <= end; ++triangle)
+      winding += crossingOf(point - reference, relativeTo(reference, fetchTriangle(triangle)));
+  }
+  return winding > 0 ? -1 : 1;
+}
+
 float diagonalOfDomain() { return length(baseCell * vec3(grid)); }
 
 Nearest nearestTriangle(Node leaf, vec3 point) {
@@ -130,10 +181,18 @@ Nearest nearestTriangle(Node leaf, vec3 point) {
 // The exact distance (w) with its gradient in world units (xyz).
 vec4 exactWithGradient(Node leaf, vec3 point) {
   Nearest nearest = nearestTriangle(leaf, point);
-  int rule = constantSign(leaf);
+  int rule = signByWinding(leaf) ? signFromWinding(leaf, point) : constantSign(leaf);
   float outside = nearest.outside < 0.0 ? -1.0 : 1.0;
   float side = rule != 0 ? float(rule) : outside;
-  bool touching = nearest.distance <= kTouching * diagonalOfDomain();
+  float touchingDistance = kTouching * diagonalOfDomain();
+  bool touching = nearest.distance <= touchingDistance;
+  if (touching && signByWinding(leaf) && nearest.normals != vec3(0.0)) {
+    // The sides of the face decide, because the point's own sign depends on rounding.
+    vec3 normal = normalize(nearest.normals);
+    vec3 foot = point - nearest.difference, beyond = 2.0 * touchingDistance * normal;
+    int front = signFromWinding(leaf, foot + beyond), behind = signFromWinding(leaf, foot - beyond);
+    if (front != behind) return vec4(float(front) * normal, side * nearest.distance - exactOffset);
+  }
   vec3 direction = touching ? outside * nearest.normals : nearest.difference;
   float steepness = length(direction);
   return vec4(steepness > 0.0 ? side * direction / steepness : vec3(0.0), side * nearest.distance - exactOffset);

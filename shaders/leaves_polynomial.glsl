@@ -23,6 +23,8 @@ vec3 normalOf(uint triangle) { return vec3(0.0); }
 vec3 worldOf(vec3 gridPoint) { return vec3(0.0); }
 
 int constantSign(Node leaf) { return 0; }
+bool signByWinding(Node leaf) { return false; }
+int signFromWinding(Node leaf, vec3 point) { return 0; }
 
 vec3 halfCell(uint depth) { return vec3(0.0); }
 

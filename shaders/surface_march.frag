@@ -280,6 +280,36 @@ void crossExactLeaf(MarchRay ray, LeafPoint leaf, inout March march) {
   }
 }
 
+// Follows the ray to the surface in an exact leaf whose triangles intersect each other. Such triangles are no part of the
+// surface where they lie inside: a crossing counts if the sign changes behind it.
+void crossIntersectingTriangles(MarchRay ray, LeafPoint leaf, inout March march) {
+  const int kMostCrossings = 16;
+  float toExit = kBlended ? lengthToExit(leaf.at, ray, leaf.zone.width) : leaf.toLeave;
+  vec3 start = worldOf(ray.origin + march.t * ray.direction);
+  float clear = 2.0 * ray.nudge;
+  if (march.side == 0.0) march.side = float(signFromWinding(leaf.at.node, start));
+  float from = -min(march.t, kBack * ray.nudge);
+  for (int i = 0; i < kMostCrossings; ++i) {
+    Crossings found = crossingsOf(leaf.at.node, start, ray.world, from, toExit + ray.nudge);
+    bool outer = march.side > 0.0;
+    float entry = outer ? found.fromOutside : found.fromInside;
+    bool isBehind = i == 0 && entry > clear && signFromWinding(leaf.at.node, start + clear * ray.world) == -march.side;
+    if (isBehind) march.kind = kOnFace;
+    if (isBehind || entry == kNever) break;
+    if (signFromWinding(leaf.at.node, start + (entry + clear) * ray.world) == -march.side) {
+      march.kind = kOnTriangle;
+      march.lastLeaf = outer ? found.outer : found.inner;
+      march.bracket.x = entry;
+      break;
+    }
+    from = entry + clear;
+  }
+  if (march.kind != kUnderWay) return;
+  march.t += toExit + ray.nudge;
+  march.lastLeaf = kNoCell;
+  if (!(march.t <= ray.length)) march.kind = kMiss;
+}
+
 // Marches along the ray, using the functions of single leaves. Returns true if the ray reaches a point at which the
 // blended field has to be evaluated. Then `leaf` is the leaf at this point.
 bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
@@ -293,7 +323,11 @@ bool marchByPolynomials(MarchRay ray, inout March march, out LeafPoint leaf) {
     }
     if (!stays) break;
     if (kExactLeaves && crossesAtTriangles(leaf.at.node) && !leaf.zone.inside) {
-      crossExactLeaf(ray, leaf, march);
+      if (signByWinding(leaf.at.node)) {
+        crossIntersectingTriangles(ray, leaf, march);
+      } else {
+        crossExactLeaf(ray, leaf, march);
+      }
       continue;
     }
     blended = stepInLeaf(ray, leaf, march);

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <utility>
 #include <variant>
 
+#include "hpsdf/detail/exact_sign.h"
 #include "hpsdf/detail/triangle_list.h"
 
 namespace hpsdf::physics {
@@ -32,10 +35,33 @@ class Sides {
   bool allPositive_ = true, allNegative_ = true;
 };
 
+using Segment = std::array<Vector3, 2>;
+
+double squaredDistance(const Segment& segment, const Vector3& x) {
+  const Vector3 along = segment[1] - segment[0];
+  const double squared = along.squaredNorm();
+  const double t = squared > 0 ? std::clamp((x - segment[0]).dot(along) / squared, 0.0, 1.0) : 0;
+  return (segment[0] + t * along - x).squaredNorm();
+}
+
+/// The shortest way between two segments begins or ends at an end of one of them, or it is perpendicular to both.
+double distanceBetween(const Segment& a, const Segment& b) {
+  double squared = std::min(
+      {squaredDistance(a, b[0]), squaredDistance(a, b[1]), squaredDistance(b, a[0]), squaredDistance(b, a[1])});
+  const Vector3 alongA = a[1] - a[0], alongB = b[1] - b[0], across = alongA.cross(alongB), between = b[0] - a[0];
+  const double scale = across.squaredNorm();
+  if (scale > 0) {
+    const double onA = between.cross(alongB).dot(across) / scale, onB = between.cross(alongA).dot(across) / scale;
+    if (onA > 0 && onA < 1 && onB > 0 && onB < 1)
+      squared = std::min(squared, (between + onB * alongB - onA * alongA).squaredNorm());
+  }
+  return std::sqrt(squared);
+}
+
 }  // namespace
 
 ExactLeafBound::ExactLeafBound(const ExactTriangles& exact, std::uint64_t leaf)
-    : sign_(node::exactSign(leaf)), offset_(exact.offset) {
+    : exact_(exact), leaf_(leaf), sign_(node::exactSign(leaf)), offset_(exact.offset) {
   const auto vertex = [&](std::uint32_t index) {
     return std::visit([&](const auto& vertices) { return Vector3(vertices[index].template cast<double>()); },
                       exact.vertices);
@@ -44,6 +70,32 @@ ExactLeafBound::ExactLeafBound(const ExactTriangles& exact, std::uint64_t leaf)
     const auto& index = exact.triangles[triangle];
     triangles_.push_back(triangleOf(index, {vertex(index[0]), vertex(index[1]), vertex(index[2])}));
   });
+  if (sign_ == ExactSign::winding) findOpenEdges();
+}
+
+void ExactLeafBound::findOpenEdges() {
+  struct Edge {
+    Segment ends;
+    int count = 0;  ///< triangles along the edge from the lower to the higher index, minus those the other way
+  };
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Edge> edges;
+  for (const Triangle& triangle : triangles_)
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t from = triangle.index[k], to = triangle.index[(k + 1) % 3];
+      Edge& edge = edges[std::minmax(from, to)];
+      edge.ends = {triangle.corner[k], triangle.corner[(k + 1) % 3]};
+      edge.count += from < to ? 1 : -1;
+    }
+  for (const auto& [indices, edge] : edges)
+    if (edge.count != 0) openEdges_.push_back(edge.ends);
+}
+
+int ExactLeafBound::signByWinding(const Ball& ball) const {
+  const Vector3 reference = TriangleListView(exact_, leaf_).reference().point.cast<double>();
+  const Segment toCenter = {reference, ball.center};
+  const auto isPassed = [&](const Segment& edge) { return distanceBetween(toCenter, edge) <= ball.radius; };
+  if (std::ranges::any_of(openEdges_, isPassed)) return 0;
+  return windingAt(exact_, leaf_, ball.center) > 0 ? -1 : 1;
 }
 
 ExactLeafBound::Triangle ExactLeafBound::triangleOf(const std::array<std::uint32_t, 3>& index,
@@ -82,7 +134,8 @@ double ExactLeafBound::leastIn(const Box& box, bool withSign, Positions& candida
   const double rounding = kExactRounding * (nearest + size);
   const double least = nearest - ball.radius - rounding, most = nearest + ball.radius + rounding;
   int sign = sign_ == ExactSign::positive ? 1 : sign_ == ExactSign::negative ? -1 : 0;
-  if (sign == 0 && withSign && least > 0) sign = signIn(ball, candidates);
+  if (sign == 0 && withSign && least > 0)
+    sign = sign_ == ExactSign::winding ? signByWinding(ball) : signIn(ball, candidates);
   return (sign > 0 ? least : -most) - offset_;
 }
 

@@ -13,13 +13,14 @@ namespace hpsdf::physics {
 /// Bounds the values of an exact leaf from below. The distance to the leaf's triangles changes no faster than the point
 /// moves, everywhere in space. The sign may change without a zero where it follows from pseudonormals and the list
 /// lacks the nearest triangles: beyond the leaf, where a blended field still uses it, and beside the holes of an open
-/// mesh. So the sign counts as known only where all faces, edges and vertices that can be nearest agree on it.
+/// mesh. So the sign counts as known only where all faces, edges and vertices that can be nearest agree on it. Where
+/// the sign follows from the winding number, it may change behind edges that the listed triangles do not close.
 class ExactLeafBound {
  public:
   /// Positions of triangles in the leaf's list.
   using Positions = std::vector<std::uint32_t>;
 
-  /// `leaf` is the packed node.
+  /// Keeps a reference to the triangles. `leaf` is the packed node.
   ExactLeafBound(const ExactTriangles& exact, std::uint64_t leaf);
 
   /// Returns the positions of all triangles of the leaf.
@@ -63,13 +64,20 @@ class ExactLeafBound {
   /// Returns 1 or −1 if all features of the candidates that can be nearest to a point of the ball give this sign, else
   /// 0.
   int signIn(const Ball& ball, const Positions& candidates);
+  /// Returns the sign in a ball without triangles for `ExactSign::winding`, or 0 if a segment from the reference point
+  /// to a point of the ball may pass an edge at which the listed triangles end.
+  int signByWinding(const Ball& ball) const;
+  void findOpenEdges();
   void findFeatures(Triangle& triangle) const;
   static Feature faceOf(const Triangle& triangle);
   Feature sideOf(const Triangle& triangle, int side) const;
   Feature cornerOf(const Triangle& triangle, int corner) const;
 
+  const ExactTriangles& exact_;
+  std::uint64_t leaf_;
   ExactSign sign_;
   double offset_;
+  std::vector<std::array<Vector3, 2>> openEdges_;  ///< for `ExactSign::winding`: edges at which the triangles end
   std::vector<Triangle> triangles_;
   std::vector<double> distances_;
 };

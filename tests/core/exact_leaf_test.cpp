@@ -10,6 +10,8 @@
 #include "../support/temporary_directory.h"
 #include "../support/test_mesh.h"
 #include "hpsdf/build.h"
+#include "hpsdf/detail/exact_sign.h"
+#include "hpsdf/detail/sign_check.h"
 #include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
@@ -27,11 +29,16 @@ struct Part {
   DistanceOptions distance = {};
 };
 
+/// Two boxes, one of which reaches into the other.
+TriangleMesh overlappingBoxes() {
+  return support::joined(support::boxOfTwo(), support::moved(support::boxOfTwo(), {0.7, 0.6, 0.5}));
+}
+
 Part partOf(const std::string& name) {
   if (name == "shell") return {support::openBox(), {.insideTest = InsideTest::shell, .thickness = 0.1}};
   if (name == "far") return {support::moved(shapes::mesh("gear"), {300, -200, 100})};
-  if (name == "overlap")  // two boxes, one of which reaches into the other
-    return {support::joined(support::boxOfTwo(), support::moved(support::boxOfTwo(), {0.7, 0.6, 0.5}))};
+  if (name == "overlap") return {overlappingBoxes()};
+  if (name == "inward") return {support::reversed(overlappingBoxes())};
   if (name == "fandisk") return {loadMesh(support::testMesh("cad/fandisk.obj"))};
   return {shapes::mesh(name)};
 }
@@ -87,7 +94,6 @@ TEST_P(ExactLeaf, isExactNearTheSurface) {
     greatest = std::max(greatest, std::abs(field.value(x) - distance));
   }
   EXPECT_GT(count, 1000);
-  if (GetParam() == "overlap") return;  // cells in which triangles intersect are not exact
   EXPECT_LT(greatest, (options.exactTolerance + 1e-6) * size);
 }
 
@@ -144,7 +150,8 @@ TEST_P(ExactLeaf, doesNotDependOnThreads) {
   EXPECT_EQ(alone.data().exact.lists, field.data().exact.lists);
 }
 
-INSTANTIATE_TEST_SUITE_P(Parts, ExactLeaf, testing::Values("box", "gear", "shell", "far", "overlap", "fandisk"),
+INSTANTIATE_TEST_SUITE_P(Parts, ExactLeaf,
+                         testing::Values("box", "gear", "shell", "far", "overlap", "inward", "fandisk"),
                          [](const auto& part) { return part.param; });
 
 TEST(ExactLeaves, ofACubeNeedFewBytes) {
@@ -213,6 +220,83 @@ TEST(ExactLeaves, withDamagedListsAreRefused) {
   EXPECT_THROW(fieldOf({2, 0xffff, triangle_run::packed(1, 2) | triangle_run::kLast}, 0), Error) << "no such triangle";
   EXPECT_THROW(fieldOf({0xffffffff, 0xffff, both}, 0), Error) << "longer than all lists";
   EXPECT_THROW(fieldOf({0}, 0), Error) << "an empty list";
+}
+
+TEST(ExactLeaves, followTheWindingNumberWhereTrianglesIntersect) {
+  const TriangleMesh boxes = overlappingBoxes();
+  const ExactDistance exact(boxes);
+  const Field field = build(exact, domainAround(boxes), hpx());
+  int count = 0, inBoth = 0;
+  for (const Vector3& x : placesIn(field.domain(), 50000)) {
+    const FieldData& data = field.data();
+    const std::uint64_t leaf = data.nodes[field.cellAt(x).id];
+    if (!node::isExact(leaf) || node::exactSign(leaf) != ExactSign::winding) continue;
+    ++count;
+    ASSERT_EQ(windingAt(data.exact, leaf, x), std::lround(windingNumber(boxes, x))) << x.transpose();
+    inBoth += static_cast<int>(windingAt(data.exact, leaf, x) == 2);
+  }
+  EXPECT_GT(count, 500);
+  EXPECT_GT(inBoth, 20);
+}
+
+TEST(ExactLeaves, haveTheNormalAsGradientOnTheSurfaceWhereTrianglesIntersect) {
+  const TriangleMesh boxes = overlappingBoxes();
+  const Field field = build(ExactDistance(boxes), domainAround(boxes), hpx());
+  int count = 0;
+  for (Vector3 x : placesIn(Box(Vector3::Constant(-1), Vector3::Constant(1)), 3000)) {
+    if (std::max(std::abs(x.y()), std::abs(x.z())) > 0.99) continue;
+    x.x() = 1;  // on the first box, whose corner (1, 1, 1) lies in the second one
+    const Cell cell = field.cellAt(x);
+    if (cell.degree != kExactDegree || node::exactSign(field.data().nodes[cell.id]) != ExactSign::winding) continue;
+    if (x.y() > -0.41 && x.z() > -0.51) continue;  // in the second box
+    ++count;
+    const ValueAndGradient found = field.valueAndGradient(x);
+    ASSERT_NEAR((found.gradient - Vector3::UnitX()).norm(), 0, 1e-6) << x.transpose();
+  }
+  EXPECT_GT(count, 100);
+}
+
+/// The segments from the reference point to the vertices of a grid run through edges and vertices of the triangles, if
+/// the reference point lies on the grid too.
+TEST(ExactLeaves, countASegmentThroughAnEdgeOrAVertexOnce) {
+  FieldData data;
+  data.domain = Box(Vector3::Constant(-2), Vector3::Constant(2));
+  data.nodes = {node::exactLeaf(ExactSign::winding, 0)};
+  const TriangleMesh box = support::boxOfTwo();
+  data.exact.vertices = box.vertices;
+  for (const Triangle& triangle : box.triangles) data.exact.triangles.push_back(triangle);
+  data.exact.lists = {12 | TriangleListView::kReferenceBit, 0xffffffff, 0xffffffff, 0xffffffff,
+                      triangle_run::packed(0, 12) | triangle_run::kLast};
+  const auto reference = TriangleListView::packed({{0, 0, 0}, 1});
+  data.exact.lists.insert(data.exact.lists.end(), reference.begin(), reference.end());
+  const Field field(std::move(data));
+  for (const double x : {-1.5, -0.5, 0.0, 0.5, 1.5})
+    for (const double y : {-1.5, -0.5, 0.0, 0.5, 1.5})
+      for (const double z : {-1.5, -0.5, 0.25, 0.5, 1.5}) {
+        const Vector3 point(x, y, z);
+        EXPECT_EQ(field.value(point) < 0, point.cwiseAbs().maxCoeff() < 1) << point.transpose();
+      }
+}
+
+TEST(ExactLeaves, withDamagedReferencesAreRefused) {
+  const auto fieldOf = [](std::uint32_t count, ExactSign sign, std::vector<std::uint32_t> reference) {
+    FieldData data;
+    data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
+    data.nodes = {node::exactLeaf(sign, 0)};
+    data.exact.vertices = std::vector<Vector3>{{0, 0, 0}, {0.5, 0, 0}, {0, 0.5, 0}};
+    data.exact.triangles = {{0, 1, 2}};
+    data.exact.lists = {count, 0xff, triangle_run::packed(0, 1) | triangle_run::kLast};
+    data.exact.lists.insert(data.exact.lists.end(), reference.begin(), reference.end());
+    return Field(std::move(data));
+  };
+  constexpr std::uint32_t kOne = 1 | TriangleListView::kReferenceBit, kNan = 0x7fc00000;
+  const std::vector<std::uint32_t> above = {0, 0, 0x3f000000, 0};  // z = 0.5
+  EXPECT_NEAR(fieldOf(kOne, ExactSign::winding, above).value({0.1, 0.1, -0.25}), -0.25, 1e-12);
+  EXPECT_NEAR(fieldOf(kOne, ExactSign::winding, above).value({0.9, 0, -0.25}), std::hypot(0.4, 0.25), 1e-12);
+  EXPECT_THROW(fieldOf(kOne, ExactSign::winding, {0, 0, 0x3f000000}), Error) << "too few words";
+  EXPECT_THROW(fieldOf(kOne, ExactSign::winding, {0, 0, kNan, 1}), Error) << "not a point";
+  EXPECT_THROW(fieldOf(1, ExactSign::winding, {}), Error) << "no reference";
+  EXPECT_THROW(fieldOf(kOne, ExactSign::pseudonormal, {0, 0, 0x3f000000, 1}), Error) << "no reference is expected";
 }
 
 TEST(ExactLeaves, needADistanceToTriangles) {

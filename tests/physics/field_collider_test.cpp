@@ -10,6 +10,7 @@
 
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
 #include "support/made_meshes.h"
@@ -67,33 +68,42 @@ Field exactField(const TriangleMesh& mesh, const DistanceOptions& distance = {},
 
 /// Returns one exact leaf for a few random triangles that have nothing to do with each other, so that its sign changes
 /// anywhere.
-Field scatteredField(unsigned seed) {
+Field scatteredField(unsigned seed, ExactSign sign) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(-0.8, 0.8);
   FieldData data;
   data.domain = Box(Vector3(-1, -1, -1), Vector3(1, 1, 1));
-  data.nodes = {node::exactLeaf(ExactSign::pseudonormal, 0)};
+  data.nodes = {node::exactLeaf(sign, 0)};
   std::vector<Vector3> vertices(12);
   for (Vector3& x : vertices) x = Vector3(uniform(random), uniform(random), uniform(random));
   data.exact.vertices = std::move(vertices);
   data.exact.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {7, 8, 9}, {9, 10, 11}};
   data.exact.lists = {5, 0xffffffff, 0xff, triangle_run::packed(0, 5) | triangle_run::kLast};
+  if (sign == ExactSign::winding) {
+    data.exact.lists[0] |= TriangleListView::kReferenceBit;
+    const auto reference = TriangleListView::packed({{0.1F, -0.2F, 0.3F}, 0});
+    data.exact.lists.insert(data.exact.lists.end(), reference.begin(), reference.end());
+  }
   return Field(std::move(data));
 }
 
-/// Returns fields with exact leaves: of solids with and without sharp edges, of a shell, of an open mesh whose sign
-/// jumps beside its hole, and of scattered triangles. All but the last are there as built and with blended zones of two
-/// widths.
+/// Returns fields with exact leaves: of solids with and without sharp edges, of two boxes that overlap, of a shell, of
+/// an open mesh whose sign jumps beside its hole, and of scattered triangles. All but the last are there as built and
+/// with blended zones of two widths.
 std::vector<Field> exactFields() {
   std::vector<Field> result;
   result.push_back(exactField(shapes::mesh("gear")));
   result.push_back(exactField(shapes::mesh("torus,segments=24,sides=12")));
   result.push_back(exactField(wedge()));
+  result.push_back(
+      exactField(support::joined(support::boxOfTwo(), support::moved(support::boxOfTwo(), {0.7, 0.6, 0.5}))));
   result.push_back(exactField(support::openBox(), {.insideTest = InsideTest::shell, .thickness = 0.1}));
   result.push_back(exactField(support::openBox(), {.insideTest = InsideTest::pseudonormal}, 0.2));
   for (std::size_t i = 0, count = result.size(); i < count; ++i)
     result.push_back(blended(result[i], i == 0 ? kDefaultBlend : kMaxBlend));
-  for (unsigned seed = 0; seed < 2; ++seed) result.push_back(scatteredField(seed));
+  for (unsigned seed = 0; seed < 2; ++seed)
+    for (const ExactSign sign : {ExactSign::pseudonormal, ExactSign::winding})
+      result.push_back(scatteredField(seed, sign));
   return result;
 }
 

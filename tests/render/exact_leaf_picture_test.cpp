@@ -13,6 +13,7 @@
 #include "compare_buffers.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/render/renderer.h"
@@ -31,9 +32,9 @@ constexpr int kWidth = 160, kHeight = 120;
 
 /// A field with exact leaves, and the distance that it approximates.
 struct Part {
-  explicit Part(const TriangleMesh& mesh, const DistanceOptions& options = {})
+  explicit Part(const TriangleMesh& mesh, const DistanceOptions& options = {}, double targetError = 1e-5)
       : exact(mesh, options),
-        field(build(exact, domainAround(mesh), {.targetError = 1e-5, .strategy = Strategy::hpx})),
+        field(build(exact, domainAround(mesh), {.targetError = targetError, .strategy = Strategy::hpx})),
         size(boundingBox(mesh).sizes().maxCoeff()) {}
 
   ExactDistance exact;
@@ -52,6 +53,11 @@ const Part& part(const std::string& name) {
     return parts.try_emplace(name, support::moved(shapes::mesh("gear"), Vector3(900, -300, 20), 8)).first->second;
   if (name == "tiny")
     return parts.try_emplace(name, support::moved(shapes::mesh("box"), Vector3(3e-12, 0, 0), 1e-12)).first->second;
+  if (name == "overlap") {
+    const TriangleMesh gear = shapes::mesh("gear");
+    const TriangleMesh both = support::joined(gear, support::moved(gear, {0.31, 0.17, 0.08}));
+    return parts.try_emplace(name, both, DistanceOptions{}, 1e-6).first->second;
+  }
   return parts.try_emplace(name, shapes::mesh(name)).first->second;
 }
 
@@ -248,7 +254,28 @@ TEST_P(ExactLeafPicture, differsForAWrongTriangle) {
   EXPECT_FALSE(agree(cpu->slice(slice, kWidth, kHeight), gl->slice(slice, kWidth, kHeight), sliceTolerance(field)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Parts, ExactLeafPicture, testing::Values("box", "gear", "far", "tiny", "shell", "fandisk"),
+TEST(ExactLeafPictures, ofOverlappingPartsNeedTheWindingNumber) {
+  FieldData data = part("overlap").field.data();
+  std::size_t leaves = 0;
+  for (const std::uint64_t leaf : data.nodes) {
+    if (!node::isExact(leaf) || node::exactSign(leaf) != ExactSign::winding) continue;
+    ++leaves;
+    const TriangleListView list(data.exact, leaf);
+    WindingReference reference = list.reference();
+    reference.winding = reference.winding > 0 ? 0 : 1;
+    std::ranges::copy(TriangleListView::packed(reference),
+                      data.exact.lists.begin() + (list.referenceWords() - data.exact.lists.data()));
+  }
+  EXPECT_GT(leaves, 100U);
+  const Field wrong(std::move(data));
+  const auto right = makeCpuRenderer(part("overlap").field), cpu = makeCpuRenderer(wrong);
+  const Camera camera = cameras(wrong, 1, 5).front();
+  EXPECT_FALSE(agree(right->surface({camera, 0}, kWidth, kHeight), cpu->surface({camera, 0}, kWidth, kHeight),
+                     surfaceTolerance(wrong), &camera));
+}
+
+INSTANTIATE_TEST_SUITE_P(Parts, ExactLeafPicture,
+                         testing::Values("box", "gear", "far", "tiny", "shell", "overlap", "fandisk"),
                          [](const auto& part) { return part.param; });
 
 }  // namespace exact_leaf_picture_test

@@ -422,6 +422,10 @@ Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x) {
   return search.result(0);
 }
 
+double distanceTo(const Hierarchy& hierarchy, const Vector3& x) {
+  return std::sqrt(squaredDistance(hierarchy.frameAt(nearestTriangle(hierarchy, x).triangleRef), x));
+}
+
 void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
                       std::array<Nearest, kPacket>& nearest) {
   Search<kPacket> search(hierarchy, points);

@@ -59,6 +59,9 @@ void run(Search<kPacket>& search);
 /// Returns the triangle nearest to x.
 Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x);
 
+/// Returns the distance from x to the nearest triangle.
+double distanceTo(const Hierarchy& hierarchy, const Vector3& x);
+
 /// Finds the nearest triangle of each point of a packet in one search. The points should be close to each other. On
 /// entry, `nearest` holds triangles from which the search starts, such as those found for nearby points. On return, it
 /// holds the nearest triangles.

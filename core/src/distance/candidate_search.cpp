@@ -33,11 +33,6 @@ void forEachOctant(const Box& box, const F& f) {
 
 double halfDiagonal(const Box& box) { return (box.max() - box.min()).norm() / 2; }
 
-double distanceTo(const Hierarchy& hierarchy, const Vector3& x) {
-  const bvh::Nearest nearest = bvh::nearestTriangle(hierarchy, x);
-  return std::sqrt(bvh::squaredDistance(hierarchy.frameAt(nearest.triangleRef), x));
-}
-
 /// Collects the triangles within a radius of a point.
 class Collector {
  public:
@@ -195,7 +190,7 @@ class Sifter {
 };
 
 bool comesWithinAt(const Hierarchy& hierarchy, const Box& box, double distance, int levels) {
-  const double fromCentre = distanceTo(hierarchy, box.center());
+  const double fromCentre = bvh::distanceTo(hierarchy, box.center());
   if (fromCentre > distance + halfDiagonal(box)) return false;
   if (levels == 0 || fromCentre <= distance + (box.max() - box.min()).minCoeff() / 2) return true;
   bool comes = false;
@@ -210,16 +205,16 @@ bool CandidateSearch::comesWithin(const Box& box, double distance) const {
   return comesWithinAt(hierarchy_, box, distance + offset_, kLevels);
 }
 
-std::optional<ExactSign> CandidateSearch::signIn(const Box& box, std::span<const std::uint32_t> triangles) const {
+std::optional<LeafSign> CandidateSearch::signIn(const Box& box, std::span<const std::uint32_t> triangles) const {
   return signs_.find(
-      box.center(), [&] { return comesWithin(box, -offset_); }, triangles);
+      box, [&] { return comesWithin(box, -offset_); }, triangles);
 }
 
 std::optional<TriangleList> CandidateSearch::nearestTo(const Box& box, std::size_t most) const {
   // The balls around whole boxes reach about so many times more triangles than those that are found in the end.
   constexpr std::size_t kCoarse = 32;
   const double radius = halfDiagonal(box);
-  const double reach = (distanceTo(hierarchy_, box.center()) + 2 * radius) * (1 + kRounding);
+  const double reach = (bvh::distanceTo(hierarchy_, box.center()) + 2 * radius) * (1 + kRounding);
   const auto coarse = Collector(hierarchy_, box.center(), reach, kCoarse * most).collect();
   if (!coarse) return std::nullopt;
   auto list = Sifter(hierarchy_, box, *coarse, most).sift();

@@ -28,7 +28,7 @@ class CandidateSearch final : public TriangleSearch {
   bool comesWithin(const Box& box, double distance) const override;
   std::optional<TriangleList> nearestTo(const Box& box, std::size_t most) const override;
   bool hasSigns() const override { return signs_.any(); }
-  std::optional<ExactSign> signIn(const Box& box, std::span<const std::uint32_t> triangles) const override;
+  std::optional<LeafSign> signIn(const Box& box, std::span<const std::uint32_t> triangles) const override;
 
  private:
   const bvh::Hierarchy& hierarchy_;

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
+#include <limits>
 
+#include "bvh/search.h"
 #include "surface/crossings.h"
 
 namespace hpsdf::distance {
@@ -12,18 +15,46 @@ bool ExactLeafSigns::any() const {
          (insideTest_ == InsideTest::winding && winding_.isClosed());
 }
 
-std::optional<ExactSign> ExactLeafSigns::find(const Vector3& centre, const std::function<bool()>& isCrossed,
-                                              std::span<const std::uint32_t> slots) const {
+std::optional<LeafSign> ExactLeafSigns::find(const Box& box, const std::function<bool()>& isCrossed,
+                                             std::span<const std::uint32_t> slots) const {
   if (!any()) return std::nullopt;
-  if (insideTest_ == InsideTest::pseudonormal) return ExactSign::pseudonormal;
-  if (insideTest_ == InsideTest::shell) return ExactSign::positive;
-  if (!isCrossed()) return winding_.isInside(centre) ? ExactSign::negative : ExactSign::positive;
+  if (insideTest_ == InsideTest::pseudonormal) return LeafSign{ExactSign::pseudonormal};
+  if (insideTest_ == InsideTest::shell) return LeafSign{ExactSign::positive};
+  if (!isCrossed()) return LeafSign{winding_.isInside(box.center()) ? ExactSign::negative : ExactSign::positive};
   const auto allAre = [&](Sides sides) {
     return std::ranges::all_of(slots, [&](std::uint32_t slot) { return sidesOf(slot) == sides; });
   };
-  if (allAre(Sides::separates)) return ExactSign::pseudonormal;
-  if (allAre(Sides::bothInside)) return ExactSign::negative;
-  return std::nullopt;
+  if (allAre(Sides::separates)) return LeafSign{ExactSign::pseudonormal};
+  if (allAre(Sides::bothInside)) return LeafSign{ExactSign::negative};
+  const std::optional<WindingReference> reference = referenceIn(box);
+  return reference ? std::optional(LeafSign{ExactSign::winding, *reference}) : std::nullopt;
+}
+
+/// Returns a reference point in a box, the farthest from the triangles out of a few. Segments from it to points that
+/// queries and pictures ask for, such as centres of cells, should not run along edges. So the places are irregular:
+/// multiples of powers of the real solution of t³ = t + 1 spread evenly in a cube. Returns std::nullopt if the point
+/// may change its side when it is rounded to floats.
+std::optional<WindingReference> ExactLeafSigns::referenceIn(const Box& box) const {
+  constexpr int kPlaces = 4;
+  const Vector3 steps(0.8191725133961645, 0.6710436067037893, 0.5497004779019703);
+  const double size = box.max().cwiseAbs().cwiseMax(box.min().cwiseAbs()).maxCoeff();
+  double farthest = 4 * std::numeric_limits<float>::epsilon() * size;
+  WindingReference reference;
+  bool isFound = false;
+  for (int place = 1; place <= kPlaces; ++place) {
+    const Vector3 share = (place * steps).unaryExpr([](double s) { return s - std::floor(s); });
+    const Eigen::Vector3f point = (box.min() + share.cwiseProduct(box.sizes())).cast<float>();
+    const Vector3 rounded = point.cast<double>();
+    if (!box.contains(rounded)) continue;
+    const double distance = bvh::distanceTo(hierarchy_, rounded);
+    if (!(distance > farthest)) continue;
+    farthest = distance;
+    reference.point = point;
+    isFound = true;
+  }
+  if (!isFound) return std::nullopt;
+  reference.winding = winding_.windingAt(reference.point.cast<double>());
+  return reference;
 }
 
 void ExactLeafSigns::prepare() const {

@@ -26,7 +26,9 @@ constexpr double kTooNear = 0x1p-44;
 /// crossed. The sign of a leaf into which no triangle reaches is therefore that of its centre. In other leaves, the
 /// pseudonormal gives the sign if every listed triangle has the outside in front of it and the inside behind it,
 /// intersects no other triangle, and has no edge or vertex that is too sharp: the triangles are then the whole boundary
-/// of the inside around their nearest points.
+/// of the inside around their nearest points. Elsewhere, the winding number is found at one point of the leaf, from
+/// where it can be followed to any other point: every triangle that is crossed on the way is listed, because it is
+/// nearest to the point where it is crossed.
 class ExactLeafSigns {
  public:
   /// Keeps references to the arguments.
@@ -36,16 +38,17 @@ class ExactLeafSigns {
   /// Returns false if no leaf has a sign: for open meshes and outer hulls.
   bool any() const;
 
-  /// Returns the sign in a leaf. `isCrossed` says whether a triangle may reach into the leaf; it is called only where
-  /// the sign depends on it. `slots` are the triangles that can be nearest to its points. Returns std::nullopt if the
-  /// sign does not follow from these.
-  std::optional<ExactSign> find(const Vector3& centre, const std::function<bool()>& isCrossed,
-                                std::span<const std::uint32_t> slots) const;
+  /// Returns the sign in a leaf that has a weight in `box`. `isCrossed` says whether a triangle may reach into the box;
+  /// it is called only where the sign depends on it. `slots` are the triangles that can be nearest to points of the
+  /// box. Returns std::nullopt if the sign does not follow from these.
+  std::optional<LeafSign> find(const Box& box, const std::function<bool()>& isCrossed,
+                               std::span<const std::uint32_t> slots) const;
 
  private:
   using Sides = sign::WindingSign::Sides;
 
   void prepare() const;
+  std::optional<WindingReference> referenceIn(const Box& box) const;
   Sides sidesOf(std::uint32_t slot) const;
 
   const bvh::Hierarchy& hierarchy_;

@@ -152,6 +152,12 @@ bool WindingSign::separatesOutsideFromInside(std::uint32_t slot) const { return 
 
 bool WindingSign::isInside(const Vector3& x) const { return sampleAt(x, 0, 0).inside; }
 
+std::int32_t WindingSign::windingAt(const Vector3& x) const {
+  constexpr double kError = 0.25;  // the number is whole
+  const double winding = winding_.estimateWithin(x, kError, [](const auto&) { return false; }).value;
+  return static_cast<std::int32_t>(std::lround(winding + 0.5 - level_));
+}
+
 bool WindingSign::isSameSideWithin(const Vector3& x, double radius) const {
   return edges_.empty() || sampleAt(x, 0, radius).holdsWithin(radius);
 }

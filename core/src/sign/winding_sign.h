@@ -60,6 +60,10 @@ class WindingSign {
 
   bool isInside(const Vector3& x) const;
 
+  /// Returns the winding number at a point that lies on no triangle, plus 1 in a mesh that is oriented inward, so that
+  /// the point is inside if the number is above 0. The mesh must have no holes.
+  std::int32_t windingAt(const Vector3& x) const;
+
   /// Returns true if all points within `radius` of x are certainly on the same side (inside or outside) as x, except
   /// points that a triangle separates from x.
   bool isSameSideWithin(const Vector3& x, double radius) const;

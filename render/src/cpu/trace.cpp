@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "hpsdf/detail/exact_sign.h"
 #include "view/exact_leaf.h"
 
 namespace hpsdf::render {
@@ -383,14 +384,28 @@ class TraceField::March {
     const double toExit = lengthToExit(leaf.at, ray_.direction, field_.space_.grid, field_.field_.blend);
     const Vector3 direction = ray_.direction.cwiseProduct(field_.space_.size).cwiseQuotient(field_.space_.grid);
     const RayPart part{field_.worldPoint(pointAt(t_)), direction, -std::min(t_, kBack * nudge_), toExit + nudge_};
-    const bool hasCrossing = node::exactSign(field_.field_.nodes[leaf.at.node]) == ExactSign::pseudonormal;
-    const auto crossing =
-        hasCrossing ? firstCrossing(field_.field_.exact, field_.field_.nodes[leaf.at.node], part, side_) : std::nullopt;
-    if (crossing) {
+    if (const auto crossing = crossingOfSurface(field_.field_.nodes[leaf.at.node], part)) {
       const double t = t_ + crossing->t;
       return Hit{t, leaf.at, localAt(leaf.at, t), false, crossing->triangle};
     }
     advance(leaf, toExit, toExit == leaf.toLeave ? 0 : heightAt(leaf.at, t_ + toExit));
+    return std::nullopt;
+  }
+
+  /// Returns the first crossing of a ray with the surface in an exact leaf. Triangles that lie inside are no part of
+  /// the surface: where triangles intersect each other, a crossing counts if the sign changes behind it.
+  std::optional<Crossing> crossingOfSurface(std::uint64_t bits, RayPart part) const {
+    const ExactTriangles& exact = field_.field_.exact;
+    const ExactSign rule = node::exactSign(bits);
+    if (rule == ExactSign::positive || rule == ExactSign::negative) return std::nullopt;
+    while (const auto crossing = firstCrossing(exact, bits, part, side_)) {
+      const double behind = crossing->t + nudge_;
+      const auto isOther = [&] {
+        return (windingAt(exact, bits, part.start + behind * part.direction) > 0) == (side_ > 0);
+      };
+      if (rule == ExactSign::pseudonormal || isOther()) return crossing;
+      part.first = behind;
+    }
     return std::nullopt;
   }
 

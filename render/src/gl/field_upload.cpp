@@ -121,6 +121,20 @@ std::vector<std::array<float, 4>> cornerTexels(const FieldData& field) {
   return texels;
 }
 
+/// The lists of exact leaves, with reference points relative to the domain's lower corner.
+std::vector<std::uint32_t> uploadedLists(const FieldData& field) {
+  std::vector<std::uint32_t> lists = field.exact.lists;
+  for (const std::uint64_t bits : field.nodes) {
+    if (!node::isExact(bits) || node::exactSign(bits) != ExactSign::winding) continue;
+    const TriangleListView list(field.exact, bits);
+    WindingReference reference = list.reference();
+    reference.point = (reference.point.cast<double>() - field.domain.min()).cast<float>();
+    std::ranges::copy(TriangleListView::packed(reference),
+                      lists.begin() + (list.referenceWords() - field.exact.lists.data()));
+  }
+  return lists;
+}
+
 template <typename T>
 void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum format, const std::vector<T>& data) {
   if (data.empty()) return upload(buffer, texture, format, std::vector<T>(1));  // a buffer cannot be empty
@@ -160,7 +174,7 @@ void FieldUpload::uploadExact(const FieldData& field, GLint largest) {
   if (exact.empty()) return;
   checkFits(exact.lists.size(), std::min<std::size_t>(largest, std::size_t{1} << kOffsetBits), "runs of triangles");
   checkFits(3 * exact.triangles.size(), largest, "corners of triangles");
-  upload(exactListBuffer_, exactLists_, GL_R32UI, exact.lists);
+  upload(exactListBuffer_, exactLists_, GL_R32UI, uploadedLists(field));
   upload(exactCornerBuffer_, exactCorners_, GL_RGBA32F, cornerTexels(field));
 }
 

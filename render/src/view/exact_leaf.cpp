@@ -6,6 +6,7 @@
 #include <limits>
 #include <variant>
 
+#include "hpsdf/detail/exact_sign.h"
 #include "hpsdf/detail/triangle_list.h"
 
 namespace hpsdf::render {
@@ -86,6 +87,21 @@ Vector3 pseudonormal(const ExactTriangles& exact, std::uint64_t bits, const Near
   return sum.normalized();
 }
 
+/// Returns 1 or −1, the sign of an exact leaf at a point. `pseudonormalSign` is the one that the pseudonormal gives.
+int signFrom(const ExactTriangles& exact, std::uint64_t bits, const Vector3& x, int pseudonormalSign) {
+  switch (node::exactSign(bits)) {
+    case ExactSign::positive:
+      return 1;
+    case ExactSign::negative:
+      return -1;
+    case ExactSign::winding:
+      return windingAt(exact, bits, x) > 0 ? -1 : 1;
+    case ExactSign::pseudonormal:
+      break;
+  }
+  return pseudonormalSign;
+}
+
 }  // namespace
 
 std::array<Vector3, 3> cornersOf(const ExactTriangles& exact, std::uint32_t triangle) {
@@ -109,9 +125,10 @@ ValueAndGradient evaluateExactLeaf(const ExactTriangles& exact, std::uint64_t bi
   const NearestFeature nearest = nearestFeature(exact, bits, x);
   const Vector3 normal = pseudonormal(exact, bits, nearest), away = x - nearest.point;
   const bool outside = away.dot(normal) >= 0;
-  const ExactSign rule = node::exactSign(bits);
-  const bool positive = rule == ExactSign::pseudonormal ? outside : rule == ExactSign::positive;
+  const bool positive = signFrom(exact, bits, x, outside ? 1 : -1) > 0;
   const double value = positive ? nearest.distance : -nearest.distance;
+  if (nearest.count == 3 && node::exactSign(bits) == ExactSign::winding)
+    return {value - exact.offset, slopeByWinding(exact, bits, x, normal, away.dot(normal)) * normal};
   if (nearest.count == 3 || !(nearest.distance > 0))
     return {value - exact.offset, positive == outside ? normal : Vector3(-normal)};
   return {value - exact.offset, away / value};

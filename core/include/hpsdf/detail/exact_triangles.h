@@ -17,8 +17,9 @@ namespace hpsdf {
 /// A list is a part of `lists`, from the leaf's offset. It begins with the number of its triangles. Then come their
 /// octants, one byte for each triangle and four bytes in a word, lowest byte first. The octants of a triangle are those
 /// octants of the leaf, including the blend zone beyond its faces, in which the triangle can be nearest: bit x + 2y +
-/// 4z stands for the octant in the place of child number x + 2y + 4z. Last come the triangles as runs, up to the first
-/// run that is marked as the last one. A run is a sequence of triangles with successive indices.
+/// 4z stands for the octant in the place of child number x + 2y + 4z. Then come the triangles as runs, up to the first
+/// run that is marked as the last one. A run is a sequence of triangles with successive indices. If bit 31 of the
+/// number is set, four more words follow: a `WindingReference`.
 struct ExactTriangles {
   /// Vertices in world units: doubles, or floats where these suffice.
   std::variant<std::vector<Eigen::Vector3d>, std::vector<Eigen::Vector3f>> vertices;
@@ -48,6 +49,21 @@ enum class ExactSign : std::uint8_t {
   pseudonormal,  ///< by the angle-weighted pseudonormal of the nearest face, edge or vertex (Bærentzen & Aanæs 2005)
   positive,      ///< the distance is positive throughout the leaf
   negative,      ///< the distance is negative throughout the leaf
+  winding,       ///< by the winding number, which differs from that of a `WindingReference` by the triangles in between
+};
+
+/// A point of an exact leaf at which the winding number is known. At another point of the leaf, the winding number
+/// follows from the listed triangles that the segment between the two points crosses.
+struct WindingReference {
+  Eigen::Vector3f point = Eigen::Vector3f::Zero();  ///< world units
+  /// The winding number, plus 1 in a mesh that is oriented inward. A point is inside if the number is above 0 there.
+  std::int32_t winding = 0;
+};
+
+/// How the distance in an exact leaf gets its sign.
+struct LeafSign {
+  ExactSign rule = ExactSign::pseudonormal;
+  WindingReference reference = {};  ///< for `ExactSign::winding`
 };
 
 }  // namespace hpsdf

@@ -88,7 +88,7 @@ constexpr bool isExact(std::uint64_t n) { return isLeaf(n) && degree(n) == kExac
 constexpr ExactSign exactSign(std::uint64_t n) { return static_cast<ExactSign>(n >> 48 & 3); }
 constexpr bool hasOnlyKnownBits(std::uint64_t n) {
   if (!isLeaf(n)) return n <= 0xffffffff;
-  if (isExact(n)) return exactSign(n) <= ExactSign::negative && n == exactLeaf(exactSign(n), offset(n));
+  if (isExact(n)) return n == exactLeaf(exactSign(n), offset(n));
   return n == leaf(degree(n), offset(n));
 }
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }

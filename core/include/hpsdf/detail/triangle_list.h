@@ -1,6 +1,8 @@
 #pragma once
 // Access to the triangles of exact leaves.
 
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -14,7 +16,8 @@ class TriangleListView {
   TriangleListView(const ExactTriangles& exact, std::uint64_t leaf) : from_(&exact.lists[node::offset(leaf)]) {}
   explicit TriangleListView(const std::uint32_t* from) : from_(from) {}
 
-  std::uint32_t count() const { return *from_; }
+  std::uint32_t count() const { return *from_ & ~kReferenceBit; }
+  bool hasReference() const { return (*from_ & kReferenceBit) != 0; }
   /// Returns the octants of the triangle at place i of the list.
   std::uint8_t octants(std::uint32_t i) const { return static_cast<std::uint8_t>(from_[1 + i / 4] >> (8 * (i % 4))); }
   const std::uint32_t* runs() const { return from_ + runsAt(count()); }
@@ -30,6 +33,30 @@ class TriangleListView {
       if (triangle_run::isLast(*run)) return;
     }
   }
+
+  /// Returns the words of a reference, as they follow the runs of a list.
+  static std::array<std::uint32_t, 4> packed(const WindingReference& reference) {
+    const auto& point = reference.point;
+    return {std::bit_cast<std::uint32_t>(point.x()), std::bit_cast<std::uint32_t>(point.y()),
+            std::bit_cast<std::uint32_t>(point.z()), std::bit_cast<std::uint32_t>(reference.winding)};
+  }
+
+  /// Returns the words behind the runs.
+  const std::uint32_t* referenceWords() const {
+    const std::uint32_t* word = runs();
+    while (!triangle_run::isLast(*word)) ++word;
+    return word + 1;
+  }
+
+  /// Returns the reference of a list that has one.
+  WindingReference reference() const {
+    const std::uint32_t* words = referenceWords();
+    return {{std::bit_cast<float>(words[0]), std::bit_cast<float>(words[1]), std::bit_cast<float>(words[2])},
+            std::bit_cast<std::int32_t>(words[3])};
+  }
+
+  static constexpr std::uint32_t kReferenceBit = std::uint32_t{1} << 31;  ///< in the number of triangles
+  static constexpr std::size_t kReferenceWords = 4;
 
  private:
   const std::uint32_t* from_;

@@ -47,7 +47,7 @@ class TriangleSearch {
 
   /// Returns how the sign of the distance follows from the given triangles, which `nearestTo` found for the box.
   /// Returns std::nullopt if the sign cannot be found from them.
-  virtual std::optional<ExactSign> signIn(const Box& box, std::span<const std::uint32_t> triangles) const = 0;
+  virtual std::optional<LeafSign> signIn(const Box& box, std::span<const std::uint32_t> triangles) const = 0;
 };
 
 }  // namespace hpsdf

@@ -48,11 +48,10 @@ std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Bui
   if (options.strategy != Strategy::hpx || !hasTriangles) return std::nullopt;
   // Queries of exact leaves square lengths in single precision.
   constexpr double kShortest = 1e-16, kLongest = 1e18;
-  constexpr double kLeastEdge = 1.0 / 256;  // as a share of L
   const double length = referenceLength(distance.source(), domain);
   if (!(length > kShortest && length < kLongest)) return std::nullopt;
   return ExactCells(*distance.triangleSearch(), options.exactWithin * length,
-                    static_cast<std::size_t>(options.exactTriangles), options.blend, kLeastEdge * length);
+                    static_cast<std::size_t>(options.exactTriangles), options.blend);
 }
 
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.

@@ -114,7 +114,7 @@ enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kFi
 // do not change it; with a `CheckedReader` they read and check it.
 
 template <typename Stream>
-void finiteItem(Stream& stream, double& value) {
+void finiteItem(Stream& stream, auto& value) {
   stream.item(value);
   stream.require(std::isfinite(value), "a number is not finite");
 }
@@ -139,8 +139,12 @@ struct FitLimits {
 template <typename Stream>
 void exactItems(Stream& stream, Fit& fit, std::size_t triangles) {
   fit.degree = kExactDegree;
-  stream.item(fit.sign);
-  stream.require(fit.sign <= ExactSign::negative, "a cell's sign is unknown");
+  stream.item(fit.sign.rule);
+  stream.require(fit.sign.rule <= ExactSign::winding, "a cell's sign is unknown");
+  if (fit.sign.rule == ExactSign::winding) {
+    for (float& coordinate : fit.sign.reference.point) finiteItem(stream, coordinate);
+    stream.item(fit.sign.reference.winding);
+  }
   finiteItem(stream, fit.error.volume);
   auto& [listed, octants] = fit.list;
   stream.list(listed);

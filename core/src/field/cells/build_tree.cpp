@@ -77,7 +77,7 @@ ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, Coeffic
   if (!packer) return size;
   for (const BuildNode& node : tree.nodes) {
     if (node.firstChild != 0 || !node.fit.isExact()) continue;
-    packer->pack(node.fit.list);
+    packer->pack(node.fit.list, node.fit.sign);
     size.inTree += bytesOf(node.fit.list);
   }
   const ExactTriangles exact = packer->finish();
@@ -112,7 +112,7 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch*
       stack.pop_back();
       BuildNode& node = tree.nodes[pair.from];
       if (node.firstChild == 0 && node.fit.isExact()) {
-        data.nodes[pair.to] = node::exactLeaf(node.fit.sign, packer->pack(node.fit.list));
+        data.nodes[pair.to] = node::exactLeaf(node.fit.sign.rule, packer->pack(node.fit.list, node.fit.sign));
         node.fit = Fit{};
         continue;
       }

@@ -41,7 +41,7 @@ struct Fit {
   /// For an exact leaf, whose degree is `kExactDegree`: its triangles, as `TriangleSearch::nearestTo` returns them, and
   /// the way in which their distance gets its sign.
   TriangleList list = {};
-  ExactSign sign = ExactSign::pseudonormal;
+  LeafSign sign = {};
 
   bool isExact() const { return degree == kExactDegree; }
 };

@@ -108,9 +108,9 @@ bool ExactBounds::isComplete(const query::OctreeNode& leaf, const Box& around) c
 
 /// Beyond the box, the list may lack the nearest triangles. Let y be the point of the box that is closest to x, at the
 /// distance r. If the sign is the same throughout the leaf, the field of the leaf is 1-Lipschitz like Φ, and at y the
-/// two differ only by `error`. Hence they differ by at most 2r more at x. If the sign comes from pseudonormals of
-/// triangles that lack neighbours, it may be wrong. A wrong sign adds twice the distance, which is at most the distance
-/// at the centre of the leaf plus the distance to the centre.
+/// two differ only by `error`. Hence they differ by at most 2r more at x. If the sign comes from triangles that lack
+/// neighbours, it may be wrong. A wrong sign adds twice the distance, which is at most the distance at the centre of
+/// the leaf plus the distance to the centre.
 double ExactBounds::errorAround(const query::OctreeNode& leaf) const {
   const std::uint64_t bits = field_.nodes[leaf.node];
   const Box box = query::cellBox(frame_, leaf.depth, leaf.cellIndex);
@@ -118,7 +118,8 @@ double ExactBounds::errorAround(const query::OctreeNode& leaf) const {
   const double rounding = error(leaf);
   if (isComplete(leaf, around)) return rounding;
   const double beyond = 2 * field_.blend * box.sizes().norm();
-  if (node::exactSign(bits) != ExactSign::pseudonormal) return rounding + beyond;
+  const ExactSign rule = node::exactSign(bits);
+  if (rule == ExactSign::positive || rule == ExactSign::negative) return rounding + beyond;
   double atCentre = 0;
   const Vector3 centre = box.center();
   query::evaluateExact(field_.exact, bits, 0, {&centre, 1}, &atCentre);

@@ -59,9 +59,9 @@ Fit planeFit(const Box& cell, const CommonPlane& plane) {
 /// Returns the fit of a cell with these triangles, which were found for `box`; or std::nullopt if they do not determine
 /// the sign.
 std::optional<Fit> ExactCells::fitFrom(const Box& cell, const Box& box, TriangleList list) const {
-  const std::optional<ExactSign> sign = search_.signIn(box, list.triangles);
+  const std::optional<LeafSign> sign = search_.signIn(box, list.triangles);
   if (!sign) return std::nullopt;
-  const auto plane = *sign == ExactSign::pseudonormal ? commonPlane(search_, list.triangles) : std::nullopt;
+  const auto plane = sign->rule == ExactSign::pseudonormal ? commonPlane(search_, list.triangles) : std::nullopt;
   Fit fit;
   if (plane) {
     fit = planeFit(cell, *plane);
@@ -77,15 +77,11 @@ std::optional<Fit> ExactCells::fitFrom(const Box& cell, const Box& box, Triangle
 
 ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) const {
   constexpr std::size_t kLonger = 64;
-  // Lists without a sign contain triangles that intersect others. Cells with so short lists are not divided further.
-  constexpr std::size_t kFew = 8;
   const Box box = boxOfWeight(cell, blend_);
   auto list = search_.nearestTo(box, isDivisible ? most_ : kLonger * most_);
   if (!list) return {{}, isDivisible};
-  const bool isLong = list->triangles.size() > kFew;
   std::optional<Fit> fit = fitFrom(cell, box, std::move(*list));
-  if (!fit) return {{}, isDivisible && isLong && cell.sizes().maxCoeff() > leastEdge_};
-  fit->error.near = true;
+  if (fit) fit->error.near = true;
   return {std::move(fit), false};
 }
 

@@ -19,11 +19,9 @@ class ExactCells {
  public:
   /// Keeps a reference to the search. `within` is the distance from the surface up to which the field is exact, `most`
   /// the greatest number of triangles of a leaf that could be divided further. `blend` is the width of the field's
-  /// blend zones in edges of a leaf; a leaf is exact in its blend zones too. Cells whose triangles do not determine the
-  /// sign, because these intersect each other or lie upon each other, are divided as long as their edges exceed
-  /// `leastEdge`.
-  ExactCells(const TriangleSearch& search, double within, std::size_t most, double blend, double leastEdge)
-      : search_(search), within_(within), most_(most), blend_(blend), leastEdge_(leastEdge) {}
+  /// blend zones in edges of a leaf; a leaf is exact in its blend zones too.
+  ExactCells(const TriangleSearch& search, double within, std::size_t most, double blend)
+      : search_(search), within_(within), most_(most), blend_(blend) {}
 
   /// Returns true if a point of the cell may be so close to the surface that the field must be exact there.
   bool mustBeExact(const Box& cell) const { return search_.comesWithin(cell, within_); }
@@ -62,7 +60,6 @@ class ExactCells {
   double within_;
   std::size_t most_;
   double blend_;
-  double leastEdge_;
 };
 
 /// Tries to make a polynomial that stands for the triangles of a cell.

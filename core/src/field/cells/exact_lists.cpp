@@ -32,9 +32,15 @@ std::vector<std::uint32_t> ExactListPacker::packed(const TriangleList& list) con
   return words;
 }
 
-std::uint32_t ExactListPacker::pack(const TriangleList& list) {
+std::uint32_t ExactListPacker::pack(const TriangleList& list, const LeafSign& sign) {
   if (!isNumbered_) number();
-  const auto [entry, isNew] = offsets_.try_emplace(packed(list), static_cast<std::uint32_t>(lists_.size()));
+  std::vector<std::uint32_t> words = packed(list);
+  if (sign.rule == ExactSign::winding) {
+    words[0] |= TriangleListView::kReferenceBit;
+    const auto reference = TriangleListView::packed(sign.reference);
+    words.insert(words.end(), reference.begin(), reference.end());
+  }
+  const auto [entry, isNew] = offsets_.try_emplace(std::move(words), static_cast<std::uint32_t>(lists_.size()));
   if (isNew) lists_.insert(lists_.end(), entry->first.begin(), entry->first.end());
   return entry->second;
 }

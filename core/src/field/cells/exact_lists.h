@@ -19,8 +19,8 @@ class ExactListPacker {
 
   /// Marks triangles as used. All lists must be marked before the first one is packed.
   void mark(const TriangleList& list);
-  /// Packs a list and returns its offset.
-  std::uint32_t pack(const TriangleList& list);
+  /// Packs a list, with the reference for its sign if there is one, and returns its offset.
+  std::uint32_t pack(const TriangleList& list, const LeafSign& sign);
   /// Returns the packed lists with the triangles and vertices to which they refer. The vertices are doubles.
   ExactTriangles finish();
 

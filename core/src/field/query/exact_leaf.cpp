@@ -11,6 +11,7 @@
 #include <utility>
 #include <variant>
 
+#include "hpsdf/detail/exact_sign.h"
 #include "hpsdf/detail/triangle_list.h"
 #include "mesh/triangle_bounds.h"
 
@@ -227,7 +228,23 @@ class OctantTriangles {
     return sum;
   }
 
-  ExactSign sign() const { return node::exactSign(leaf_); }
+  /// Returns 1 if the signed distance grows at a point along the normal of its nearest face, and -1 if it falls. `sign`
+  /// is that of `signAt`.
+  double slopeAcross(const NearestFeature& face, const Vector3& x, ExactSign sign) const {
+    if (sign == ExactSign::pseudonormal) return 1;
+    if (node::exactSign(leaf_) == ExactSign::winding) [[unlikely]]
+      return slopeByWinding(exact_, leaf_, x, face.normal.normalized(), face.height);
+    return (face.height < 0) == (sign == ExactSign::negative) ? 1 : -1;
+  }
+
+  /// Returns how the distance gets its sign at a point: by the pseudonormal, or positive or negative.
+  ExactSign signAt(const Vector3& x) const {
+    const ExactSign rule = node::exactSign(leaf_);
+    if (rule != ExactSign::winding) [[likely]]
+      return rule;
+    return windingAt(exact_, leaf_, x) > 0 ? ExactSign::negative : ExactSign::positive;
+  }
+
   double offset() const { return exact_.offset; }
 
  private:
@@ -278,16 +295,11 @@ class OctantTriangles {
   int octant_;
 };
 
-/// Returns 1 if the signed distance grows along the normal of the nearest face, and -1 if it falls.
-double slopeAcross(const NearestFeature& face, ExactSign sign) {
-  if (sign == ExactSign::pseudonormal) return 1;
-  return (face.height < 0) == (sign == ExactSign::negative) ? 1 : -1;
-}
-
-/// Returns the signed distance, with its gradient, of a point whose nearest feature is given.
+/// Returns the signed distance, with its gradient, of a point x whose nearest feature is given.
 template <typename V>
-ValueAndGradient signedDistance(const OctantTriangles<V>& triangles, const NearestFeature& nearest, bool withGradient) {
-  const ExactSign sign = triangles.sign();
+ValueAndGradient signedDistance(const OctantTriangles<V>& triangles, const Vector3& x, const NearestFeature& nearest,
+                                bool withGradient) {
+  const ExactSign sign = triangles.signAt(x);
   const double distance = std::sqrt(nearest.squared);
   ValueAndGradient result{distance, Vector3::Zero()};
   const bool needsNormal = sign == ExactSign::pseudonormal || (withGradient && !(distance > 0));
@@ -302,7 +314,7 @@ ValueAndGradient signedDistance(const OctantTriangles<V>& triangles, const Neare
   }
   if (withGradient) {
     if (nearest.corners == 3)
-      result.gradient = nearest.normal.normalized() * slopeAcross(nearest, sign);
+      result.gradient = nearest.normal.normalized() * triangles.slopeAcross(nearest, x, sign);
     else
       result.gradient = distance > 0 ? Vector3(nearest.difference / result.value) : Vector3(normal.normalized());
   }
@@ -318,9 +330,9 @@ void evaluateAll(const ExactTriangles& exact, std::uint64_t leaf, int octant, st
         const OctantTriangles triangles(exact, vertices, leaf, octant);
         triangles.forEachNearest(points, [&](std::size_t i, const NearestFeature& nearest) {
           if constexpr (std::is_same_v<Result, double>)
-            out[i] = signedDistance(triangles, nearest, false).value;
+            out[i] = signedDistance(triangles, points[i], nearest, false).value;
           else
-            out[i] = signedDistance(triangles, nearest, true);
+            out[i] = signedDistance(triangles, points[i], nearest, true);
         });
       },
       exact.vertices);

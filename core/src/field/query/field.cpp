@@ -58,10 +58,13 @@ std::vector<std::uint32_t> checkLists(const ExactTriangles& exact) {
       listed += triangle_run::length(run);
       isLast = triangle_run::isLast(run);
     }
-    if (!isLast || listed != list.count()) notAField("a list of triangles has a wrong length");
+    if (list.hasReference()) at += TriangleListView::kReferenceWords;
+    if (!isLast || listed != list.count() || at > words.size()) notAField("a list of triangles has a wrong length");
     std::uint8_t octants = 0;
     for (std::uint32_t i = 0; i < list.count(); ++i) octants |= list.octants(i);
     if (octants != 0xff) notAField("a list has no triangle for an octant");
+    if (list.hasReference() && !list.reference().point.allFinite())
+      notAField("the reference point of a list of triangles is not finite");
   }
   return starts;
 }
@@ -80,6 +83,9 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
     if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
     if (node::isExact(nodes[n])) {
       if (!std::ranges::binary_search(lists, node::offset(nodes[n]))) notAField("a cell has no list of triangles");
+      const bool hasReference = TriangleListView(data.exact, nodes[n]).hasReference();
+      if (hasReference != (node::exactSign(nodes[n]) == ExactSign::winding))
+        notAField("a cell's list of triangles does not fit its sign");
       continue;
     }
     if (node::isLeaf(nodes[n])) {
