@@ -1,5 +1,8 @@
 // Tests the choice between polynomials and exact leaves for meshes.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <string_view>
 
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
@@ -53,6 +56,43 @@ TEST(AutomaticStrategy, isNotMisledByTrianglesWithoutAreaOrTurnedOver) {
     sphere.triangles.push_back({a, b, b});
   }
   EXPECT_EQ(chosenFor(sphere, {.insideTest = InsideTest::shell, .thickness = 0.1}), Strategy::hp);
+}
+
+/// A gear whose long, thin triangles meet at the bore: a ball touches the more of them, the closer it is to the bore.
+TriangleMesh fineGear() { return shapes::mesh("gear,teeth=100,segments=34"); }
+
+TEST(AutomaticStrategy, isHpWhereThinTrianglesWouldTakeTooManyExactLeaves) {
+  const TriangleMesh gear = fineGear();
+  const ExactDistance distance(gear);
+  const Field field =
+      build(distance, domainAround(gear), {.targetError = 1e-2, .memoryLimit = distance.bytes() + 100'000'000});
+  EXPECT_EQ(field.metadata().settings.strategy, Strategy::hp);
+  EXPECT_LT(field.data().nodes.size(), 10'000u);
+}
+
+TEST(AutomaticStrategy, isHpxForFineMeshesWhoseExactLeavesAreFew) {
+  EXPECT_EQ(chosenFor(shapes::mesh("gear,segments=24")), Strategy::hpx);
+}
+
+TEST(AutomaticStrategy, refusesExactLeavesBeforeTheyFillTheMemory) {
+  const TriangleMesh gear = fineGear();
+  const ExactDistance distance(gear);
+  int reports = 0;
+  const Progress progress{.report = [&](std::string_view, double) { ++reports; },
+                          .cancelled = [&] { return reports > 50; }};
+  const BuildOptions exact{.strategy = Strategy::hpx, .memoryLimit = distance.bytes() + 100'000'000};
+  EXPECT_THAT([&] { build(distance, domainAround(gear), exact, progress); },
+              testing::ThrowsMessage<Error>(testing::AllOf(testing::HasSubstr("exact cells near the surface need more"),
+                                                           testing::HasSubstr("take strategy hp"))));
+  EXPECT_LE(reports, 50) << "a thousand cells a report: all would be hundreds of thousands";
+}
+
+TEST(AutomaticStrategy, doesNotDependOnTheNumberOfThreads) {
+  const TriangleMesh gear = shapes::mesh("gear,teeth=24,segments=24");
+  const ExactDistance distance(gear);
+  const Strategy one =
+      build(distance, domainAround(gear), {.targetError = 1e-2, .threads = 1}).metadata().settings.strategy;
+  EXPECT_EQ(build(distance, domainAround(gear), {.targetError = 1e-2, .threads = 4}).metadata().settings.strategy, one);
 }
 
 }  // namespace automatic_strategy_test

@@ -322,6 +322,17 @@ TEST(Build, saysEarlyThatMemoryWillNotDo) {
   EXPECT_THROW(build(counted, cube(), options), Error) << "not even the base grid";
 }
 
+TEST(Build, saysEarlyThatNoiseTakesTooMuchMemory) {
+  std::atomic<std::uint64_t> taken = 0;
+  const auto counted = [&](const Vector3& x) {
+    ++taken;
+    return (x - (x / 0.7).array().round().matrix() * 0.7).norm();  // from the points of a lattice: kinks all over
+  };
+  const BuildOptions options{.targetError = 1e-6, .memoryLimit = 1'500'000};
+  EXPECT_THROW(build(counted, cube(), options), Error);
+  EXPECT_LT(taken.load(), 1'000'000u) << "the power law of the error tells it; its lower bound takes millions";
+}
+
 TEST(Build, limitsHold) {
   const Field shallow = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 6, .maxDepth = 1});
   const FieldStatistics s = statistics(shallow);

@@ -165,6 +165,29 @@ bool areNear(const Corners& one, const Corners& other, int shared, double margin
   return isNear(one, unshared(other), margin) || isNear(other, unshared(one), margin);
 }
 
+/// Returns true if a line along an edge of the triangle t, in its plane, has the other triangle on its outer side,
+/// farther from t than the margin.
+bool liesBeyondEdge(const Corners& t, const Corners& other, double margin) {
+  // A bound of the rounding errors of the products below, for unit axes and coordinates of magnitudes of about 1.
+  constexpr double kRounding = 1e-13;
+  const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 outward = (t[(k + 1) % 3] - t[k]).cross(normal);
+    const auto height = [&](const Vector3& x) { return outward.dot(x - t[k]); };
+    const double inner = std::max({height(t[0]), height(t[1]), height(t[2])});
+    const double outer = std::min({height(other[0]), height(other[1]), height(other[2])});
+    if (outer - inner > (margin + kRounding) * outward.norm()) return true;
+  }
+  return false;
+}
+
+/// Returns true only if an axis certainly separates two triangles by more than the margin. The axes are normal to the
+/// edges, in the planes of the triangles: they separate the long, thin triangles of a flat face, whose boxes nearly all
+/// overlap, before the exact predicates are asked, which are slowest for points in one plane.
+bool areSeparated(const Corners& one, const Corners& other, double margin) {
+  return liesBeyondEdge(one, other, margin) || liesBeyondEdge(other, one, margin);
+}
+
 /// Finds pairs of intersecting triangles by a tree of axis-aligned bounding boxes. Each box contains up to four
 /// boxes of the next lower level; the lowest boxes bound the triangles in the order of the hierarchy.
 class Finder {
@@ -256,6 +279,7 @@ class Finder {
     Indices one = hierarchy_.triangles()[slot], other = hierarchy_.triangles()[otherSlot];
     const int shared = moveSharedToFront(one, other);
     const Corners first = cornersOf(one), second = cornersOf(other);
+    if (shared == 0 && areSeparated(first, second, margin_)) return false;
     if (isDegenerate(second)) return false;
     return intersectBeyondShared(first, second, shared) || (margin_ > 0 && areNear(first, second, shared, margin_));
   }

@@ -35,14 +35,6 @@ double nearDistance(const BuildOptions& options, double referenceLength) {
   return asked > 0 ? asked : 0.01 * referenceLength;
 }
 
-/// Returns the settings with the strategy that takes effect.
-BuildOptions settled(BuildOptions options, const DistanceFunction& distance, const Box& domain) {
-  if (options.strategy == Strategy::automatic)
-    options.strategy =
-        automaticStrategy(distance.triangleSearch(), options, referenceLength(distance.source(), domain));
-  return options;
-}
-
 std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, const Box& domain) {
   const bool hasTriangles = distance.triangleSearch() != nullptr && distance.triangleSearch()->hasSigns();
   if (options.strategy != Strategy::hpx || !hasTriangles) return std::nullopt;
@@ -52,6 +44,34 @@ std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Bui
   if (!(length > kShortest && length < kLongest)) return std::nullopt;
   return ExactCells(*distance.triangleSearch(), options.exactWithin * length,
                     static_cast<std::size_t>(options.exactTriangles), options.blend);
+}
+
+/// Estimates the octree of the exact leaves, as far as it has no more than `mostNodes` nodes.
+ExactEstimate exactEstimate(const DistanceFunction& distance, const BuildOptions& options, const Box& domain,
+                            double mostNodes, const Progress& progress) {
+  const std::optional<ExactCells> cells = exactCells(distance, options, domain);
+  if (!cells) return {};
+  BuildTree baseCells{.domain = domain, .grid = options.grid, .nodes = {}};
+  baseCells.addBaseCells();
+  return estimateExactLeaves(std::move(baseCells), *cells, options.maxDepth, mostNodes, progress);
+}
+
+/// Returns the settings with the strategy that takes effect. Throws `Error` if exact leaves were asked for and would
+/// not fit into memory, long before they would fill it.
+BuildOptions settled(BuildOptions options, const DistanceFunction& distance, const Box& domain,
+                     const Progress& progress) {
+  const bool isFree = options.strategy == Strategy::automatic;
+  if (isFree)
+    options.strategy =
+        automaticStrategy(distance.triangleSearch(), options, referenceLength(distance.source(), domain));
+  if (options.strategy != Strategy::hpx) return options;
+  if (isFree) {
+    const ExactEstimate estimate = exactEstimate(distance, options, domain, kMostNodesOfAutomatic, progress);
+    if (estimate.nodes > kMostNodesOfAutomatic) options.strategy = Strategy::hp;
+  } else if (options.exactTolerance == 0) {  // polynomials in place of lists would be unknown to the estimate
+    requireMemoryForExact(exactEstimate(distance, options, domain, mostNodes(options), progress), options);
+  }
+  return options;
 }
 
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.
@@ -196,7 +216,7 @@ Field build(const DistanceFunction& distance, const Box& domain, const BuildOpti
             const Progress& progress) {
   checkOptions(domain, options);
   return Field(withThreads(options.threads, [&] {
-    const BuildOptions settings = settled(options, distance, domain);
+    const BuildOptions settings = settled(options, distance, domain, progress);
     Construction construction(distance, domain, settings, progress);
     construction.grow();
     return construction.finish();
@@ -207,7 +227,7 @@ Field buildResumably(const DistanceFunction& distance, const Box& domain, const 
                      const Checkpoint& checkpoint, const Progress& progress) {
   checkOptions(domain, options);
   return Field(withThreads(options.threads, [&] {
-    const BuildOptions settings = settled(options, distance, domain);
+    const BuildOptions settings = settled(options, distance, domain, progress);
     CheckpointFile file(checkpoint, distance, domain, settings);
     Construction construction(distance, domain, settings, progress);
     if (construction.resume(file) && checkpoint.resumed) checkpoint.resumed(construction.steps());
@@ -221,9 +241,10 @@ void buildStages(const DistanceFunction& distance, const Box& domain, const Buil
                  const Progress& progress) {
   if (!std::ranges::is_sorted(steps)) throw Error("stages of a construction: expected steps that do not descend");
   if (steps.empty()) return;
-  BuildOptions limited = settled(options, distance, domain);
+  BuildOptions limited = options;
   limited.maxSteps = std::min(options.maxSteps.value_or(steps.back()), steps.back());
   checkOptions(domain, limited);
+  limited.strategy = settled(options, distance, domain, progress).strategy;
   withThreads(options.threads, [&] {
     Construction construction(distance, domain, limited, progress);
     std::size_t stage = 0;

@@ -47,6 +47,16 @@ class GrowthProgress {
     return 1 + std::log(error / target) * std::log(work / past.work) / std::log(past.error / error);
   }
 
+  /// Returns the final work divided by the present work if the error goes on to fall by a power law of the work, as it
+  /// did in its last tenfold decrease. Returns 1 until there was such a decrease. No more than three further decades
+  /// are extrapolated, because the error of smooth shapes falls ever faster.
+  double likelyFactor(double work, double error, double target) const {
+    if (history_.empty() || !(history_.front().error > 10 * error) || !(error > target)) return 1;
+    const Sample& past = latestAbove(10, error);
+    if (!(work > past.work)) return 1;
+    return std::pow(std::min(error / target, 1e3), std::log(work / past.work) / std::log(past.error / error));
+  }
+
  private:
   struct Sample {
     double work, error;
@@ -189,7 +199,7 @@ class Growth {
 
   void refineRound() {
     setup_.progress.update("refining", fractionDone());
-    refiner_.requireMemory(leastGrowthFactor());
+    refiner_.requireMemory(growthFactor(&GrowthProgress::leastFactor), growthFactor(&GrowthProgress::likelyFactor));
     const std::vector<std::uint32_t> worst = worstLeaves();
     std::vector<Trial> trials = tryAll(worst);
     for (std::size_t w = 0; w < worst.size(); ++w) {
@@ -267,11 +277,12 @@ class Growth {
     if (node.fit.error.weighted > 0 && refiner_.allowed(node)) queue_.push({node.fit.error.weighted, leaf});
   }
 
-  double leastGrowthFactor() const {
+  /// Returns one of the factors of `GrowthProgress`, or 1 if the construction does not end at a weighted error.
+  double growthFactor(double (GrowthProgress::*factor)(double, double, double) const) const {
     const ErrorGoal& goal = setup_.growthGoal;
     const bool endsOtherwise = goal.byDistance() || setup_.options.maxSteps || setup_.options.maxBytes;
     if (endsOtherwise || !(goal.weighted > 0)) return 1;
-    return progress_.leastFactor(double(fitter_.evaluations()), state_.totals.weighted, goal.weighted);
+    return (progress_.*factor)(double(fitter_.evaluations()), state_.totals.weighted, goal.weighted);
   }
 
   double fractionDone() {

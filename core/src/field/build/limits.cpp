@@ -32,6 +32,8 @@ std::string cellsText(double cells) {
 constexpr double kBytesPerNode = 250;
 constexpr double kBytesPerCoefficient = 8;
 
+constexpr double kTolerance = 1.5;  // estimates of the final memory may exceed the allowed memory by this factor
+
 /// Converts the target error τ, which refers to a mesh of size 2, to a mesh of size `referenceLength`.
 double scaledTarget(double weighted, double referenceLength) {
   if (weighted == 0) return 0;
@@ -142,17 +144,32 @@ std::size_t ByteBudget::finalCoefficients(const Fit& fit) const {
 }
 
 void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
-  constexpr double kTolerance = 1.5;  // the extrapolated memory may exceed the allowed memory by this factor
+  // The likely memory is off by a factor of 3 at times. It serves to refuse a construction that chases noise soon after
+  // its start; the lower bound passes the allowed memory only when most of the time is spent.
+  constexpr double kLikelyTolerance = 5;
   const double fixed = double(need.fixedBytes), most = allowedMemory(options);
   if (fixed > most)
     refuse("the distance that the field is made from holds ", bytesText(fixed), " of memory, more than the ",
            bytesText(most), " allowed: simplify the mesh, or allow more memory");
   const double bytes = kBytesPerNode * double(need.nodes) + kBytesPerCoefficient * double(need.coefficients);
-  const double finally = fixed + bytes * need.growthFactor;
+  const bool isLikelyTooMuch = fixed + bytes * need.likelyFactor > kLikelyTolerance * most;
+  const double factor = isLikelyTooMuch ? std::max(need.likelyFactor, need.growthFactor) : need.growthFactor;
+  const double finally = fixed + bytes * factor;
   if (fixed + bytes <= most && finally <= kTolerance * most) return;
-  refuse("about ", cellsText(double(need.nodes) * need.growthFactor), " and ", bytesText(finally),
+  refuse("about ", cellsText(double(need.nodes) * factor), " and ", bytesText(finally),
          " of memory are needed, more than the ", bytesText(most),
          " allowed: take a larger target error or a lower maximum depth, or allow more memory");
+}
+
+double mostNodes(const BuildOptions& options) { return kTolerance * allowedMemory(options) / kBytesPerNode; }
+
+void requireMemoryForExact(const ExactEstimate& estimate, const BuildOptions& options) {
+  // Lists are in memory twice when the arrays of the field are made.
+  const double bytes = kBytesPerNode * estimate.nodes + 2 * estimate.listBytes, most = allowedMemory(options);
+  if (bytes <= kTolerance * most) return;
+  refuse("the exact cells near the surface need more than the ", bytesText(most),
+         " of memory allowed: take strategy hp, more exact-triangles a cell, a smaller exact-within or a lower maximum "
+         "depth, or allow more memory");
 }
 
 double referenceLength(const Source& source, const Box& domain) {

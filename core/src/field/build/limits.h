@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "field/cells/cell_fit.h"
+#include "field/cells/exact_leaves.h"
 #include "field/nearness.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/distance_function.h"
@@ -33,11 +34,18 @@ ErrorGoal errorGoal(const BuildOptions& options, double referenceLength);
 struct MemoryNeed {
   std::size_t nodes = 0, coefficients = 0;
   double growthFactor = 1;     ///< lower bound of the octree's final size divided by its present size
+  double likelyFactor = 1;     ///< the same, as a likely value
   std::size_t fixedBytes = 0;  ///< bytes besides the octree
 };
 
 /// Throws `Error` if the construction exceeds the allowed memory now, or will exceed it at the end.
 void requireMemory(const MemoryNeed& need, const BuildOptions& options);
+
+/// Returns the number of nodes of an octree that certainly exceeds the allowed memory.
+double mostNodes(const BuildOptions& options);
+
+/// Throws `Error` if the exact leaves will exceed the allowed memory.
+void requireMemoryForExact(const ExactEstimate& estimate, const BuildOptions& options);
 
 /// Computes the bytes of the finished field from its numbers of nodes and coefficients. The lookup grid and the
 /// triangles of exact leaves do not count.

@@ -131,7 +131,7 @@ void Refiner::sumTotals() {
   state.lastSum = state.totals.weighted;
 }
 
-void Refiner::requireMemory(double factor) const {
+void Refiner::requireMemory(double leastFactor, double likelyFactor) const {
   // Estimate the memory. If pruning follows, the projections and the internal nodes that are kept for it need
   // about three times as much memory as the coefficients of the leaves.
   // Exact leaves are in memory twice when the arrays of the field are made. Their bytes count as coefficients.
@@ -140,7 +140,8 @@ void Refiner::requireMemory(double factor) const {
   detail::requireMemory({.nodes = state.tree.nodes.size(),
                          .coefficients = (keepsAll ? 4 * state.coefficients : state.coefficients) +
                                          static_cast<std::size_t>(exactBytes / sizeof(double)),
-                         .growthFactor = factor,
+                         .growthFactor = leastFactor,
+                         .likelyFactor = likelyFactor,
                          .fixedBytes = setup.distance.bytes()},
                         setup.options);
 }

@@ -90,8 +90,9 @@ struct Refiner {
   double bytes() const {
     return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)) + state.exactSize.inField;
   }
-  /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by `factor`.
-  void requireMemory(double factor = 1) const;
+  /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by `leastFactor` at
+  /// least and probably by `likelyFactor`.
+  void requireMemory(double leastFactor = 1, double likelyFactor = 1) const;
 };
 
 /// Decides between a higher degree and a split (paper, eqs. 7 to 9), with errors weighted by nearness to the

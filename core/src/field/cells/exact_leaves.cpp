@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <random>
 #include <span>
 #include <utility>
 
@@ -132,24 +133,76 @@ std::vector<std::uint32_t> splitChosen(BuildTree& tree, std::span<const std::uin
   return children;
 }
 
+/// Decides what becomes of cells of one depth, and fits those that stay whole.
+std::vector<Choice> chooseForCells(BuildTree& tree, std::span<const std::uint32_t> level, const ExactCells& cells,
+                                   const SmoothFit& smoothFit, bool isDivisible, const Progress& progress) {
+  constexpr std::size_t kChunk = 1024;
+  std::vector<Choice> choices(level.size());
+  for (std::size_t begin = 0; begin < level.size(); begin += kChunk) {
+    progress.update("finding exact cells", double(begin) / double(level.size()));
+    tbb::parallel_for(begin, std::min(begin + kChunk, level.size()), [&](std::size_t i) {
+      BuildNode& node = tree.nodes[level[i]];
+      choices[i] = chooseForCell(node, tree.boxOf(node), cells, smoothFit, isDivisible);
+    });
+  }
+  return choices;
+}
+
+/// Keeps a stratified random sample of the cells to be split, and leaves the others. Returns how many cells each one of
+/// the sample stands for.
+double sampleSplits(std::vector<Choice>& choices, std::mt19937& random) {
+  constexpr std::size_t kStrata = 64;  // enough for numbers of leaves that are right within some 20 %
+  std::vector<std::size_t> splits;
+  for (std::size_t i = 0; i < choices.size(); ++i)
+    if (choices[i] == Choice::split) splits.push_back(i);
+  if (splits.size() <= kStrata) return 1;
+  for (const std::size_t i : splits) choices[i] = Choice::leave;
+  for (std::size_t stratum = 0; stratum < kStrata; ++stratum) {
+    const std::size_t begin = splits.size() * stratum / kStrata, end = splits.size() * (stratum + 1) / kStrata;
+    choices[splits[begin + random() % (end - begin)]] = Choice::split;
+  }
+  return double(splits.size()) / kStrata;
+}
+
+/// Returns the bytes of the lists of these nodes, and removes their fits.
+double takeLists(BuildTree& tree, std::span<const std::uint32_t> level) {
+  double bytes = 0;
+  for (const std::uint32_t node : level) {
+    bytes += bytesOf(tree.nodes[node].fit.list);
+    tree.nodes[node].fit = {};
+  }
+  return bytes;
+}
+
 }  // namespace
 
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
                       const Progress& progress) {
-  constexpr std::size_t kChunk = 1024;
   std::vector<std::uint32_t> level(tree.nodes.size());
   std::iota(level.begin(), level.end(), 0U);
   for (int depth = 0; !level.empty(); ++depth) {
-    std::vector<Choice> choices(level.size());
-    for (std::size_t begin = 0; begin < level.size(); begin += kChunk) {
-      progress.update("finding exact cells", double(begin) / double(level.size()));
-      tbb::parallel_for(begin, std::min(begin + kChunk, level.size()), [&](std::size_t i) {
-        BuildNode& node = tree.nodes[level[i]];
-        choices[i] = chooseForCell(node, tree.boxOf(node), cells, smoothFit, depth < maxDepth);
-      });
-    }
+    const auto choices = chooseForCells(tree, level, cells, smoothFit, depth < maxDepth, progress);
     level = splitChosen(tree, level, choices);
   }
+}
+
+ExactEstimate estimateExactLeaves(BuildTree&& baseCells, const ExactCells& cells, int maxDepth, double mostNodes,
+                                  const Progress& progress) {
+  const SmoothFit none = [](const Box&) { return std::nullopt; };
+  BuildTree sample = std::move(baseCells);
+  std::vector<std::uint32_t> level(sample.nodes.size());
+  std::iota(level.begin(), level.end(), 0U);
+  ExactEstimate estimate{.nodes = double(level.size()), .listBytes = 0};
+  std::mt19937 random;  // always with the same seed: the estimate is the same for any number of threads
+  double each = 1;      // number of cells that each cell of the sample stands for
+  for (int depth = 0; !level.empty() && estimate.nodes <= mostNodes; ++depth) {
+    auto choices = chooseForCells(sample, level, cells, none, depth < maxDepth, progress);
+    estimate.listBytes += each * takeLists(sample, level);
+    each *= sampleSplits(choices, random);
+    level = splitChosen(sample, level, choices);
+    estimate.nodes += each * double(level.size());
+  }
+  return estimate;
 }
 
 }  // namespace hpsdf::detail

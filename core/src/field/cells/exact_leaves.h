@@ -71,4 +71,17 @@ using SmoothFit = std::function<std::optional<Fit>(const Box& cell)>;
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
                       const Progress& progress);
 
+/// The estimated size of the octree that `placeExactLeaves` makes.
+struct ExactEstimate {
+  double nodes = 0;
+  double listBytes = 0;  ///< memory of the lists of exact leaves during the construction
+};
+
+/// Estimates what `placeExactLeaves` makes without a `smoothFit` from a tree of base cells, by Knuth's method for the
+/// size of a search tree: of the cells of each depth that would be split, only a stratified random sample is split. The
+/// time hardly depends on the size of the octree. Ends as soon as there are more than `mostNodes` nodes; the estimate
+/// is then that of the levels so far. The result does not depend on the number of threads.
+ExactEstimate estimateExactLeaves(BuildTree&& baseCells, const ExactCells& cells, int maxDepth, double mostNodes,
+                                  const Progress& progress);
+
 }  // namespace hpsdf::detail
