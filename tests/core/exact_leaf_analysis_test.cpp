@@ -35,6 +35,7 @@ BuildOptions hpx(double target = 1e-4) {
           .grid = {3, 3, 3},
           .maxDegree = 4,
           .strategy = Strategy::hpx,
+          .exactTriangles = 32,
           .coefficients = CoefficientType::float64};
 }
 

@@ -156,8 +156,8 @@ struct BuildOptions {
   /// close to the surface, 0 to 1. It is estimated from 512 points in the leaf, as for `maxError`. With 0, all leaves
   /// close to the surface have triangles or are linear.
   double exactTolerance = 0;
-  /// For `Strategy::hpx`: greatest number of triangles of an exact leaf, 1 to 4096. A leaf of the greatest depth may
-  /// have more.
+  /// For `Strategy::hpx`: number of triangles above which an exact leaf is divided, 1 to 4096. Up to twice as many stay
+  /// together where dividing would hardly shorten the list. A leaf of the greatest depth may have more.
   int exactTriangles = 64;
   int quadrature = 3;  ///< order of the quadrature as a multiple of the degree p, 2 to 8; the paper uses 4
   CubatureKind cubature = CubatureKind::compact;

@@ -35,6 +35,11 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
 /// are continuous throughout the domain. `width` is the width of the blended zones relative to the edge of a leaf, up
 /// to `kMaxBlend`: the wider the zones, the smoother the field, and the more queries evaluate several leaves. A width
 /// of 0 removes the blending. The proven bounds of `field` are dropped because they do not hold for the new field.
+///
+/// Exact leaves of a field that was built without blending list the triangles that are nearest within the leaf. In the
+/// zones beyond it, their distance may be too great, and may jump where its sign is uncertain. To avoid this, build the
+/// field with `BuildOptions::blend`.
+///
 /// Throws `Error` for a width out of range.
 Field blended(const Field& field, double width = kDefaultBlend);
 

@@ -232,8 +232,9 @@ const std::vector<Row> kRows = {
      "plane."},
     {"exact-triangles", kMethod, wholeNumber().within(1, 4096).stored(15).advanced(),
      member<&BuildOptions::exactTriangles>,
-     "Greatest number of triangles that an exact cell of strategy hpx keeps. A cell with more is divided, down to "
-     "max-depth. Raise it for fewer cells and a smaller field, lower it for faster queries."},
+     "Number of triangles above which an exact cell of strategy hpx is divided, down to max-depth. Up to twice as many "
+     "stay together where dividing would hardly shorten the list. Raise it for fewer cells and a smaller field, lower "
+     "it for faster queries."},
     {"coefficients", kResult, choice({"auto", "float", "double"}).advanced(), member<&BuildOptions::coefficients>,
      "Precision of the coefficients. auto takes float where that changes the error by less than 1 %."},
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <random>
@@ -46,6 +47,17 @@ std::optional<CommonPlane> commonPlane(const TriangleSearch& search, std::span<c
   return plane;
 }
 
+/// Returns true if all octants need much fewer triangles than the whole list has. Where many triangles meet at a
+/// vertex, the octant with this vertex needs nearly all of them, and dividing the cell would repeat them at every
+/// depth.
+bool isShorterInOctants(const TriangleList& list) {
+  constexpr double kShare = 0.6;
+  std::array<std::size_t, 8> counts = {};
+  for (const std::uint8_t octants : list.octants)
+    for (int octant = 0; octant < 8; ++octant) counts[octant] += octants >> octant & 1;
+  return double(*std::ranges::max_element(counts)) < kShare * double(list.triangles.size());
+}
+
 /// Returns the fit of degree 1 that is the signed distance to a plane.
 Fit planeFit(const Box& cell, const CommonPlane& plane) {
   Fit fit;
@@ -79,8 +91,8 @@ std::optional<Fit> ExactCells::fitFrom(const Box& cell, const Box& box, Triangle
 ExactCells::Outcome ExactCells::makeExact(const Box& cell, bool isDivisible) const {
   constexpr std::size_t kLonger = 64;
   const Box box = boxOfWeight(cell, blend_);
-  auto list = search_.nearestTo(box, isDivisible ? most_ : kLonger * most_);
-  if (!list) return {{}, isDivisible};
+  auto list = search_.nearestTo(box, isDivisible ? kLongerFactor * most_ : kLonger * most_);
+  if (!list || (isDivisible && list->triangles.size() > most_ && isShorterInOctants(*list))) return {{}, isDivisible};
   std::optional<Fit> fit = fitFrom(cell, box, std::move(*list));
   if (fit) fit->error.near = true;
   return {std::move(fit), false};

@@ -32,8 +32,8 @@ class ExactCells {
     bool divides = false;    ///< there is no such fit, but there may be fits of the cell's parts
   };
 
-  /// Makes a cell exact, if its list is not too long and determines the sign. If the cell cannot be divided further,
-  /// the list may be much longer.
+  /// Makes a cell exact, if its list is not too long and determines the sign. The list may be twice as long if dividing
+  /// the cell would hardly shorten it, and much longer if the cell cannot be divided further.
   Outcome makeExact(const Box& cell, bool isDivisible) const;
 
   /// Returns true if the triangles that can be nearest to points of the cell all face about the same way, so that the
@@ -53,6 +53,8 @@ class ExactCells {
  private:
   /// Number of triangles in a list that takes at most as many bytes as a quadratic polynomial.
   static constexpr std::size_t kShort = 12;
+  /// A cell that could be divided may have a list so many times as long as `most` where dividing hardly shortens it.
+  static constexpr std::size_t kLongerFactor = 2;
 
   std::optional<Fit> fitFrom(const Box& cell, const Box& box, TriangleList list) const;
 
