@@ -69,6 +69,14 @@ std::vector<std::uint32_t> checkLists(const ExactTriangles& exact) {
   return starts;
 }
 
+/// Throws `Error` unless `leaf` refers to one of the lists that begin at `lists`, whose reference point fits its sign.
+void checkExactLeaf(const ExactTriangles& exact, const std::vector<std::uint32_t>& lists, std::uint64_t leaf) {
+  if (!std::ranges::binary_search(lists, node::offset(leaf))) notAField("a cell has no list of triangles");
+  const bool hasReference = TriangleListView(exact, leaf).hasReference();
+  if (hasReference != (node::exactSign(leaf) == ExactSign::winding))
+    notAField("a cell's list of triangles does not fit its sign");
+}
+
 /// Throws `Error` unless the nodes form trees: every group of children must belong to exactly one node, which precedes
 /// the group.
 void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coefficients) {
@@ -82,10 +90,7 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
     if (depth[n] == kUnreached) notAField("node " + std::to_string(n) + " is no other node's child");
     if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
     if (node::isExact(nodes[n])) {
-      if (!std::ranges::binary_search(lists, node::offset(nodes[n]))) notAField("a cell has no list of triangles");
-      const bool hasReference = TriangleListView(data.exact, nodes[n]).hasReference();
-      if (hasReference != (node::exactSign(nodes[n]) == ExactSign::winding))
-        notAField("a cell's list of triangles does not fit its sign");
+      checkExactLeaf(data.exact, lists, nodes[n]);
       continue;
     }
     if (node::isLeaf(nodes[n])) {
