@@ -122,6 +122,24 @@ TEST(CheckedEstimator, noHoleIsMissed) {
   EXPECT_NEAR(value(Estimator::checked), 0.5, 0.1);
 }
 
+/// High above the plate, the distance differs from that to a plane only in a narrow column above the hole.
+TEST(CheckedEstimator, noNarrowHoleIsMissedFromAfar) {
+  const TriangleMesh mesh = plateWithHole();
+  const ExactDistance exact(mesh);
+  const DistanceFunction distance(exact);
+  const Box cell(Vector3(18.25, 22.25, 4), Vector3(34.25, 38.25, 20));
+  const Progress progress;
+  const auto ratioOfErrors = [&](Estimator estimator) {  // measured over estimated
+    const BuildOptions options{.nearness = 0, .estimator = estimator};
+    const detail::Nearness nearness{.diagonal = 160};
+    const detail::CellFitter fitter(distance, options, nearness, 0.02, progress);
+    const detail::Fit fit = fitter.fit(cell, 2);
+    return measuredRms(fit, fitter, cell) / std::sqrt(fit.error.squared / fit.error.volume);
+  };
+  EXPECT_GT(ratioOfErrors(Estimator::residual), 100);
+  EXPECT_NEAR(ratioOfErrors(Estimator::checked), 1, 0.5);
+}
+
 /// The triangles of a shell lie half of its thickness within it.
 TEST(CheckedEstimator, trianglesOfAShellAreNotErrors) {
   const TriangleMesh mesh = support::boxOfTwo();

@@ -33,7 +33,9 @@ enum class Estimator : std::uint8_t {
   residual,  ///< ∫Φ² − ∫f²: the part of the sampled Φ that the polynomial f does not represent
   /// As `residual`, but at least what (f − Φ)² is at points that are not samples: at a lattice of 27 points, of which a
   /// cell shares corners with its siblings, and at the centroids of the surface's triangles, where Φ is known. It sees
-  /// most kinks of Φ between the samples of a cell, for about 5 % more evaluations of Φ in each trial.
+  /// most kinks of Φ between the samples of a cell, for about 5 % more evaluations of Φ in each trial. Where a large
+  /// cell of degree 2 would have an error near zero, it is compared with Φ at up to 4096 more points before that is
+  /// believed.
   checked,
 };
 

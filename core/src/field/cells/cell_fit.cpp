@@ -6,6 +6,7 @@
 
 #include "field/nearness.h"
 #include "field/query/evaluate.h"
+#include "hpsdf/detail/random_points.h"
 #include "util/refuse.h"
 
 namespace hpsdf::detail {
@@ -85,6 +86,29 @@ CheckPoints cornersOfChild(const CheckPoints& parent, int child) {
     corners.distances.push_back(parent.distances[index]);
   }
   return corners;
+}
+
+/// Returns this many random points in local coordinates, sorted into compact groups.
+std::vector<Vector3> randomPoints(std::size_t count) {
+  constexpr std::uint64_t kSeed = 22;
+  const Box local(-Vector3::Ones(), Vector3::Ones());
+  std::vector<Vector3> points(count), sorted;
+  for (std::size_t i = 0; i < count; ++i) points[i] = Random(kSeed, i).inBox(local);
+  for (const std::uint32_t i : groupedOrder(points)) sorted.push_back(points[i]);
+  return sorted;
+}
+
+/// Returns the points, in local coordinates of a cell, at which a mean squared error is measured that is so small for
+/// the cell that samples and check points do not prove it: a feature narrower than their spacing may lie between them.
+/// A large cell gets more points than a small one, so that narrow features of the surface are found at every depth, and
+/// an error near zero more than one that is merely small. Returns no points if the error is believed.
+std::span<const Vector3> pointsOfDoubt(double meanSquare, const Box& cell, double diagonal) {
+  constexpr double kSmall = 3e-4, kNearZero = 1e-5;  // RMS error over the cell's shortest edge
+  static const std::array<std::vector<Vector3>, 2> points = {randomPoints(512), randomPoints(4096)};
+  const double rms = std::sqrt(meanSquare) / cell.sizes().minCoeff();
+  const double cells = diagonal / std::sqrt(3.0) / cell.sizes().maxCoeff();  // about so many fit side by side
+  if (rms > kSmall || cells >= 64) return {};
+  return points[rms > kNearZero || cells >= 16 ? 0 : 1];
 }
 
 double meanSquareOf(const Fit& fit) {
@@ -219,6 +243,19 @@ double CellFitter::checkedError(const Fit& fit, const Box& cell, const CheckPoin
   return kShare * (sum + worst);
 }
 
+double CellFitter::measuredIfDoubtful(const Fit& fit, const Box& cell, double squared) const {
+  // A cell of a higher degree was refined because an error had been seen. A distance without triangles may be smooth
+  // everywhere.
+  constexpr int kHighestDegree = 2;
+  if (!surface_ || fit.degree > kHighestDegree) return squared;
+  const std::span<const Vector3> points = pointsOfDoubt(squared, cell, nearness_.diagonal);
+  if (points.empty()) return squared;
+  const std::vector<double> exact = distances(cell, points);
+  double sum = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) sum += squaredErrorAt(fit, points[i], exact[i]);
+  return std::max(squared, sum / static_cast<double>(points.size()));
+}
+
 Fit CellFitter::makeFit(CachedProjection projected, int degree, const Box& cell, bool outsideBand,
                         const CheckPoints& check) const {
   Fit fit;
@@ -229,10 +266,10 @@ Fit CellFitter::makeFit(CachedProjection projected, int degree, const Box& cell,
                        ? basis::topDegreeError(fit.coefficients.data(), degree, 1.0)
                        : squaredError(fit, projected.meanSquare);
   if (options_.estimator == Estimator::checked) {
-    const double checked = checkedError(fit, cell, check);
-    squared = std::max(squared, checked);
-    // Raise the mean square, so that pruning sees what the check found.
-    projected.meanSquare = std::max(projected.meanSquare, meanSquareOf(fit) + checked);
+    const double residual = squared;
+    squared = measuredIfDoubtful(fit, cell, std::max(squared, checkedError(fit, cell, check)));
+    // Raise the mean square, so that pruning sees what the checks found.
+    if (squared > residual) projected.meanSquare = std::max(projected.meanSquare, meanSquareOf(fit) + squared);
   }
   rate(fit, squared, cell);
   if (keepsProjections()) fit.cached = std::move(projected);

@@ -109,6 +109,9 @@ class CellFitter {
   /// Returns the mean squared error of a fit that its errors at the check points, and at the centroids of triangles in
   /// the cell, suggest.
   double checkedError(const Fit& fit, const Box& cell, const CheckPoints& check) const;
+  /// Returns `squared`, the mean squared error that samples and check points suggest. If it is too small to be
+  /// believed, measures the error at many more points and returns the greater of the two.
+  double measuredIfDoubtful(const Fit& fit, const Box& cell, double squared) const;
   double squaredError(const Fit& fit, double meanSquare) const;
   void rate(Fit& fit, double squared, const Box& cell) const;
   bool keepsProjections() const { return options_.criterion == Criterion::optimal; }
