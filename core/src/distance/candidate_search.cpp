@@ -161,6 +161,7 @@ class Sifter {
       chunk_.count = std::min(mesh::TriangleChunk::kSize, places.size() - first);
       for (std::size_t i = 0; i < chunk_.count; ++i)
         for (int k = 0; k < 3; ++k) chunk_.corners[k][i] = corners_[places[first + i]][k] - point;
+      fillLastVector(chunk_);
       findBounds(chunk_);
       for (std::size_t i = 0; i < chunk_.count; ++i) {
         if (chunk_.upper[i] < nearest) nearest = chunk_.upper[i];

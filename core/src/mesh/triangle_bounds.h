@@ -18,6 +18,10 @@ struct TriangleChunk {
   alignas(64) std::array<float, kSize> upper;  ///< upper bound of the distance; NaN for a triangle without area
 };
 
+/// Fills the corners behind the last triangle with copies of it, up to the end of a SIMD vector of the widest
+/// instruction set. To be called when the triangles of a chunk have changed, before their bounds are found.
+void fillLastVector(TriangleChunk& chunk);
+
 /// Computes the bounds of the distances from the point to the triangles. The bounds allow for rounding in this function
 /// and of the corners, relative to their distances from the point. `count` must be above 0.
 void findBounds(TriangleChunk& chunk);

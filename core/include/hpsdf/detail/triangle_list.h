@@ -20,6 +20,11 @@ class TriangleListView {
   bool hasReference() const { return (*from_ & kReferenceBit) != 0; }
   /// Returns the octants of the triangle at place i of the list.
   std::uint8_t octants(std::uint32_t i) const { return static_cast<std::uint8_t>(from_[1 + i / 4] >> (8 * (i % 4))); }
+  /// Returns the octants of all triangles, a byte each.
+  const std::uint8_t* octants() const {
+    static_assert(std::endian::native == std::endian::little);  // the words of a list are read as bytes
+    return reinterpret_cast<const std::uint8_t*>(from_ + 1);
+  }
   const std::uint32_t* runs() const { return from_ + runsAt(count()); }
 
   /// Returns the offset of the runs in a list of `count` triangles, that is behind their number and their octants.

@@ -11,6 +11,7 @@
 #include <utility>
 #include <variant>
 
+#include "field/query/octant_filter.h"
 #include "hpsdf/detail/exact_sign.h"
 #include "hpsdf/detail/triangle_list.h"
 #include "mesh/triangle_bounds.h"
@@ -37,7 +38,7 @@ struct NearestFeature {
 };
 
 /// Triangles of a chunk, with room for those that are stored at once beyond its end.
-using Triangles = std::array<std::uint32_t, TriangleChunk::kSize + triangle_run::kMostLength>;
+using Triangles = std::array<std::uint32_t, TriangleChunk::kSize + std::max(triangle_run::kMostLength, kFilterWidth)>;
 
 /// Finds the feature that is nearest to a point, in double precision.
 template <typename V>
@@ -112,6 +113,7 @@ class CornerLoader {
     chunk.count = count;
     for (std::uint32_t i = 0; i < count; ++i)
       for (int k = 0; k < 3; ++k) setRelative(triangles_[triangles[i]][k], chunk.corners[k][i]);
+    fillLastVector(chunk);
   }
 
  private:
@@ -259,8 +261,7 @@ class OctantTriangles {
     Triangles triangles;
     std::uint32_t place = 0, count = 0;
     const auto pass = [&] {
-      f(triangles,
-        keepOnly(triangles, count, [&](std::uint32_t i) { return (list.octants(place + i) >> octant_ & 1) != 0; }));
+      f(triangles, keepInOctant(list.octants() + place, octant_, triangles.data(), count));
       place += std::exchange(count, 0);
     };
     list.forEachRun([&](std::uint32_t run) {
@@ -287,6 +288,7 @@ class OctantTriangles {
       kept += static_cast<std::uint32_t>(!(chunk.lower[i] > limit));
     }
     chunk.count = kept;
+    fillLastVector(chunk);
   }
 
   const ExactTriangles& exact_;
