@@ -1,12 +1,12 @@
 // Tests the filter of an exact leaf's triangles by octant against a loop.
+#include "field/query/octant_filter.h"
+
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <numeric>
 #include <random>
 #include <vector>
-
-#include "field/query/octant_filter.h"
 
 namespace hpsdf {
 namespace octant_filter_test {
