@@ -116,32 +116,36 @@ void addTriangle(inout Nearest nearest, Triangle t, float tolerance) {
   }
 }
 
-// Returns true if the first of two corners comes first in an order of all positions.
-bool precedes(vec3 p, vec3 q) {
-  return p.x != q.x ? p.x < q.x : p.y != q.y ? p.y < q.y : p.z < q.z;
+// Projects a point in the direction of a segment from the origin to the plane of two coordinate axes, in which the
+// segment becomes the origin. `end` is the segment's end and `axis` the axis along which it is longest.
+vec2 projectAlong(vec3 end, int axis, vec3 point) {
+  int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  precise vec2 projected = vec2(point[x], point[y]) - point[axis] * (vec2(end[x], end[y]) / end[axis]);
+  return projected;
 }
 
-// Six times the volume that a segment from the origin spans with a side of a triangle (x), and 1 or 0 if the side runs
-// counter-clockwise around the segment or not (y). Both triangles at an edge compute these in the same order, so that no
-// segment passes between them. A segment that meets the side counts as one whose end is moved a little.
-vec2 volumeWithSide(vec3 end, vec3 from, vec3 to) {
-  bool isForward = precedes(from, to);
-  precise vec3 normal = isForward ? cross(from, to) : cross(to, from);
-  precise float volume = dot(end, normal);
-  float side = volume != 0.0 ? volume : normal.x != 0.0 ? normal.x : normal.y != 0.0 ? normal.y : normal.z;
-  return vec2(abs(volume), float(side > 0.0 == isForward));
+// Returns twice the area of a projected side's triangle with the origin (x), and 1, -1 or 0 (y) if the side crosses the
+// positive half of the x axis upwards, downwards or not. For the two triangles at an edge, both numbers only differ in
+// their signs, to the bit.
+vec2 areaAndCrossing(vec2 from, vec2 to) {
+  precise float area = from.x * to.y - to.x * from.y;
+  bool startsAbove = from.y >= 0.0, endsAbove = to.y >= 0.0;
+  if (startsAbove == endsAbove) return vec2(area, 0.0);
+  return vec2(area, endsAbove ? float(area > 0.0) : -float(area < 0.0));
 }
 
 // Returns 1 if the segment from the origin passes through a triangle from its outer to its inner side, -1 if it passes
 // the other way, and 0 if it does not pass through (core/src/field/query/exact_sign.cpp).
-int crossingOf(vec3 end, Triangle t) {
-  vec2 ofA = volumeWithSide(end, t.b, t.c), ofB = volumeWithSide(end, t.c, t.a), ofC = volumeWithSide(end, t.a, t.b);
-  float left = ofA.y + ofB.y + ofC.y;
-  if (left != 0.0 && left != 3.0) return 0;
-  vec3 weights = vec3(ofA.x, ofB.x, ofC.x);
-  float along = dot(weights, vec3(dot(t.a, end), dot(t.b, end), dot(t.c, end)));
-  bool isBetween = along > 0.0 && along < (weights.x + weights.y + weights.z) * dot(end, end);
-  return !isBetween ? 0 : left == 0.0 ? 1 : -1;
+int passageThrough(vec3 end, Triangle t) {
+  vec3 size = abs(end);
+  int axis = size.x >= max(size.y, size.z) ? 0 : size.y >= size.z ? 1 : 2;
+  vec2 a = projectAlong(end, axis, t.a), b = projectAlong(end, axis, t.b), c = projectAlong(end, axis, t.c);
+  vec2 ofA = areaAndCrossing(b, c), ofB = areaAndCrossing(c, a), ofC = areaAndCrossing(a, b);
+  int turns = int(ofA.y + ofB.y + ofC.y);
+  vec3 weights = abs(vec3(ofA.x, ofB.x, ofC.x));
+  float at = dot(weights, vec3(dot(t.a, end), dot(t.b, end), dot(t.c, end))) / (weights.x + weights.y + weights.z);
+  bool isBetween = at > 0.0 && at < dot(end, end);
+  return !isBetween ? 0 : end[axis] > 0.0 ? -turns : turns;
 }
 
 // Returns 1 or -1, the sign of the distance in a leaf whose sign comes from the winding number. The reference point and
@@ -157,7 +161,7 @@ int signFromWinding(Node leaf, vec3 point) {
     uint triangle = run & 0x7ffffffu;
     uint end = triangle + (run >> 27 & 15u);
     for (; triangle <= end; ++triangle)
-      winding += crossingOf(point - reference, relativeTo(reference, fetchTriangle(triangle)));
+      winding += passageThrough(point - reference, relativeTo(reference, fetchTriangle(triangle)));
   }
   return winding > 0 ? -1 : 1;
 }

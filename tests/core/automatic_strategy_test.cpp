@@ -4,6 +4,7 @@
 
 #include <string_view>
 
+#include "field/build/limits.h"
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
@@ -85,6 +86,17 @@ TEST(AutomaticStrategy, refusesExactLeavesBeforeTheyFillTheMemory) {
               testing::ThrowsMessage<Error>(testing::AllOf(testing::HasSubstr("exact cells near the surface need more"),
                                                            testing::HasSubstr("take strategy hp"))));
   EXPECT_LE(reports, 50) << "a thousand cells a report: all would be hundreds of thousands";
+}
+
+/// Where much detail lies in a small part of the mesh, the samples suggest up to 2.6 times the nodes that there are.
+TEST(AutomaticStrategy, allowsForTheErrorOfEstimatesFromSamples) {
+  const BuildOptions options{.strategy = Strategy::hpx, .memoryLimit = 25'000'000};  // 100,000 nodes
+  const auto require = [&](double nodes, double overestimate) {
+    detail::requireMemoryForExact({.nodes = nodes, .overestimate = overestimate}, options);
+  };
+  EXPECT_NO_THROW(require(300'000, detail::kOverestimateBySamples));
+  EXPECT_THROW(require(600'000, detail::kOverestimateBySamples), Error);
+  EXPECT_THROW(require(110'000, 1), Error) << "counted numbers are not allowed for";
 }
 
 TEST(AutomaticStrategy, doesNotDependOnTheNumberOfThreads) {

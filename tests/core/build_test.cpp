@@ -340,6 +340,15 @@ TEST(Build, saysEarlyThatASoupTakesTooMuchMemory) {
   EXPECT_LT(taken.load(), 400'000u) << "the power law of the error tells it";
 }
 
+/// While the facets come into sight, the error hardly falls for a while.
+TEST(Build, isNotRefusedWhereTheFacetsOfASmoothShapeComeIntoSight) {
+  const TriangleMesh sphere = shapes::mesh("sphere,subdivisions=3");
+  const ExactDistance distance(sphere);
+  BuildOptions options{.targetError = 5e-8, .strategy = Strategy::hp};
+  options.memoryLimit = distance.bytes() + 45'000'000;  // the construction takes 36 MB
+  EXPECT_NO_THROW(build(distance, domainAround(sphere), options));
+}
+
 TEST(Build, limitsHold) {
   const Field shallow = build(torus, cube(), {.targetError = 1e-9, .maxDegree = 6, .maxDepth = 1});
   const FieldStatistics s = statistics(shallow);

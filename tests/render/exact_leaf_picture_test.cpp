@@ -285,6 +285,24 @@ TEST(ExactLeafPictures, ofOverlappingPartsNeedTheWindingNumber) {
                      surfaceTolerance(wrong), &camera));
 }
 
+/// Lengths in the middle of what single precision can square, at its limits and beyond them.
+TEST(ExactLeafPictures, ofOverlappingPartsDoNotDependOnTheUnit) {
+  HPSDF_REQUIRE_GL();
+  const TriangleMesh box = support::boxOfTwo(), both = support::joined(box, support::moved(box, {0.7, 0.6, 0.5}));
+  for (const double unit : {1.0, 1e-12, 1e-8, 3e8, 1e12}) {
+    const Part part(support::moved(both, Vector3::Zero(), unit));
+    const auto cpu = makeCpuRenderer(part.field), gl = makeGlRenderer(part.field, GlChoice::software);
+    for (const SliceView& view : slices(part.field))
+      EXPECT_TRUE(
+          agree(cpu->slice(view, kWidth, kHeight), gl->slice(view, kWidth, kHeight), sliceTolerance(part.field)))
+          << unit;
+    for (const Camera& camera : cameras(part.field, 1, 5))
+      EXPECT_TRUE(agree(cpu->surface({camera, 0}, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight),
+                        surfaceTolerance(part.field), &camera))
+          << unit;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Parts, ExactLeafPicture,
                          testing::Values("box", "gear", "far", "tiny", "shell", "overlap", "fandisk"),
                          [](const auto& part) { return part.param; });

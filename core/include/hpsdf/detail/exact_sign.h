@@ -11,9 +11,8 @@ namespace hpsdf {
 /// inward. The point is inside if this number is above 0. `leaf` is the packed node.
 ///
 /// The number is that of the leaf's reference point, changed by 1 for each listed triangle that the segment between the
-/// two points crosses. Two triangles with a common edge compute on which side of the edge the segment passes from the
-/// same numbers. So they agree, and no segment slips through between them.
-std::int32_t windingAt(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x);
+/// two points crosses. A segment through an edge or a vertex crosses the surface there as often as its neighbours do.
+std::int64_t windingAt(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x);
 
 /// Returns 1 if the signed distance grows along the unit normal of a face at a point of an exact leaf with
 /// `ExactSign::winding` that is nearest to this face, and −1 if it falls. `height` is the point's signed distance from

@@ -244,8 +244,8 @@ void buildStages(const DistanceFunction& distance, const Box& domain, const Buil
   BuildOptions limited = options;
   limited.maxSteps = std::min(options.maxSteps.value_or(steps.back()), steps.back());
   checkOptions(domain, limited);
-  limited.strategy = settled(options, distance, domain, progress).strategy;
   withThreads(options.threads, [&] {
+    limited.strategy = settled(options, distance, domain, progress).strategy;
     Construction construction(distance, domain, limited, progress);
     std::size_t stage = 0;
     const auto visitNext = [&] {

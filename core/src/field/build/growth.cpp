@@ -47,14 +47,17 @@ class GrowthProgress {
     return 1 + std::log(error / target) * std::log(work / past.work) / std::log(past.error / error);
   }
 
-  /// Returns the final work divided by the present work if the error goes on to fall by a power law of the work, as it
-  /// did in its last tenfold decrease. Returns 1 until there was such a decrease. No more than three further decades
-  /// are extrapolated, because the error of smooth shapes falls ever faster.
+  /// Returns the final work divided by the present work if the error goes on to fall by a power law of the work.
+  /// Returns 1 until the error has fallen by a factor of 10. The exponent is the one of the last tenfold decrease or
+  /// that since the start, whichever is smaller: where the facets of a smooth shape come into sight, the error hardly
+  /// falls for a while. No more than three further decades are extrapolated, because the error of smooth shapes falls
+  /// ever faster.
   double likelyFactor(double work, double error, double target) const {
     if (history_.empty() || !(history_.front().error > 10 * error) || !(error > target)) return 1;
-    const Sample& past = latestAbove(10, error);
+    const Sample &start = history_.front(), &past = latestAbove(10, error);
     if (!(work > past.work)) return 1;
-    return std::pow(std::min(error / target, 1e3), std::log(work / past.work) / std::log(past.error / error));
+    const auto exponentSince = [&](const Sample& s) { return std::log(work / s.work) / std::log(s.error / error); };
+    return std::pow(std::min(error / target, 1e3), std::min(exponentSince(past), exponentSince(start)));
   }
 
  private:
@@ -111,7 +114,8 @@ class Growth {
       tree.addBaseCells();
       if (setup_.exactCells) {
         const auto smooth = [&](const Box& cell) { return smoothFit(cell); };
-        placeExactLeaves(tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress);
+        placeExactLeaves(tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress,
+                         [&](const ExactEstimate& soFar) { requireMemoryForExact(soFar, setup_.options); });
       }
     }
     const std::size_t count = tree.nodes.size();

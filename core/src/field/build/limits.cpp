@@ -144,9 +144,10 @@ std::size_t ByteBudget::finalCoefficients(const Fit& fit) const {
 }
 
 void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
-  // The likely memory is off by a factor of 3 at times. It serves to refuse a construction that chases noise soon after
-  // its start; the lower bound passes the allowed memory only when most of the time is spent.
-  constexpr double kLikelyTolerance = 5;
+  // The likely memory is too great by a factor of 30 at times, while the facets of a smooth shape come into sight. It
+  // serves to refuse a construction that chases noise soon after its start; the lower bound passes the allowed memory
+  // only when most of the time is spent.
+  constexpr double kLikelyTolerance = 50;
   const double fixed = double(need.fixedBytes), most = allowedMemory(options);
   if (fixed > most)
     refuse("the distance that the field is made from holds ", bytesText(fixed), " of memory, more than the ",
@@ -161,12 +162,14 @@ void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
          " allowed: take a larger target error or a lower maximum depth, or allow more memory");
 }
 
-double mostNodes(const BuildOptions& options) { return kTolerance * allowedMemory(options) / kBytesPerNode; }
+double mostNodes(const BuildOptions& options) {
+  return kOverestimateBySamples * allowedMemory(options) / kBytesPerNode;
+}
 
 void requireMemoryForExact(const ExactEstimate& estimate, const BuildOptions& options) {
   // Lists are in memory twice when the arrays of the field are made.
   const double bytes = kBytesPerNode * estimate.nodes + 2 * estimate.listBytes, most = allowedMemory(options);
-  if (bytes <= kTolerance * most) return;
+  if (bytes <= estimate.overestimate * most) return;
   refuse("the exact cells near the surface need more than the ", bytesText(most),
          " of memory allowed: take strategy hp, more exact-triangles a cell, a smaller exact-within or a lower maximum "
          "depth, or allow more memory");

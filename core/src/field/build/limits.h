@@ -41,10 +41,10 @@ struct MemoryNeed {
 /// Throws `Error` if the construction exceeds the allowed memory now, or will exceed it at the end.
 void requireMemory(const MemoryNeed& need, const BuildOptions& options);
 
-/// Returns the number of nodes of an octree that certainly exceeds the allowed memory.
+/// Returns the number of nodes that an estimated octree may have without being refused.
 double mostNodes(const BuildOptions& options);
 
-/// Throws `Error` if the exact leaves will exceed the allowed memory.
+/// Throws `Error` if the exact leaves exceed the allowed memory, or certainly will.
 void requireMemoryForExact(const ExactEstimate& estimate, const BuildOptions& options);
 
 /// Computes the bytes of the finished field from its numbers of nodes and coefficients. The lookup grid and the

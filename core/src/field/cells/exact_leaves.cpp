@@ -189,12 +189,16 @@ double takeLists(BuildTree& tree, std::span<const std::uint32_t> level) {
 }  // namespace
 
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
-                      const Progress& progress) {
+                      const Progress& progress, const std::function<void(const ExactEstimate&)>& afterDepth) {
   std::vector<std::uint32_t> level(tree.nodes.size());
   std::iota(level.begin(), level.end(), 0U);
+  ExactEstimate size;
   for (int depth = 0; !level.empty(); ++depth) {
     const auto choices = chooseForCells(tree, level, cells, smoothFit, depth < maxDepth, progress);
+    for (const std::uint32_t node : level) size.listBytes += bytesOf(tree.nodes[node].fit.list);
     level = splitChosen(tree, level, choices);
+    size.nodes = double(tree.nodes.size());
+    afterDepth(size);
   }
 }
 
@@ -204,7 +208,7 @@ ExactEstimate estimateExactLeaves(BuildTree&& baseCells, const ExactCells& cells
   BuildTree sample = std::move(baseCells);
   std::vector<std::uint32_t> level(sample.nodes.size());
   std::iota(level.begin(), level.end(), 0U);
-  ExactEstimate estimate{.nodes = double(level.size()), .listBytes = 0};
+  ExactEstimate estimate{.nodes = double(level.size()), .overestimate = kOverestimateBySamples};
   std::mt19937 random;  // always with the same seed: the estimate is the same for any number of threads
   double each = 1;      // number of cells that each cell of the sample stands for
   for (int depth = 0; !level.empty() && estimate.nodes <= mostNodes; ++depth) {

@@ -67,17 +67,22 @@ class ExactCells {
 /// Tries to make a polynomial that stands for the triangles of a cell.
 using SmoothFit = std::function<std::optional<Fit>(const Box& cell)>;
 
-/// Makes the leaves exact that may contain points close to the surface, or takes the polynomial from `smoothFit` where
-/// there is one. Starts from the base cells of a tree without fits, and divides cells whose lists are too long. Cells
-/// far from the surface remain without fits. Reports progress and throws `Cancelled`.
-void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
-                      const Progress& progress);
-
-/// The estimated size of the octree that `placeExactLeaves` makes.
+/// The size of an octree with exact leaves, counted or estimated.
 struct ExactEstimate {
   double nodes = 0;
-  double listBytes = 0;  ///< memory of the lists of exact leaves during the construction
+  double listBytes = 0;     ///< memory of the lists of exact leaves during the construction
+  double overestimate = 1;  ///< the numbers may be so many times too great
 };
+
+/// Samples are off by a factor of 3 at times, where much detail lies in a small part of the mesh.
+inline constexpr double kOverestimateBySamples = 5;
+
+/// Makes the leaves exact that may contain points close to the surface, or takes the polynomial from `smoothFit` where
+/// there is one. Starts from the base cells of a tree without fits, and divides cells whose lists are too long. Cells
+/// far from the surface remain without fits. Reports progress and throws `Cancelled`. Calls `afterDepth` with the size
+/// so far whenever the cells of a depth are done.
+void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
+                      const Progress& progress, const std::function<void(const ExactEstimate&)>& afterDepth);
 
 /// Estimates what `placeExactLeaves` makes without a `smoothFit` from a tree of base cells, by Knuth's method for the
 /// size of a search tree: of the cells of each depth that would be split, only a stratified random sample is split. The

@@ -9,73 +9,72 @@
 namespace hpsdf {
 namespace {
 
-/// A segment from the origin.
-struct Segment {
-  Vector3 end;
-
-  /// The volume that the segment spans with a side of a triangle.
-  struct Volume {
-    double size;  ///< six times the volume
-    bool isLeft;  ///< the side runs counter-clockwise around the segment, as seen from the segment's end
-  };
-
-  /// A segment that meets the side counts as one whose end is moved a little along x or, if that changes nothing, along
-  /// y or z. As this is the same for all sides, a segment through a vertex crosses a closed surface once.
-  Volume volumeWith(const Vector3& from, const Vector3& to) const {
-    const Vector3 normal = from.cross(to);
-    const double volume = end.dot(normal);
-    for (const double side : {volume, normal.x(), normal.y(), normal.z()})
-      if (side != 0) return {std::abs(volume), side > 0};
-    return {0, false};
+/// A segment from the origin, in whose direction points are projected to the plane of two coordinate axes. The segment
+/// becomes the origin of this plane.
+class Segment {
+ public:
+  explicit Segment(const Vector3& end) : end_(end) {
+    end.cwiseAbs().maxCoeff(&axis_);
+    slope_ = Plane(end[(axis_ + 1) % 3], end[(axis_ + 2) % 3]) / end[axis_];
   }
+
+  /// Returns 1 if the segment passes through a triangle from its outer to its inner side, −1 if it passes the other
+  /// way, and 0 if it does not pass through.
+  ///
+  /// The projected outline of the triangle winds around the origin as often as it crosses one half of an axis. For two
+  /// triangles with a common side, the crossings of this side cancel to the bit. So the number of passages through the
+  /// triangles around an edge or a vertex depends on the outline of them all only: the segment may meet the edge or the
+  /// vertex, and rounding errors there do not matter.
+  int passageThrough(const std::array<Vector3, 3>& corners) const {
+    const std::array<Plane, 3> projected = {project(corners[0]), project(corners[1]), project(corners[2])};
+    int turns = 0;
+    double along = 0, sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Plane &from = projected[(k + 1) % 3], &to = projected[(k + 2) % 3];
+      const double area = from.x() * to.y() - to.x() * from.y();  // twice that of the triangle with the origin
+      turns += crossingOf(from, to, area);
+      along += std::abs(area) * corners[k].dot(end_);
+      sum += std::abs(area);
+    }
+    // The segment's line passes the triangle at the mean of the corners with these weights. It is on the segment if its
+    // projection to the segment is.
+    const bool isBetween = along > 0 && along < sum * end_.squaredNorm();
+    return !isBetween ? 0 : end_[axis_] > 0 ? -turns : turns;
+  }
+
+ private:
+  using Plane = Eigen::Vector2d;
+
+  Plane project(const Vector3& x) const { return Plane(x[(axis_ + 1) % 3], x[(axis_ + 2) % 3]) - x[axis_] * slope_; }
+
+  /// Returns 1 if the side of a triangle crosses the positive half of the x axis upwards, −1 if downwards, else 0.
+  static int crossingOf(const Plane& from, const Plane& to, double area) {
+    const bool startsAbove = from.y() >= 0, endsAbove = to.y() >= 0;
+    if (startsAbove == endsAbove) return 0;
+    if (endsAbove) return area > 0 ? 1 : 0;
+    return area < 0 ? -1 : 0;
+  }
+
+  Vector3 end_;
+  Eigen::Index axis_ = 0;  ///< the axis along which the segment is longest
+  Plane slope_;            ///< of the segment, along the two other axes
 };
-
-/// A triangle relative to the start of a segment, with the indices of its corners.
-struct Corners {
-  std::array<std::uint32_t, 3> index;
-  std::array<Vector3, 3> at;
-};
-
-/// Returns 1 if a segment passes through a triangle from its outer to its inner side, −1 if it passes the other way,
-/// and 0 if it does not pass through.
-int crossingOf(const Segment& segment, const Corners& corners) {
-  std::array<double, 3> weight;  // of the corners, by the volume with the opposite side
-  int left = 0;                  // number of sides that run counter-clockwise
-  for (int k = 0; k < 3; ++k) {
-    const int from = (k + 1) % 3, to = (k + 2) % 3;
-    // Both triangles at an edge compute its volume from the lower to the higher index.
-    const bool isForward = corners.index[from] < corners.index[to];
-    const Segment::Volume volume = isForward ? segment.volumeWith(corners.at[from], corners.at[to])
-                                             : segment.volumeWith(corners.at[to], corners.at[from]);
-    left += static_cast<int>(volume.isLeft == isForward);
-    weight[k] = volume.size;
-  }
-  if (left != 0 && left != 3) return 0;
-  // The crossing is at the mean of the corners with these weights. It lies between the segment's ends if its projection
-  // does.
-  double along = 0, sum = 0;
-  for (int k = 0; k < 3; ++k) {
-    along += weight[k] * corners.at[k].dot(segment.end);
-    sum += weight[k];
-  }
-  const bool isBetween = along > 0 && along < sum * segment.end.squaredNorm();
-  return !isBetween ? 0 : left == 0 ? 1 : -1;
-}
 
 }  // namespace
 
-std::int32_t windingAt(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x) {
+std::int64_t windingAt(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x) {
   const WindingReference reference = TriangleListView(exact, leaf).reference();
   const Vector3 origin = reference.point.cast<double>();
-  const Segment segment{x - origin};
-  std::int32_t winding = reference.winding;
+  const Segment segment(x - origin);
+  std::int64_t winding = reference.winding;
   std::visit(
       [&](const auto& vertices) {
+        const auto corner = [&](std::uint32_t index) {
+          return Vector3(vertices[index].template cast<double>() - origin);
+        };
         forEachTriangle(exact, leaf, [&](std::uint32_t triangle) {
-          const auto& index = exact.triangles[triangle];
-          Corners corners{index, {}};
-          for (int k = 0; k < 3; ++k) corners.at[k] = vertices[index[k]].template cast<double>() - origin;
-          winding += crossingOf(segment, corners);
+          const auto& [a, b, c] = exact.triangles[triangle];
+          winding += segment.passageThrough({corner(a), corner(b), corner(c)});
         });
       },
       exact.vertices);
