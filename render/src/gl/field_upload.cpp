@@ -123,16 +123,7 @@ std::vector<std::array<float, 4>> cornerTexels(const FieldData& field) {
 
 /// The lists of exact leaves, with reference points relative to the domain's lower corner.
 std::vector<std::uint32_t> uploadedLists(const FieldData& field) {
-  std::vector<std::uint32_t> lists = field.exact.lists;
-  for (const std::uint64_t bits : field.nodes) {
-    if (!node::isExact(bits) || node::exactSign(bits) != ExactSign::winding) continue;
-    const TriangleListView list(field.exact, bits);
-    WindingReference reference = list.reference();
-    reference.point = (reference.point.cast<double>() - field.domain.min()).cast<float>();
-    std::ranges::copy(TriangleListView::packed(reference),
-                      lists.begin() + (list.referenceWords() - field.exact.lists.data()));
-  }
-  return lists;
+  return listsWithMovedReferences(field, [&](const Vector3& x) { return Vector3(x - field.domain.min()); });
 }
 
 template <typename T>

@@ -1,28 +1,14 @@
 #include "view/scaled_renderer.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
 #include <variant>
-#include <vector>
 
 #include "hpsdf/detail/triangle_list.h"
 
 namespace hpsdf::render {
 namespace {
-
-/// Scales the reference points in a copy of a field's lists. Several leaves may refer to one list.
-void scaleReferences(const FieldData& field, double factor, std::vector<std::uint32_t>& lists) {
-  for (const std::uint64_t bits : field.nodes) {
-    if (!node::isExact(bits) || node::exactSign(bits) != ExactSign::winding) continue;
-    const TriangleListView list(field.exact, bits);
-    WindingReference reference = list.reference();
-    reference.point = (factor * reference.point.cast<double>()).cast<float>();
-    std::ranges::copy(TriangleListView::packed(reference),
-                      lists.begin() + (list.referenceWords() - field.exact.lists.data()));
-  }
-}
 
 Field scaled(const Field& field, double factor) {
   FieldData data = field.data();
@@ -39,7 +25,7 @@ Field scaled(const Field& field, double factor) {
                   .template cast<typename std::remove_reference_t<decltype(v)>::Scalar>();
       },
       data.exact.vertices);
-  scaleReferences(field.data(), factor, data.exact.lists);
+  data.exact.lists = listsWithMovedReferences(field.data(), [&](const Vector3& x) { return Vector3(factor * x); });
   data.exact.offset *= factor;
   data.bounds.clear();  // the bounds would have to be scaled, and no renderer uses them
   return Field(std::move(data));

@@ -1,10 +1,12 @@
 #pragma once
 // Access to the triangles of exact leaves.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "hpsdf/detail/field_data.h"
 
@@ -74,6 +76,23 @@ void forEachTriangle(const ExactTriangles& exact, std::uint64_t leaf, const F& f
     const std::uint32_t first = triangle_run::first(run), end = first + triangle_run::length(run);
     for (std::uint32_t triangle = first; triangle < end; ++triangle) f(triangle);
   });
+}
+
+/// Returns a copy of the lists of a field in which `moved`, a function of a point in double precision, has moved the
+/// reference points. Several leaves may refer to one list.
+template <typename F>
+std::vector<std::uint32_t> listsWithMovedReferences(const FieldData& field, const F& moved) {
+  std::vector<std::uint32_t> lists = field.exact.lists;
+  for (const std::uint64_t bits : field.nodes) {
+    if (!node::isExact(bits) || node::exactSign(bits) != ExactSign::winding) continue;
+    const TriangleListView list(field.exact, bits);
+    WindingReference reference = list.reference();
+    const Vector3 point = moved(Vector3(reference.point.cast<double>()));
+    reference.point = point.cast<float>();
+    std::ranges::copy(TriangleListView::packed(reference),
+                      lists.begin() + (list.referenceWords() - field.exact.lists.data()));
+  }
+  return lists;
 }
 
 }  // namespace hpsdf
