@@ -153,7 +153,7 @@ struct BuildOptions {
   Strategy strategy = Strategy::automatic;
   /// For `Strategy::hpx`: greatest distance from the surface up to which the field is exact, as a share of L (see
   /// `targetError`), 0 to 1.
-  double exactWithin = 0.005;
+  double exactWithin = 0.012;
   /// For `Strategy::hpx`: greatest error, as a share of L, of a polynomial that stands for the triangles of a leaf
   /// close to the surface, 0 to 1. It is estimated from 512 points in the leaf, as for `maxError`. With 0, all leaves
   /// close to the surface have triangles or are linear.
