@@ -160,13 +160,10 @@ class Sifter {
     for (std::size_t first = 0; first < places.size(); first += mesh::TriangleChunk::kSize) {
       chunk_.count = std::min(mesh::TriangleChunk::kSize, places.size() - first);
       for (std::size_t i = 0; i < chunk_.count; ++i)
-        for (int k = 0; k < 3; ++k) chunk_.corners[k][i] = corners_[places[first + i]][k] - point;
+        for (int k = 0; k < 3; ++k) chunk_.setCorner(k, i, (corners_[places[first + i]][k] - point).head<3>());
       fillLastVector(chunk_);
-      findBounds(chunk_);
-      for (std::size_t i = 0; i < chunk_.count; ++i) {
-        if (chunk_.upper[i] < nearest) nearest = chunk_.upper[i];
-        lower_[first + i] = chunk_.lower[i];
-      }
+      nearest = std::min(nearest, findBounds(chunk_));
+      std::copy_n(chunk_.lower.begin(), chunk_.count, lower_.begin() + static_cast<std::ptrdiff_t>(first));
     }
     return nearest;
   }

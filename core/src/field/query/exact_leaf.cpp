@@ -1,8 +1,6 @@
 #include "field/query/exact_leaf.h"
 
-#include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -11,7 +9,7 @@
 #include <utility>
 #include <variant>
 
-#include "field/query/octant_filter.h"
+#include "field/query/nearest_filter.h"
 #include "hpsdf/detail/exact_sign.h"
 #include "hpsdf/detail/triangle_list.h"
 #include "mesh/triangle_bounds.h"
@@ -20,12 +18,6 @@ namespace hpsdf::query {
 namespace {
 
 using mesh::TriangleChunk;
-
-/// Returns a number without the last 29 of its 52 binary digits, which is a float.
-double leadingDigits(double number) {
-  constexpr std::uint64_t kLast = (std::uint64_t{1} << 29) - 1;
-  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(number) & ~kLast);
-}
 
 /// The nearest feature (face, edge or vertex) of a list of triangles.
 struct NearestFeature {
@@ -38,7 +30,7 @@ struct NearestFeature {
 };
 
 /// Triangles of a chunk, with room for those that are stored at once beyond its end.
-using Triangles = std::array<std::uint32_t, TriangleChunk::kSize + std::max(triangle_run::kMostLength, kFilterWidth)>;
+using Triangles = std::array<std::uint32_t, TriangleChunk::kSize + kFilterWidth>;
 
 /// Finds the feature that is nearest to a point, in double precision.
 template <typename V>
@@ -96,66 +88,6 @@ class FeatureSearch {
   NearestFeature best_;
 };
 
-/// Loads the corners of triangles relative to a point, in single precision.
-template <typename V>
-class CornerLoader {
- public:
-  CornerLoader(const ExactTriangles& exact, const std::vector<V>& vertices, const Vector3& origin)
-      : triangles_(exact.triangles.data()), vertices_(vertices.data()), last_(vertices.size() - 1), origin_(origin) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double high = leadingDigits(origin[axis]);
-      high_[axis] = static_cast<float>(high);
-      low_[axis] = static_cast<float>(origin[axis] - high);
-    }
-  }
-
-  void load(const Triangles& triangles, std::uint32_t count, TriangleChunk& chunk) const {
-    chunk.count = count;
-    for (std::uint32_t i = 0; i < count; ++i)
-      for (int k = 0; k < 3; ++k) setRelative(triangles_[triangles[i]][k], chunk.corners[k][i]);
-    fillLastVector(chunk);
-  }
-
- private:
-  /// Sets `out` to a vertex minus the origin.
-  void setRelative(std::uint32_t index, Eigen::Vector4f& out) const {
-    const V& vertex = vertices_[index];
-    if constexpr (std::is_same_v<V, Eigen::Vector3f>) {
-      // The subtraction in two parts keeps the relative error small. A load of four floats is much faster than three
-      // loads of one; the fourth belongs to the next vertex and does not matter.
-      if (index < last_) [[likely]]
-        out = (Eigen::Map<const Eigen::Vector4f>(vertex.data()) - high_) - low_;
-      else
-        out.head<3>() = (vertex - high_.head<3>()) - low_.head<3>();
-    } else {
-      for (int axis = 0; axis < 3; ++axis) out[axis] = static_cast<float>(vertex[axis] - origin_[axis]);
-    }
-  }
-
-  const std::array<std::uint32_t, 3>* triangles_;
-  const V* vertices_;
-  std::size_t last_;  ///< index of the last vertex
-  Vector3 origin_;
-  Eigen::Vector4f high_ = Eigen::Vector4f::Zero(), low_ = Eigen::Vector4f::Zero();  ///< sum of two floats: the origin
-};
-
-/// Keeps the items for which `keep` is true, without branches that could be mispredicted. Returns their number.
-template <typename Keep>
-std::uint32_t keepOnly(Triangles& triangles, std::uint32_t count, const Keep& keep) {
-  std::uint32_t kept = 0;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    triangles[kept] = triangles[i];
-    kept += static_cast<std::uint32_t>(keep(i));
-  }
-  return kept;
-}
-
-float leastUpperBound(const TriangleChunk& chunk) {
-  float least = std::numeric_limits<float>::infinity();
-  for (std::size_t i = 0; i < chunk.count; ++i) least = chunk.upper[i] < least ? chunk.upper[i] : least;
-  return least;
-}
-
 /// The triangles that matter in one octant of an exact leaf.
 template <typename V>
 class OctantTriangles {
@@ -165,15 +97,7 @@ class OctantTriangles {
 
   NearestFeature nearestTo(const Vector3& x) const {
     FeatureSearch<V> search(exact_, vertices_, x);
-    float limit = std::numeric_limits<float>::infinity();
-    forEachChunk([&](Triangles& triangles, std::uint32_t count) {
-      if (count > kFew) {
-        TriangleChunk chunk;
-        CornerLoader(exact_, vertices_, x).load(triangles, count, chunk);
-        findBounds(chunk);
-        limit = std::min(limit, leastUpperBound(chunk));
-        count = keepOnly(triangles, count, [&](std::uint32_t i) { return !(chunk.lower[i] > limit); });
-      }
+    forEachChunk(x, 0, [&](const Triangles& triangles, std::uint32_t count) {
       for (std::uint32_t i = 0; i < count; ++i) search.tryTriangle(triangles[i]);
     });
     return search.best();
@@ -187,19 +111,17 @@ class OctantTriangles {
       for (std::size_t i = 0; i < points.size(); ++i) f(i, nearestTo(points[i]));
       return;
     }
-    forEachChunk([&](Triangles& triangles, std::uint32_t count) {
-      Box box;
-      for (const Vector3& x : points) box.extend(x);
-      const Vector3 origin = box.center();
+    Box box;
+    for (const Vector3& x : points) box.extend(x);
+    const Vector3 origin = box.center();
+    forEachChunk(origin, box.sizes().norm() / 2, [&](Triangles& triangles, std::uint32_t count) {
       TriangleChunk chunk;
-      CornerLoader(exact_, vertices_, origin).load(triangles, count, chunk);
-      if (count > kFew) keepNearestToBall(static_cast<float>(box.sizes().norm() / 2), triangles, chunk);
+      const bool hasBounds = count > kFew;
+      if (hasBounds) loadCorners(source(origin), triangles.data(), count, chunk);
       for (std::size_t i = 0; i < points.size(); ++i) {
         FeatureSearch<V> search(exact_, vertices_, points[i]);
-        const bool hasBounds = chunk.count > kFew;
-        if (hasBounds) findBounds(chunk, (points[i] - origin).template cast<float>());
-        const float limit = hasBounds ? leastUpperBound(chunk) : 0;
-        for (std::uint32_t n = 0; n < chunk.count; ++n)
+        const float limit = hasBounds ? findBounds(chunk, (points[i] - origin).template cast<float>()) : 0;
+        for (std::uint32_t n = 0; n < count; ++n)
           if (!hasBounds || !(chunk.lower[n] > limit)) search.tryTriangle(triangles[n]);
         f(i, search.best());
       }
@@ -252,43 +174,27 @@ class OctantTriangles {
  private:
   static constexpr std::uint32_t kFew = 3;  ///< so few triangles are tried without bounds
 
-  /// Calls f(triangles, count) with the triangles in the octant, up to the size of a chunk at a time. `f` may change
-  /// the triangles.
-  template <typename F>
-  void forEachChunk(const F& f) const {
-    constexpr std::uint32_t kAtOnce = 8;  // so many triangles are stored without a branch that could be mispredicted
-    const TriangleListView list(exact_, leaf_);
-    Triangles triangles;
-    std::uint32_t place = 0, count = 0;
-    const auto pass = [&] {
-      f(triangles, keepInOctant(list.octants() + place, octant_, triangles.data(), count));
-      place += std::exchange(count, 0);
-    };
-    list.forEachRun([&](std::uint32_t run) {
-      const std::uint32_t first = triangle_run::first(run), length = triangle_run::length(run);
-      if (count + length > TriangleChunk::kSize) pass();
-      for (std::uint32_t i = 0; i < kAtOnce; ++i) triangles[count + i] = first + i;
-      for (std::uint32_t i = kAtOnce; i < length; ++i) triangles[count + i] = first + i;
-      count += length;
-    });
-    pass();
+  CornerSource<V> source(const Vector3& origin) const { return {exact_.triangles, vertices_, origin}; }
+
+  /// Returns the octants of the list's triangles, and the words behind them.
+  std::span<const std::uint8_t> octants(const TriangleListView& list) const {
+    const auto* end = reinterpret_cast<const std::uint8_t*>(exact_.lists.data() + exact_.lists.size());
+    return {list.octants(), end};
   }
 
-  /// Keeps the triangles of a chunk that can be nearest to a point of the ball with this radius around the origin. No
-  /// triangle farther from the origin than d + 2r can be, where d is the distance of the nearest one.
-  static void keepNearestToBall(float radius, Triangles& triangles, TriangleChunk& chunk) {
-    constexpr float kRounding = 1 + 1e-6F;
-    if (chunk.count == 0) return;
-    findBounds(chunk);
-    const float limit = (leastUpperBound(chunk) + 2 * radius) * kRounding;
-    std::uint32_t kept = 0;
-    for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      for (auto& corner : chunk.corners) corner[kept] = corner[i];
-      triangles[kept] = triangles[i];
-      kept += static_cast<std::uint32_t>(!(chunk.lower[i] > limit));
+  /// Calls f(triangles, count) with the triangles that can be nearest to a point of the ball with this radius around
+  /// the origin, from up to a chunk of the list at a time. `f` may change the numbers behind the last triangle.
+  template <typename F>
+  void forEachChunk(const Vector3& origin, double radius, const F& f) const {
+    const TriangleListView list(exact_, leaf_);
+    ListPart rest{list.runs(), octants(list)};
+    Triangles triangles;
+    float nearest = std::numeric_limits<float>::infinity();
+    while (rest.run != nullptr) {
+      const std::uint32_t count =
+          keepNearest(source(origin), rest, octant_, static_cast<float>(radius), triangles.data(), nearest);
+      f(triangles, count);
     }
-    chunk.count = kept;
-    fillLastVector(chunk);
   }
 
   const ExactTriangles& exact_;
