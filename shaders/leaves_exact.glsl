@@ -148,13 +148,15 @@ int passageThrough(vec3 end, Triangle t) {
   return !isBetween ? 0 : end[axis] > 0.0 ? -turns : turns;
 }
 
-// Returns 1 or -1, the sign of the distance in a leaf whose sign comes from the winding number. The reference point and
-// its winding number follow the runs. The point is in world units from the domain's lower corner.
+// Returns 1 or -1, the sign of the distance in a leaf whose sign comes from the winding number. The reference point,
+// relative to the first corner of the first triangle, and its winding number follow the runs. The point is in world
+// units from the domain's lower corner.
 int signFromWinding(Node leaf, vec3 point) {
   int words = leaf.offset;
   while ((texelFetch(exactLists, words).x & 0x80000000u) == 0u) ++words;
-  vec3 reference = uintBitsToFloat(uvec3(texelFetch(exactLists, words + 1).x, texelFetch(exactLists, words + 2).x,
-                                         texelFetch(exactLists, words + 3).x));
+  vec3 offset = uintBitsToFloat(uvec3(texelFetch(exactLists, words + 1).x, texelFetch(exactLists, words + 2).x,
+                                      texelFetch(exactLists, words + 3).x));
+  vec3 reference = fetchTriangle(texelFetch(exactLists, leaf.offset).x & 0x7ffffffu).a + offset;
   int winding = int(texelFetch(exactLists, words + 4).x);
   for (int at = leaf.offset; at <= words; ++at) {
     uint run = texelFetch(exactLists, at).x;

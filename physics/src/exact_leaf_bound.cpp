@@ -91,7 +91,7 @@ void ExactLeafBound::findOpenEdges() {
 }
 
 int ExactLeafBound::signByWinding(const Ball& ball) const {
-  const Vector3 reference = TriangleListView(exact_, leaf_).reference().point.cast<double>();
+  const Vector3 reference = referenceOf(exact_, leaf_).point;
   const Segment toCenter = {reference, ball.center};
   const auto isPassed = [&](const Segment& edge) { return distanceBetween(toCenter, edge) <= ball.radius; };
   if (std::ranges::any_of(openEdges_, isPassed)) return 0;

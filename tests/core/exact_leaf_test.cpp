@@ -38,6 +38,7 @@ Part partOf(const std::string& name) {
   if (name == "shell") return {support::openBox(), {.insideTest = InsideTest::shell, .thickness = 0.1}};
   if (name == "far") return {support::moved(shapes::mesh("gear"), {300, -200, 100})};
   if (name == "overlap") return {overlappingBoxes()};
+  if (name == "farOverlap") return {support::moved(overlappingBoxes(), {1e6, -3e5, 2e4})};
   if (name == "inward") return {support::reversed(overlappingBoxes())};
   if (name == "fandisk") return {loadMesh(support::testMesh("cad/fandisk.obj"))};
   return {shapes::mesh(name)};
@@ -151,7 +152,7 @@ TEST_P(ExactLeaf, doesNotDependOnThreads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Parts, ExactLeaf,
-                         testing::Values("box", "gear", "shell", "far", "overlap", "inward", "fandisk"),
+                         testing::Values("box", "gear", "shell", "far", "overlap", "farOverlap", "inward", "fandisk"),
                          [](const auto& part) { return part.param; });
 
 TEST(ExactLeaves, ofACubeNeedFewBytes) {
@@ -267,7 +268,7 @@ TEST(ExactLeaves, countASegmentThroughAnEdgeOrAVertexOnce) {
   for (const Triangle& triangle : box.triangles) data.exact.triangles.push_back(triangle);
   data.exact.lists = {12 | TriangleListView::kReferenceBit, 0xffffffff, 0xffffffff, 0xffffffff,
                       triangle_run::packed(0, 12) | triangle_run::kLast};
-  const auto reference = TriangleListView::packed({{0, 0, 0}, 1});
+  const auto reference = PackedReference({Vector3::Zero(), 1}, box.vertices[box.triangles[0][0]]).words();
   data.exact.lists.insert(data.exact.lists.end(), reference.begin(), reference.end());
   const Field field(std::move(data));
   for (const double x : {-1.5, -0.5, 0.0, 0.5, 1.5})
@@ -292,7 +293,7 @@ TEST(ExactLeaves, countASegmentThroughAVertexOnceDespiteRounding) {
   field.forEachCell([&](const Cell& cell) {
     const std::uint64_t leaf = data.nodes[cell.id];
     if (!node::isExact(leaf) || node::exactSign(leaf) != ExactSign::winding) return;
-    const Vector3 reference = TriangleListView(data.exact, leaf).reference().point.cast<double>();
+    const Vector3 reference = referenceOf(data.exact, leaf).point;
     for (const Vector3& vertex : both.vertices)
       for (const double beyond : {1.01, 1.1, 1.3, 2.0, 3.0}) {
         const Vector3 x = reference + beyond * (vertex - reference);

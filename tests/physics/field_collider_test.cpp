@@ -76,12 +76,13 @@ Field scatteredField(unsigned seed, ExactSign sign) {
   data.nodes = {node::exactLeaf(sign, 0)};
   std::vector<Vector3> vertices(12);
   for (Vector3& x : vertices) x = Vector3(uniform(random), uniform(random), uniform(random));
+  const Vector3 corner = vertices[0];
   data.exact.vertices = std::move(vertices);
   data.exact.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {7, 8, 9}, {9, 10, 11}};
   data.exact.lists = {5, 0xffffffff, 0xff, triangle_run::packed(0, 5) | triangle_run::kLast};
   if (sign == ExactSign::winding) {
     data.exact.lists[0] |= TriangleListView::kReferenceBit;
-    const auto reference = TriangleListView::packed({{0.1F, -0.2F, 0.3F}, 0});
+    const auto reference = PackedReference({Vector3(0.1, -0.2, 0.3), 0}, corner).words();
     data.exact.lists.insert(data.exact.lists.end(), reference.begin(), reference.end());
   }
   return Field(std::move(data));

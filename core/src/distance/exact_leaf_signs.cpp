@@ -33,27 +33,24 @@ std::optional<LeafSign> ExactLeafSigns::find(const Box& box, const std::function
 /// Returns a reference point in a box, the farthest from the triangles out of a few. Segments from it to points that
 /// queries and pictures ask for, such as centres of cells, should not run along edges. So the places are irregular:
 /// multiples of powers of the real solution of t³ = t + 1 spread evenly in a cube. Returns std::nullopt if the point
-/// may change its side when it is rounded to floats.
+/// may change its side when its offset from a vertex is rounded to floats.
 std::optional<WindingReference> ExactLeafSigns::referenceIn(const Box& box) const {
   constexpr int kPlaces = 4;
   const Vector3 steps(0.8191725133961645, 0.6710436067037893, 0.5497004779019703);
-  const double size = box.max().cwiseAbs().cwiseMax(box.min().cwiseAbs()).maxCoeff();
-  double farthest = 4 * std::numeric_limits<float>::epsilon() * size;
+  double farthest = 4 * std::numeric_limits<float>::epsilon() / hierarchy_.scale();
   WindingReference reference;
   bool isFound = false;
   for (int place = 1; place <= kPlaces; ++place) {
     const Vector3 share = (place * steps).unaryExpr([](double s) { return s - std::floor(s); });
-    const Eigen::Vector3f point = (box.min() + share.cwiseProduct(box.sizes())).cast<float>();
-    const Vector3 rounded = point.cast<double>();
-    if (!box.contains(rounded)) continue;
-    const double distance = bvh::distanceTo(hierarchy_, rounded);
+    const Vector3 point = box.min() + share.cwiseProduct(box.sizes());
+    const double distance = bvh::distanceTo(hierarchy_, point);
     if (!(distance > farthest)) continue;
     farthest = distance;
     reference.point = point;
     isFound = true;
   }
   if (!isFound) return std::nullopt;
-  reference.winding = winding_.windingAt(reference.point.cast<double>());
+  reference.winding = winding_.windingAt(reference.point);
   return reference;
 }
 

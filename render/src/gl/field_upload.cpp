@@ -121,11 +121,6 @@ std::vector<std::array<float, 4>> cornerTexels(const FieldData& field) {
   return texels;
 }
 
-/// The lists of exact leaves, with reference points relative to the domain's lower corner.
-std::vector<std::uint32_t> uploadedLists(const FieldData& field) {
-  return listsWithMovedReferences(field, [&](const Vector3& x) { return Vector3(x - field.domain.min()); });
-}
-
 template <typename T>
 void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum format, const std::vector<T>& data) {
   if (data.empty()) return upload(buffer, texture, format, std::vector<T>(1));  // a buffer cannot be empty
@@ -165,7 +160,7 @@ void FieldUpload::uploadExact(const FieldData& field, GLint largest) {
   if (exact.empty()) return;
   checkFits(exact.lists.size(), std::min<std::size_t>(largest, std::size_t{1} << kOffsetBits), "runs of triangles");
   checkFits(3 * exact.triangles.size(), largest, "corners of triangles");
-  upload(exactListBuffer_, exactLists_, GL_R32UI, uploadedLists(field));
+  upload(exactListBuffer_, exactLists_, GL_R32UI, field.exact.lists);
   upload(exactCornerBuffer_, exactCorners_, GL_RGBA32F, cornerTexels(field));
 }
 

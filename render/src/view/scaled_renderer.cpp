@@ -1,7 +1,10 @@
 #include "view/scaled_renderer.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
+#include <set>
 #include <utility>
 #include <variant>
 
@@ -9,6 +12,20 @@
 
 namespace hpsdf::render {
 namespace {
+
+/// Scales the reference points of exact leaves. Several leaves may refer to one list.
+void scaleReferences(FieldData& data, double factor) {
+  std::set<std::uint32_t> lists;
+  for (const std::uint64_t leaf : data.nodes)
+    if (node::isExact(leaf) && node::exactSign(leaf) == ExactSign::winding) lists.insert(node::offset(leaf));
+  for (const std::uint32_t list : lists) {
+    std::uint32_t* const words = data.exact.lists.data() +
+                                 (TriangleListView(&data.exact.lists[list]).referenceWords() - data.exact.lists.data());
+    PackedReference reference(words);
+    reference.offset = (factor * reference.offset.cast<double>()).cast<float>();
+    std::ranges::copy(reference.words(), words);
+  }
+}
 
 Field scaled(const Field& field, double factor) {
   FieldData data = field.data();
@@ -25,7 +42,7 @@ Field scaled(const Field& field, double factor) {
                   .template cast<typename std::remove_reference_t<decltype(v)>::Scalar>();
       },
       data.exact.vertices);
-  data.exact.lists = listsWithMovedReferences(field.data(), [&](const Vector3& x) { return Vector3(factor * x); });
+  scaleReferences(data, factor);
   data.exact.offset *= factor;
   data.bounds.clear();  // the bounds would have to be scaled, and no renderer uses them
   return Field(std::move(data));

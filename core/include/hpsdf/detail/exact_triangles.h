@@ -19,7 +19,8 @@ namespace hpsdf {
 /// octants of the leaf, including the blend zone beyond its faces, in which the triangle can be nearest: bit x + 2y +
 /// 4z stands for the octant in the place of child number x + 2y + 4z. Then come the triangles as runs, up to the first
 /// run that is marked as the last one. A run is a sequence of triangles with successive indices. If bit 31 of the
-/// number is set, four more words follow: a `WindingReference`.
+/// number is set, four more words follow: a `WindingReference`, as three floats and an integer. Its point is stored
+/// relative to the first corner of the first listed triangle, so that it is accurate far from the origin, too.
 struct ExactTriangles {
   /// Vertices in world units: doubles, or floats where these suffice.
   std::variant<std::vector<Eigen::Vector3d>, std::vector<Eigen::Vector3f>> vertices;
@@ -55,7 +56,7 @@ enum class ExactSign : std::uint8_t {
 /// A point of an exact leaf at which the winding number is known. At another point of the leaf, the winding number
 /// follows from the listed triangles that the segment between the two points crosses.
 struct WindingReference {
-  Eigen::Vector3f point = Eigen::Vector3f::Zero();  ///< world units
+  Vector3 point = Vector3::Zero();  ///< world units
   /// The winding number, plus 1 in a mesh that is oriented inward. A point is inside if the number is above 0 there.
   std::int32_t winding = 0;
 };

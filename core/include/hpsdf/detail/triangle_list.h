@@ -1,12 +1,11 @@
 #pragma once
 // Access to the triangles of exact leaves.
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <variant>
 
 #include "hpsdf/detail/field_data.h"
 
@@ -41,25 +40,11 @@ class TriangleListView {
     }
   }
 
-  /// Returns the words of a reference, as they follow the runs of a list.
-  static std::array<std::uint32_t, 4> packed(const WindingReference& reference) {
-    const auto& point = reference.point;
-    return {std::bit_cast<std::uint32_t>(point.x()), std::bit_cast<std::uint32_t>(point.y()),
-            std::bit_cast<std::uint32_t>(point.z()), std::bit_cast<std::uint32_t>(reference.winding)};
-  }
-
-  /// Returns the words behind the runs.
+  /// Returns the words behind the runs, where the reference of a list begins if it has one.
   const std::uint32_t* referenceWords() const {
     const std::uint32_t* word = runs();
     while (!triangle_run::isLast(*word)) ++word;
     return word + 1;
-  }
-
-  /// Returns the reference of a list that has one.
-  WindingReference reference() const {
-    const std::uint32_t* words = referenceWords();
-    return {{std::bit_cast<float>(words[0]), std::bit_cast<float>(words[1]), std::bit_cast<float>(words[2])},
-            std::bit_cast<std::int32_t>(words[3])};
   }
 
   static constexpr std::uint32_t kReferenceBit = std::uint32_t{1} << 31;  ///< in the number of triangles
@@ -78,21 +63,32 @@ void forEachTriangle(const ExactTriangles& exact, std::uint64_t leaf, const F& f
   });
 }
 
-/// Returns a copy of the lists of a field in which `moved`, a function of a point in double precision, has moved the
-/// reference points. Several leaves may refer to one list.
-template <typename F>
-std::vector<std::uint32_t> listsWithMovedReferences(const FieldData& field, const F& moved) {
-  std::vector<std::uint32_t> lists = field.exact.lists;
-  for (const std::uint64_t bits : field.nodes) {
-    if (!node::isExact(bits) || node::exactSign(bits) != ExactSign::winding) continue;
-    const TriangleListView list(field.exact, bits);
-    WindingReference reference = list.reference();
-    const Vector3 point = moved(Vector3(reference.point.cast<double>()));
-    reference.point = point.cast<float>();
-    std::ranges::copy(TriangleListView::packed(reference),
-                      lists.begin() + (list.referenceWords() - field.exact.lists.data()));
+/// The words of a `WindingReference`, as they follow the runs of a list.
+struct PackedReference {
+  Eigen::Vector3f offset;  ///< of the point from the first corner of the first listed triangle, in world units
+  std::int32_t winding;
+
+  explicit PackedReference(const std::uint32_t* words)
+      : offset(std::bit_cast<float>(words[0]), std::bit_cast<float>(words[1]), std::bit_cast<float>(words[2])),
+        winding(std::bit_cast<std::int32_t>(words[3])) {}
+  /// `corner` is the first corner of the first listed triangle.
+  PackedReference(const WindingReference& reference, const Vector3& corner)
+      : offset((reference.point - corner).cast<float>()), winding(reference.winding) {}
+
+  std::array<std::uint32_t, TriangleListView::kReferenceWords> words() const {
+    return {std::bit_cast<std::uint32_t>(offset.x()), std::bit_cast<std::uint32_t>(offset.y()),
+            std::bit_cast<std::uint32_t>(offset.z()), std::bit_cast<std::uint32_t>(winding)};
   }
-  return lists;
+};
+
+/// Returns the reference of an exact leaf whose sign follows from the winding number. `leaf` is the packed node.
+inline WindingReference referenceOf(const ExactTriangles& exact, std::uint64_t leaf) {
+  const TriangleListView list(exact, leaf);
+  const PackedReference packed(list.referenceWords());
+  const std::uint32_t first = exact.triangles[triangle_run::first(*list.runs())][0];
+  const Vector3 corner = std::visit(
+      [&](const auto& vertices) { return Vector3(vertices[first].template cast<double>()); }, exact.vertices);
+  return {corner + packed.offset.cast<double>(), packed.winding};
 }
 
 }  // namespace hpsdf

@@ -142,7 +142,7 @@ void exactItems(Stream& stream, Fit& fit, std::size_t triangles) {
   stream.item(fit.sign.rule);
   stream.require(fit.sign.rule <= ExactSign::winding, "a cell's sign is unknown");
   if (fit.sign.rule == ExactSign::winding) {
-    for (float& coordinate : fit.sign.reference.point) finiteItem(stream, coordinate);
+    for (double& coordinate : fit.sign.reference.point) finiteItem(stream, coordinate);
     stream.item(fit.sign.reference.winding);
   }
   finiteItem(stream, fit.error.volume);

@@ -37,7 +37,8 @@ std::uint32_t ExactListPacker::pack(const TriangleList& list, const LeafSign& si
   std::vector<std::uint32_t> words = packed(list);
   if (sign.rule == ExactSign::winding) {
     words[0] |= TriangleListView::kReferenceBit;
-    const auto reference = TriangleListView::packed(sign.reference);
+    const Vector3& corner = search_.vertices()[search_.triangles()[list.triangles.front()][0]];
+    const auto reference = PackedReference(sign.reference, corner).words();
     words.insert(words.end(), reference.begin(), reference.end());
   }
   const auto [entry, isNew] = offsets_.try_emplace(std::move(words), static_cast<std::uint32_t>(lists_.size()));

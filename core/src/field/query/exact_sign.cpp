@@ -63,8 +63,8 @@ class Segment {
 }  // namespace
 
 std::int64_t windingAt(const ExactTriangles& exact, std::uint64_t leaf, const Vector3& x) {
-  const WindingReference reference = TriangleListView(exact, leaf).reference();
-  const Vector3 origin = reference.point.cast<double>();
+  const WindingReference reference = referenceOf(exact, leaf);
+  const Vector3 origin = reference.point;
   const Segment segment(x - origin);
   std::int64_t winding = reference.winding;
   std::visit(
@@ -85,7 +85,7 @@ int slopeByWinding(const ExactTriangles& exact, std::uint64_t leaf, const Vector
                    double height) {
   constexpr double kTouching = 1e-9;  // much more than the rounding errors of positions
   const auto isInside = [&](const Vector3& point) { return windingAt(exact, leaf, point) > 0; };
-  const Vector3 origin = TriangleListView(exact, leaf).reference().point.cast<double>();
+  const Vector3 origin = referenceOf(exact, leaf).point;
   const double touching = kTouching * ((x - origin).norm() + 1e-3 * x.norm());
   if (std::abs(height) < touching) {
     const Vector3 foot = x - height * normal;

@@ -63,7 +63,7 @@ std::vector<std::uint32_t> checkLists(const ExactTriangles& exact) {
     std::uint8_t octants = 0;
     for (std::uint32_t i = 0; i < list.count(); ++i) octants |= list.octants(i);
     if (octants != 0xff) notAField("a list has no triangle for an octant");
-    if (list.hasReference() && !list.reference().point.allFinite())
+    if (list.hasReference() && !PackedReference(list.referenceWords()).offset.allFinite())
       notAField("the reference point of a list of triangles is not finite");
   }
   return starts;
