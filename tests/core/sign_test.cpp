@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -17,6 +18,7 @@
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
+#include "sign/angle_block.h"
 #include "sign/boundary_edges.h"
 #include "sign/solid_angle.h"
 #include "sign/winding_number.h"
@@ -103,11 +105,17 @@ TEST(BoundaryEdges, gradientsAreWithinTheirErrorBounds) {
     const BoundaryEdges::Gradient exact = edges.gradient(local, 0);
     EXPECT_EQ(exact.terms, edges.size());
     EXPECT_EQ(exact.error, 0);
+    double slope = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 step = 1e-5 * exact.edgeDistance * Vector3::Unit(k);
+      const Vector3 change = edges.gradient(local + step, 0).value - edges.gradient(local - step, 0).value;
+      slope = std::max(slope, change.norm() / (2 * step.norm()));
+    }
     for (const double error : {1.0, 1e-2, 1e-4}) {
       const BoundaryEdges::Gradient found = edges.gradient(local, error);
       EXPECT_LE(found.error, error);
       EXPECT_LE((found.value - exact.value).norm(), found.error + 1e-9);
-      EXPECT_GE(found.derivative, exact.derivative * (1 - 1e-9));
+      EXPECT_GE(found.derivative, slope * (1 - 1e-3));
       EXPECT_LE(found.edgeDistance, exact.edgeDistance * (1 + 1e-9));
       if (error == 1) {
         terms += found.terms;
@@ -117,6 +125,28 @@ TEST(BoundaryEdges, gradientsAreWithinTheirErrorBounds) {
   }
   EXPECT_LT(terms, 200 * edges.size() / 5) << "few clusters were replaced by their series";
   EXPECT_GT(greatest, 1e-6) << "no cluster was replaced by its series";
+}
+
+/// The two sides of a slit cancel in the winding number, so that a sample tells the signs of points around it.
+TEST(BoundaryEdges, ofNarrowSlitsHardlyChangeTheGradient) {
+  TriangleMesh tube;  // square, with a slit along one of its edges
+  constexpr int kSteps = 1000;
+  constexpr std::uint32_t kAround = 5;
+  for (int i = 0; i <= kSteps; ++i)
+    for (const auto& [x, y] :
+         {std::pair(1.0, 0.0), std::pair(0.0, 1.0), std::pair(-1.0, 0.0), std::pair(0.0, -1.0), std::pair(1.0, -1e-4)})
+      tube.vertices.emplace_back(x, y, i / 100.0);
+  for (std::uint32_t i = 0; i < kSteps; ++i)
+    for (std::uint32_t side = 0; side + 1 < kAround; ++side) {
+      const std::uint32_t at = kAround * i + side;
+      tube.triangles.push_back({at, at + 1, at + kAround + 1});
+      tube.triangles.push_back({at, at + kAround + 1, at + kAround});
+    }
+  const Hierarchy hierarchy(tube, boundingBox(tube));
+  const BoundaryEdges edges(hierarchy);
+  const Vector3 above = hierarchy.local({1.5, 0, 5});
+  EXPECT_LT(edges.gradient(above, 0.1).derivative, 0.2 * edges.gradient(above, 0).derivative)
+      << edges.gradient(above, 0.1).derivative << " instead of " << edges.gradient(above, 0).derivative;
 }
 
 TEST(BoundaryEdges, gradientsEqualDifferenceQuotients) {
@@ -409,6 +439,29 @@ TEST(InsideTest, ofInwardBodiesThatShareAnEdgeIsCorrectedOnImport) {
   EXPECT_EQ(inward.report.nonManifoldEdges, 1u);
   EXPECT_LT(value(ExactDistance(inward.mesh), {0, 0, 0}), 0);
   EXPECT_GT(value(ExactDistance(inward.mesh), {3, 0, 0}), 0);
+}
+
+TEST(AngleBlock, hasTheAnglesOfItsTrianglesToTheBit) {
+  std::mt19937_64 random(5);
+  std::uniform_int_distribution<int> coordinate(-2, 2);  // many triangles without area, and points on triangles
+  for (int repetition = 0; repetition < 2000; ++repetition) {
+    sign::BlockAngles sum;
+    std::array<sign::AngleSum, 4> single;
+    const Vector3 x(coordinate(random), coordinate(random), 0.5 * (repetition % 2));
+    for (int block = 0; block < 5; ++block) {
+      sign::AngleBlock corners;
+      for (int place = 0; place < 4; ++place) {
+        std::array<Vector3, 3> v;
+        for (int k = 0; k < 3; ++k)
+          for (int axis = 0; axis < 3; ++axis) corners.corner[k][axis][place] = v[k][axis] = coordinate(random);
+        sign::addHalfSolidAngle(v[0] - x, v[1] - x, v[2] - x, single[place]);
+      }
+      sign::addHalfSolidAngles(corners, x, sum);
+    }
+    double expected = 0;
+    for (const sign::AngleSum& angles : single) expected += angles.value();
+    ASSERT_EQ(sum.value(), expected) << repetition;
+  }
 }
 
 TEST(AngleSum, countsTurns) {

@@ -92,6 +92,19 @@ Vector3 BoundaryEdges::Cluster::series(const Vector3& toCenter, double squaredDi
   return inverse * std::sqrt(inverse) * (axial(second - 3 * towards) + toCenter.cross(first - 3 * inverse * higher));
 }
 
+/// The k-th derivatives of s/|s|³ in any directions are at most (k + 1)! / |s|^(k + 2). A matrix M is the sum of three
+/// products of a direction with a vector whose lengths add up to at most √3 |M|, with the Frobenius norm |M|. The terms
+/// beyond the second order are at most Σ (k + 1)(k + 2) r^(k − 3)/R^(k + 3) ∫|d|³ dl for k ≥ 3.
+double BoundaryEdges::Cluster::derivativeBound(double distance) const {
+  const double inverse = 1 / distance, nearest = distance - radius;
+  const double thirds = std::sqrt(third[0].squaredNorm() + third[1].squaredNorm() + third[2].squaredNorm());
+  const double beyond = 20 * cubes * inverse / cube(1 - radius * inverse);
+  const double byMoments =
+      2 * first.norm() + inverse * (6 * std::sqrt(3.0) * second.norm() + inverse * (36 * thirds + beyond));
+  // Besides, every edge is at least `nearest` away.
+  return std::min(byMoments * cube(inverse), 2 * length / cube(nearest));
+}
+
 inline void BoundaryEdges::Edge::addTo(Gradient& sum, const Vector3& local) const {
   const Vector3 a = from - local, b = to - local, along = b - a;
   const double la = a.norm(), lb = b.norm(), product = la * lb;
@@ -117,7 +130,7 @@ BoundaryEdges::Gradient BoundaryEdges::sum(const Vector3& local, double ratio) c
       const double nearest = distance - cluster.radius;
       sum.value += cluster.series(toCenter, squared);
       sum.error += errorFactor * cluster.cubes / (squared * squared * distance);
-      sum.derivative += 2 * cluster.length / cube(nearest);  // bound: every edge is at least `nearest` away
+      sum.derivative += cluster.derivativeBound(distance);
       sum.edgeDistance = std::min(sum.edgeDistance, nearest);
       ++sum.terms;
       n = cluster.next;

@@ -77,6 +77,10 @@ class BoundaryEdges {
     /// Returns 4π times the cluster's contribution to the gradient, by the Taylor series. `toCenter` runs from
     /// the point to the cluster's center.
     Vector3 series(const Vector3& toCenter, double squaredDistance) const;
+    /// Returns a bound of 4π times the derivative of the cluster's contribution in any direction, at a point with this
+    /// distance from the cluster's center. Where the edges form closed loops, it is much smaller than the sum of the
+    /// bounds of all edges.
+    double derivativeBound(double distance) const;
   };
 
   void addCluster(std::uint32_t begin, std::uint32_t end);

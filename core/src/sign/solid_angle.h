@@ -12,6 +12,10 @@ namespace hpsdf::sign {
 /// arguments, and counts the full turns.
 class AngleSum {
  public:
+  AngleSum() = default;
+  /// Continues from a complex number with the angle of the sum, and a number of full turns.
+  AngleSum(double real, double imaginary, double turns) : real_(real), imaginary_(imaginary), turns_(turns) {}
+
   /// Adds the angle of the complex number x + iy, in (−π, π]. Adds nothing if x and y are 0.
   void add(double x, double y) {
     if (x == 0 && y == 0) return;
@@ -34,7 +38,7 @@ class AngleSum {
 
  private:
   double real_ = 1, imaginary_ = 0;
-  int turns_ = 0;
+  double turns_ = 0;
 };
 
 /// Adds half of the signed solid angle of the triangle abc, seen from the origin (van Oosterom and Strackee

@@ -54,13 +54,26 @@ void WindingNumber::addCluster(std::uint32_t child, std::uint32_t begin, std::ui
       const bool last = i + 1 == bvh::kWidth || node.child[i + 1] == bvh::kEmpty;
       addCluster(node.child[i], firstSlot(node.child[i]), last ? end : firstSlot(node.child[i + 1]));
     }
+  } else {
+    clusters_[self].block = child & ~bvh::kBlockBit;
   }
   clusters_[self].next = static_cast<std::uint32_t>(clusters_.size());
 }
 
+/// Fills the block of a cluster that is not divided.
+void WindingNumber::fill(AngleBlock& block, const Cluster& cluster) const {
+  for (std::uint32_t place = 0; place < bvh::kWidth; ++place) {
+    const bool isUsed = cluster.begin + place < cluster.end;
+    const std::array<Vector3, 3> v = corners(isUsed ? cluster.begin + place : cluster.begin);
+    for (int k = 0; k < 3; ++k)
+      for (int axis = 0; axis < 3; ++axis) block.corner[k][axis][place] = v[isUsed ? k : 0][axis];
+  }
+}
+
 std::array<Vector3, 3> WindingNumber::corners(std::uint32_t slot) const {
   const auto& [a, b, c] = hierarchy_->triangles()[slot];
-  return {vertices_[a], vertices_[b], vertices_[c]};
+  const auto vertices = hierarchy_->vertices();
+  return {hierarchy_->local(vertices[a]), hierarchy_->local(vertices[b]), hierarchy_->local(vertices[c])};
 }
 
 /// Computes center, moments and far distances of a cluster.
@@ -125,26 +138,19 @@ double WindingNumber::Moments::error(double squaredDistance) const {
 }
 
 WindingNumber::WindingNumber(const bvh::Hierarchy& hierarchy)
-    : hierarchy_(&hierarchy), vertices_(hierarchy.vertices().size()) {
-  tbb::parallel_for(std::size_t{0}, vertices_.size(),
-                    [&](std::size_t v) { vertices_[v] = hierarchy.local(hierarchy.vertices()[v]); });
+    : hierarchy_(&hierarchy), blocks_(hierarchy.blocks().size()) {
   addCluster(0, 0, static_cast<std::uint32_t>(hierarchy.triangles().size()));
   moments_.resize(clusters_.size());
-  tbb::parallel_for(std::size_t{0}, clusters_.size(), [&](std::size_t n) { measure(clusters_[n], moments_[n]); });
-}
-
-double WindingNumber::sumOver(const Vector3& local, std::uint32_t begin, std::uint32_t end) const {
-  AngleSum angles;
-  for (std::uint32_t slot = begin; slot < end; ++slot) {
-    const auto [a, b, c] = corners(slot);
-    addHalfSolidAngle(a - local, b - local, c - local, angles);
-  }
-  return angles.value() / (2 * std::numbers::pi);
+  tbb::parallel_for(std::size_t{0}, clusters_.size(), [&](std::size_t n) {
+    measure(clusters_[n], moments_[n]);
+    if (clusters_[n].next == n + 1) fill(blocks_[clusters_[n].block], clusters_[n]);
+  });
 }
 
 WindingNumber::Estimate WindingNumber::estimate(const Vector3& x, int level) const {
   const Vector3 local = hierarchy_->local(x);
   Estimate all{0, kRounding};
+  BlockAngles angles;
   double series = 0;
   for (std::size_t n = 0; n < clusters_.size();) {
     const Cluster& cluster = clusters_[n];
@@ -155,20 +161,26 @@ WindingNumber::Estimate WindingNumber::estimate(const Vector3& x, int level) con
       all.error += moments_[n].error(squared);
       n = cluster.next;
     } else if (++n == cluster.next) {  // the cluster has no children
-      all.value += sumOver(local, cluster.begin, cluster.end);
+      addHalfSolidAngles(blocks_[cluster.block], local, angles);
     }
   }
-  all.value += series / (4 * std::numbers::pi);
+  all.value = angles.value() / (2 * std::numbers::pi) + series / (4 * std::numbers::pi);
   return all;
 }
 
 double WindingNumber::withoutTriangle(const Vector3& x, std::uint32_t slot) const {
   const Estimate all = estimateWithin(x, 0.05, [](const Estimate&) { return false; });
-  return all.value - sumOver(hierarchy_->local(x), slot, slot + 1);
+  const Vector3 local = hierarchy_->local(x);
+  const auto [a, b, c] = corners(slot);
+  AngleSum angle;
+  addHalfSolidAngle(a - local, b - local, c - local, angle);
+  return all.value - angle.value() / (2 * std::numbers::pi);
 }
 
 double WindingNumber::exact(const Vector3& x) const {
-  return sumOver(hierarchy_->local(x), 0, static_cast<std::uint32_t>(hierarchy_->triangles().size()));
+  BlockAngles angles;
+  for (const AngleBlock& block : blocks_) addHalfSolidAngles(block, hierarchy_->local(x), angles);
+  return angles.value() / (2 * std::numbers::pi);
 }
 
 bool WindingNumber::isAbove(const Vector3& x, double level) const {
@@ -177,7 +189,7 @@ bool WindingNumber::isAbove(const Vector3& x, double level) const {
 }
 
 std::size_t WindingNumber::bytes() const {
-  return clusters_.size() * sizeof(Cluster) + moments_.size() * sizeof(Moments) + vertices_.size() * sizeof(Vector3);
+  return clusters_.size() * sizeof(Cluster) + moments_.size() * sizeof(Moments) + blocks_.size() * sizeof(AngleBlock);
 }
 
 }  // namespace hpsdf::sign

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bvh/hierarchy.h"
+#include "sign/angle_block.h"
 
 namespace hpsdf::sign {
 
@@ -72,6 +73,7 @@ class WindingNumber {
     std::array<double, kLevels> squaredFarDistance = {};  ///< square of the least distance for the series, by level
     std::uint32_t next = 0;                               ///< index of the next cluster that is not a part of this one
     std::uint32_t begin = 0, end = 0;                     ///< range of triangle slots
+    std::uint32_t block = 0;                              ///< for a cluster that is not divided: its index in `blocks_`
   };
 
   /// The moments of a cluster, where n is the normal of the surface and d runs from the cluster's center to the
@@ -93,15 +95,15 @@ class WindingNumber {
   };
 
   void addCluster(std::uint32_t child, std::uint32_t begin, std::uint32_t end);
+  void fill(AngleBlock& block, const Cluster& cluster) const;
   void measure(Cluster& cluster, Moments& moments) const;
+  /// Returns the corners of a triangle in local coordinates.
   std::array<Vector3, 3> corners(std::uint32_t slot) const;
-  /// Returns the exact winding number of the triangles in slots [begin, end).
-  double sumOver(const Vector3& local, std::uint32_t begin, std::uint32_t end) const;
 
   const bvh::Hierarchy* hierarchy_ = nullptr;
-  std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes the clusters into which it is divided
-  std::vector<Moments> moments_;   ///< one for each cluster
-  std::vector<Vector3> vertices_;  ///< the hierarchy's vertices in its local coordinates
+  std::vector<Cluster> clusters_;   ///< in depth-first order: a cluster precedes the clusters into which it is divided
+  std::vector<Moments> moments_;    ///< one for each cluster
+  std::vector<AngleBlock> blocks_;  ///< the triangles of the hierarchy's blocks in local coordinates
 };
 
 }  // namespace hpsdf::sign
