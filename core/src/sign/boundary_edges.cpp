@@ -95,14 +95,18 @@ Vector3 BoundaryEdges::Cluster::series(const Vector3& toCenter, double squaredDi
 /// The k-th derivatives of s/|s|³ in any directions are at most (k + 1)! / |s|^(k + 2). A matrix M is the sum of three
 /// products of a direction with a vector whose lengths add up to at most √3 |M|, with the Frobenius norm |M|. The terms
 /// beyond the second order are at most Σ (k + 1)(k + 2) r^(k − 3)/R^(k + 3) ∫|d|³ dl for k ≥ 3.
-double BoundaryEdges::Cluster::derivativeBound(double distance) const {
+void BoundaryEdges::Cluster::addDerivative(Gradient& sum, double distance) const {
   const double inverse = 1 / distance, nearest = distance - radius;
   const double thirds = std::sqrt(third[0].squaredNorm() + third[1].squaredNorm() + third[2].squaredNorm());
   const double beyond = 20 * cubes * inverse / cube(1 - radius * inverse);
   const double byMoments =
-      2 * first.norm() + inverse * (6 * std::sqrt(3.0) * second.norm() + inverse * (36 * thirds + beyond));
-  // Besides, every edge is at least `nearest` away.
-  return std::min(byMoments * cube(inverse), 2 * length / cube(nearest));
+      cube(inverse) *
+      (2 * first.norm() + inverse * (6 * std::sqrt(3.0) * second.norm() + inverse * (36 * thirds + beyond)));
+  const double byLength = 2 * length / cube(nearest);  // every edge is at least `nearest` away
+  if (byMoments < byLength)
+    sum.derivativeByMoments += byMoments;
+  else
+    sum.derivative += byLength;
 }
 
 inline void BoundaryEdges::Edge::addTo(Gradient& sum, const Vector3& local) const {
@@ -130,7 +134,7 @@ BoundaryEdges::Gradient BoundaryEdges::sum(const Vector3& local, double ratio) c
       const double nearest = distance - cluster.radius;
       sum.value += cluster.series(toCenter, squared);
       sum.error += errorFactor * cluster.cubes / (squared * squared * distance);
-      sum.derivative += cluster.derivativeBound(distance);
+      cluster.addDerivative(sum, distance);
       sum.edgeDistance = std::min(sum.edgeDistance, nearest);
       ++sum.terms;
       n = cluster.next;
@@ -139,7 +143,9 @@ BoundaryEdges::Gradient BoundaryEdges::sum(const Vector3& local, double ratio) c
     }
   }
   constexpr double kSphere = 4 * std::numbers::pi;
-  return {sum.value / kSphere, sum.error / kSphere, sum.derivative / kSphere, sum.edgeDistance, sum.terms};
+  return {sum.value / kSphere,      sum.error / kSphere,
+          sum.derivative / kSphere, sum.derivativeByMoments / kSphere,
+          sum.edgeDistance,         sum.terms};
 }
 
 BoundaryEdges::Gradient BoundaryEdges::gradient(const Vector3& local, double error) const {

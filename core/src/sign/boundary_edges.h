@@ -39,8 +39,11 @@ class BoundaryEdges {
   /// The gradient of the winding number at a point. Lengths are in the hierarchy's local coordinates.
   struct Gradient {
     Vector3 value = Vector3::Zero();
-    double error = 0;                ///< bound of the distance between `value` and the exact sum
-    double derivative = 0;           ///< bound of the gradient's derivative in any direction
+    double error = 0;  ///< bound of the distance between `value` and the exact sum
+    /// The sum of these is a bound of the gradient's derivative in any direction. At another point, all distances to
+    /// edges and clusters are at least the share s of what they are here, where s is that of `edgeDistance`. The first
+    /// grows at most by 1/s³ then, the second by 1/s⁶.
+    double derivative = 0, derivativeByMoments = 0;
     double edgeDistance = HUGE_VAL;  ///< lower bound of the distance to the nearest unbalanced edge
     std::size_t terms = 0;           ///< number of edges and clusters that were summed
   };
@@ -77,10 +80,10 @@ class BoundaryEdges {
     /// Returns 4π times the cluster's contribution to the gradient, by the Taylor series. `toCenter` runs from
     /// the point to the cluster's center.
     Vector3 series(const Vector3& toCenter, double squaredDistance) const;
-    /// Returns a bound of 4π times the derivative of the cluster's contribution in any direction, at a point with this
+    /// Adds a bound of 4π times the derivative of the cluster's contribution in any direction, at a point with this
     /// distance from the cluster's center. Where the edges form closed loops, it is much smaller than the sum of the
     /// bounds of all edges.
-    double derivativeBound(double distance) const;
+    void addDerivative(Gradient& sum, double distance) const;
   };
 
   void addCluster(std::uint32_t begin, std::uint32_t end);

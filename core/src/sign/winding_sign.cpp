@@ -42,9 +42,10 @@ struct WindingSign::Sample {
   double clearance;  ///< lower bound of the distance to the triangles
   double distance;   ///< distance to the surface, including the surfaces that close holes
   bool inside;
-  double margin = 0;        ///< lower bound of |w − level_| for the winding number w
-  double gradient = 0;      ///< upper bound of the length of the winding number's gradient ∇w
-  double derivative = 0;    ///< upper bound of the derivative of ∇w in any direction
+  double margin = 0;    ///< lower bound of |w − level_| for the winding number w
+  double gradient = 0;  ///< upper bound of the length of the winding number's gradient ∇w
+  /// The sum of these is an upper bound of the derivative of ∇w in any direction (`BoundaryEdges::Gradient`).
+  double derivative = 0, derivativeByMoments = 0;
   double edgeDistance = 0;  ///< lower bound of the distance to the unbalanced edges, at least `clearance`
 
   /// Derives the sample for a point x, whose distances are known, from this sample. If x is too far away, the new
@@ -67,18 +68,21 @@ struct WindingSign::Sample {
 
  private:
   /// Returns the sample for a point x at the distance `step` from this sample. The distance to an unbalanced edge
-  /// shrinks at most by the factor 1 − step/edgeDistance. Therefore the bound of the gradient's derivative grows at
-  /// most by the inverse cube of this factor.
+  /// shrinks at most by the factor 1 − step/edgeDistance. Therefore the two bounds of the gradient's derivative grow at
+  /// most by the inverse third and sixth power of this factor.
   Sample movedBy(double step, const Vector3& x, double itsClearance, double itsDistance) const {
     const double nearer = 1 - step / edgeDistance;
-    const double changes = derivative / (nearer * nearer * nearer), steepest = gradient + changes * step;
+    const double cubed = nearer * nearer * nearer;
+    const double byLengths = derivative / cubed, byMoments = derivativeByMoments / (cubed * cubed);
+    const double steepest = gradient + (byLengths + byMoments) * step;
     return {x,
             itsClearance,
             itsDistance,
             inside,
             margin - steepest * step,
             steepest,
-            changes,
+            byLengths,
+            byMoments,
             std::max(edgeDistance - step, itsClearance)};
   }
 };
@@ -90,7 +94,7 @@ WindingSign::WindingSign(const bvh::Hierarchy& hierarchy, const TriangleMesh& me
 
 WindingSign::Sample WindingSign::sampleAt(const Vector3& x, double clearance, double distance) const {
   if (!std::isfinite(distance)) return {x, 0, distance, false};
-  if (edges_.empty()) return {x, clearance, distance, winding_.isAbove(x, level_), 0.5, 0, 0, HUGE_VAL};
+  if (edges_.empty()) return {x, clearance, distance, winding_.isAbove(x, level_), 0.5, 0, 0, 0, HUGE_VAL};
   const double scale = hierarchy_->scale();
   const auto gradientWithin = [&](double change) {
     return edges_.gradient(hierarchy_->local(x), change / (distance * scale));
@@ -111,6 +115,7 @@ WindingSign::Sample WindingSign::sampleAt(const Vector3& x, double clearance, do
           fromLevel(found) - found.error,
           slope + gradient.error * scale,
           gradient.derivative * scale * scale,
+          gradient.derivativeByMoments * scale * scale,
           std::max(gradient.edgeDistance / scale, clearance)};
 }
 

@@ -19,7 +19,7 @@ namespace hpsdf::render {
 /// * linearParts, RGBA32F: `SurfaceBounds::linear` of each node.
 /// * zones, RGBA32UI: x is `LookupGrid::blendExtents`; y, z and w are the members of `BlendZoneBounds`. This texture is
 ///   empty for a field without blending.
-/// * exactLists, R32UI: `ExactTriangles::lists`, with reference points relative to the domain's lower corner.
+/// * exactLists, R32UI: `ExactTriangles::lists`.
 /// * exactCorners, RGBA32F: three texels for each triangle of exact leaves. x, y and z are a corner, from the domain's
 ///   lower corner. The components w are the triangle's unit normal.
 class FieldUpload {

@@ -112,7 +112,7 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
 /// Throws `Error` unless all indices and coordinates of the exact leaves' triangles are in range.
 void checkExact(const ExactTriangles& exact) {
   const std::size_t vertices = std::visit([](const auto& v) { return v.size(); }, exact.vertices);
-  static constexpr double kLargest = 1e70;  // the fourth power of a length must be finite
+  static constexpr double kLargest = 1e18;  // products of two lengths must be finite in single precision
   const auto isInRange = [](const auto& vertex) {
     return (vertex.template cast<double>().cwiseAbs().array() <= kLargest).all();
   };

@@ -32,7 +32,8 @@ struct ListPart {
 
 /// Takes up to a chunk of triangles from a list, and keeps those that can be nearest to a point of the ball with this
 /// radius around the origin, in this octant of a leaf. Returns their number. `nearest` is an upper bound of the
-/// distance from the origin to the nearest triangle, and is lowered if one of these is nearer.
+/// distance from the origin to the nearest triangle, and is lowered if one of these is nearer, unless there are so few
+/// that they are not measured.
 std::uint32_t keepNearest(const CornerSource<Eigen::Vector3f>& source, ListPart& rest, int octant, float radius,
                           std::uint32_t* triangles, float& nearest);
 std::uint32_t keepNearest(const CornerSource<Eigen::Vector3d>& source, ListPart& rest, int octant, float radius,
