@@ -7,7 +7,11 @@
 #include <array>
 
 #include "cli_fixture.h"
+#include "console/failed.h"
+#include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/mesh_file.h"
+#include "hpsdf/verify.h"
 
 namespace hpsdf::app {
 namespace cli_build_test {
@@ -46,6 +50,46 @@ TEST_F(BuildCommand, normalizedCubeIsExact) {
   const Json plain = domainOf({});
   EXPECT_NEAR(plain[0][0].get<double>(), -0.05, 1e-12);
   EXPECT_NEAR(plain[1][2].get<double>(), 1.05, 1e-12);
+}
+
+TEST_F(BuildCommand, tellsTheErrorsOfTheFinishedField) {
+  const Outcome text = run({{"build", "builtin:torus", "-o", at("t.hpsdf"), "--target-error", "1e-4"}});
+  EXPECT_THAT(text.out, HasSubstr("measured: near the surface RMS "));
+  EXPECT_THAT(text.out, HasSubstr("% of the surface torn (mesh units)"));
+  const Outcome info = run({{"info", at("t.hpsdf"), "--json"}});
+  const Json measured = Json::parse(info.out).at("measured");
+  const Field field = load(at("t.hpsdf"));
+  const Measurement found = measure(field, ExactDistance(loadMesh("builtin:torus")));
+  EXPECT_EQ(measured.at("near").at("rms"), found.near.rms);
+  EXPECT_EQ(measured.at("domain").at("max"), found.domain.max);
+  EXPECT_EQ(measured.at("torn_share"), found.tornShare);
+  EXPECT_EQ(measured.at("wrong_signs"), 0);
+  EXPECT_THAT(run({{"info", at("t.hpsdf")}}).out,
+              AllOf(HasSubstr("error near surface"), HasSubstr("worst point"), HasSubstr("weighted estimate")));
+  ASSERT_EQ(run({{"smooth", at("t.hpsdf"), "-o", at("s.hpsdf")}}).status, 0);
+  EXPECT_TRUE(Json::parse(run({{"info", at("s.hpsdf"), "--json"}}).out).at("measured").is_null());
+  EXPECT_THAT(run({{"info", at("s.hpsdf")}}).out, HasSubstr("not since the field was changed"));
+}
+
+/// The construction compares estimates with the errors that are asked for; what counts is what is measured.
+TEST_F(BuildCommand, failsWhereTheMeasuredErrorExceedsTheOneAskedFor) {
+  const auto buildWith = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"build", "builtin:torus", "-o", at("t.hpsdf"), "--strategy",
+                                      "hp",    "--max-degree",  "2"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run({words});
+  };
+  const Outcome kept = buildWith({"--max-error", "0.05", "--target-error", "1e-4"});
+  EXPECT_EQ(kept.status, 0) << kept.err;
+  const Outcome missed = buildWith({"--max-error", "1e-3", "--target-error", "1e-4", "--max-depth", "1"});
+  EXPECT_EQ(missed.status, kExitFailed);
+  EXPECT_THAT(missed.err, HasSubstr("max-error: an error of "));
+  EXPECT_THAT(missed.err, HasSubstr("was measured, more than the 1e-3 that was asked for"));
+  EXPECT_GT(load(at("t.hpsdf")).metadata().measurement->domain.max, 1e-3) << "the field is kept";
+  const Outcome near = buildWith({"--near-error", "1e-5", "--far-error", "1e-3", "--max-depth", "1", "--json"});
+  EXPECT_EQ(near.status, kExitFailed);
+  EXPECT_THAT(near.err, HasSubstr("near-error: an RMS error near the surface of "));
+  EXPECT_FALSE(Json::parse(near.out).at("measured").is_null());
 }
 
 TEST_F(BuildCommand, analyticShapesAreNormalizedToo) {

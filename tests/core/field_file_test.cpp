@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
+#include "hpsdf/verify.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
@@ -179,9 +181,10 @@ std::string withChecksum(std::string bytes) {
 }
 
 constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8,
-                      kSinceVersion5 = 8 + 4 + 8 + 4 + 4 * 8;  // bytes that versions 3, 4 and 5 added
+                      kSinceVersion6 = 8 + 4 + 8 + 4 + 4 * 8 + 8;  // bytes that versions 3, 4 and 6 added
 
-/// Older files end their headers earlier: version 4 before the settings and sizes of exact leaves, version 3 before the
+/// Older files end their headers earlier: version 4 before settings and sizes of exact leaves and before the number of
+/// measured points, version 3 before the
 /// inside test, version 2 before the settings that follow the number of steps, and version 1 before the number of
 /// steps.
 TEST(FieldFile, filesOfOlderVersionsAreRead) {
@@ -195,14 +198,14 @@ TEST(FieldFile, filesOfOlderVersionsAreRead) {
   const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
   bytes[8] = 4;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion5, kSinceVersion5)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion6, kSinceVersion6)));
   EXPECT_EQ(load(file).metadata().source.insideTest, field.metadata().source.insideTest);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
   bytes[8] = 3;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion5 - kSinceVersion4, kSinceVersion4)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion6 - kSinceVersion4, kSinceVersion4)));
   EXPECT_EQ(load(file).metadata().measuredError, field.metadata().measuredError);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
-  const std::size_t sinceSteps = nodes - kSinceVersion5 - kSinceVersion4 - kSinceVersion3;
+  const std::size_t sinceSteps = nodes - kSinceVersion6 - kSinceVersion4 - kSinceVersion3;
   bytes[8] = 2;
   writeAll(file, withChecksum(bytes.erase(sinceSteps, kSinceVersion3)));
   EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
@@ -216,6 +219,44 @@ TEST(FieldFile, filesOfOlderVersionsAreRead) {
   EXPECT_EQ(old.data().coefficients, field.data().coefficients);
   save(old, file);
   EXPECT_EQ(load(file).metadata().steps, std::nullopt) << "what is unknown stays so";
+}
+
+TEST(FieldFile, theMeasurementIsKept) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "measured.hpsdf";
+  const Measurement measurement{.points = 20000,
+                                .nearDistance = 0.01,
+                                .near = {.rms = 1e-4, .max = 2e-3},
+                                .domain = {.rms = 3e-4, .max = 4e-3},
+                                .wrongSigns = 5,
+                                .signThreshold = 1e-3,
+                                .tornShare = 0.0625,
+                                .worst = {0.25, -0.5, 0.75}};
+  save(withMeasurement(small(), measurement), file);
+  const std::optional<Measurement> found = load(file).metadata().measurement;
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->points, measurement.points);
+  EXPECT_EQ(found->nearDistance, measurement.nearDistance);
+  EXPECT_EQ(found->near.rms, measurement.near.rms);
+  EXPECT_EQ(found->near.max, measurement.near.max);
+  EXPECT_EQ(found->domain.rms, measurement.domain.rms);
+  EXPECT_EQ(found->domain.max, measurement.domain.max);
+  EXPECT_EQ(found->wrongSigns, measurement.wrongSigns);
+  EXPECT_EQ(found->signThreshold, measurement.signThreshold);
+  EXPECT_EQ(found->tornShare, measurement.tornShare);
+  EXPECT_EQ(found->worst, measurement.worst);
+  EXPECT_EQ(load(file).data().nodes, small().data().nodes);
+}
+
+/// Fields of version 5 were written during the development of version 0.2.0 and have other lists.
+TEST(FieldFile, versionFiveIsRefused) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "five.hpsdf";
+  save(small(), file);
+  std::string bytes = readAll(file);
+  bytes[8] = 5;
+  writeAll(file, withChecksum(bytes));
+  EXPECT_NE(refusal(file).find("version 5"), std::string::npos);
 }
 
 TEST(FieldFile, continuityAndBoundsAreKept) {
@@ -261,7 +302,7 @@ TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   const std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(data.coefficients).size(), count = data.nodes.size();
   const std::size_t bounds = bytes.size() - 8 - 8 * count,
-                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion5;
+                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion6;
   const auto refused = [&](std::size_t at, auto value) {
     std::string forged = bytes;
     std::memcpy(&forged[at], &value, sizeof(value));

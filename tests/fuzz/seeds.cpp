@@ -13,6 +13,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/verify.h"
 #include "target.h"
 
 namespace {
@@ -23,6 +24,19 @@ namespace fs = std::filesystem;
 void write(const fs::path& file, const std::string& bytes) {
   fs::create_directories(file.parent_path());
   std::ofstream(file, std::ios::binary) << bytes;
+}
+
+/// Returns two octahedra that intersect each other, so that the signs of exact leaves follow from the winding number.
+TriangleMesh overlappingOctahedra() {
+  TriangleMesh mesh = fuzz::octahedron();
+  const std::size_t vertices = mesh.vertices.size(), triangles = mesh.triangles.size();
+  for (std::size_t v = 0; v < vertices; ++v) mesh.vertices.push_back(mesh.vertices[v] + Vector3(0.15, 0.1, 0.05));
+  for (std::size_t t = 0; t < triangles; ++t) {
+    Triangle triangle = mesh.triangles[t];
+    for (std::uint32_t& corner : triangle) corner += static_cast<std::uint32_t>(vertices);
+    mesh.triangles.push_back(triangle);
+  }
+  return mesh;
 }
 
 void writeFields(const fs::path& folder) {
@@ -44,18 +58,22 @@ void writeFields(const fs::path& folder) {
   add("h2", [](BuildOptions& o) { o.targetError = 1e-3, o.strategy = Strategy::h2, o.criterion = Criterion::optimal; });
   add("cell", [](BuildOptions& o) { o.grid = {1, 1, 1}, o.maxSteps = 0; });
   const ExactDistance octahedron(fuzz::octahedron(), {.insideTest = InsideTest::pseudonormal, .threads = 1});
-  const auto addExact = [&](const std::string& name, const auto& change) {
+  const ExactDistance overlapping(overlappingOctahedra(), {.threads = 1});
+  const auto addExact = [&](const std::string& name, const ExactDistance& distance, const auto& change) {
     BuildOptions options = plain;
     options.grid = {3, 3, 3};
     options.strategy = Strategy::hpx;
     options.exactTriangles = 6;
     options.coefficients = CoefficientType::float32;
     change(options);
-    save(build(octahedron, fuzz::domain(), options), folder / (name + ".hpsdf"));
+    save(build(distance, fuzz::domain(), options), folder / (name + ".hpsdf"));
   };
-  addExact("exact", [](BuildOptions&) {});
-  addExact("exact-double", [](BuildOptions& o) { o.coefficients = CoefficientType::float64; });
-  addExact("exact-blended", [](BuildOptions& o) { o.blend = 0.1, o.bounds = true; });
+  addExact("exact", octahedron, [](BuildOptions&) {});
+  addExact("exact-double", octahedron, [](BuildOptions& o) { o.coefficients = CoefficientType::float64; });
+  addExact("exact-blended", octahedron, [](BuildOptions& o) { o.blend = 0.1, o.bounds = true; });
+  addExact("exact-winding", overlapping, [](BuildOptions& o) { o.exactTriangles = 16; });
+  save(withMeasurement(load(folder / "exact.hpsdf"), measure(load(folder / "exact.hpsdf"), octahedron)),
+       folder / "measured.hpsdf");
   add("wide", [](BuildOptions& o) { o.grid = {5, 4, 3}, o.maxDegree = 1, o.maxDepth = 0; });
 }
 

@@ -352,6 +352,7 @@ class Batch {
                  {"bytes", value("bytes")},
                  {"file_bytes", value("file_bytes")},
                  {"rms_estimate", value("rms_estimate")},
+                 {"measured", value("measured")},
                  {"sign", made.field ? field.at("mesh").at("sign") : Json()},
                  {"error", made.status == Status::failed ? Json(made.error) : Json()}};
     if (field.contains("exact_leaves")) line["exact_leaves"] = field["exact_leaves"];

@@ -8,6 +8,7 @@
 #include "console/long_work.h"
 #include "console/progress_line.h"
 #include "construction/surface.h"
+#include "hpsdf/verify.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -47,6 +48,14 @@ Checkpoint checkpointAt(const Console& console, const std::filesystem::path& fil
   return checkpoint;
 }
 
+/// Measures a finished field, near the surface as far as the errors near it were asked for.
+Field measured(Field field, const BuildInput& input, const Progress& progress) {
+  const MeasureOptions options{.near = input.options.targetError.byDistance().nearDistance,
+                               .threads = input.options.threads};
+  const Measurement measurement = measure(field, *input.exact, options, progress);
+  return withMeasurement(std::move(field), measurement);
+}
+
 }  // namespace
 
 std::filesystem::path checkpointOf(const std::filesystem::path& output) { return output.string() + ".checkpoint"; }
@@ -79,9 +88,10 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
   const auto construct = [&]() -> BuiltField {
     const auto start = std::chrono::steady_clock::now();
     Field field = withProgress(console, [&](const Progress& progress) {
-      if (checkpoint.empty()) return build(*input.exact, input.domain, input.options, progress);
-      return buildResumably(*input.exact, input.domain, input.options, checkpointAt(console, checkpoint, arguments),
-                            progress);
+      if (checkpoint.empty())
+        return measured(build(*input.exact, input.domain, input.options, progress), input, progress);
+      const Checkpoint state = checkpointAt(console, checkpoint, arguments);
+      return measured(buildResumably(*input.exact, input.domain, input.options, state, progress), input, progress);
     });
     warnOfErrorLeft(console, field.metadata());
     if (input.options.bounds) warnOfBounds(console, input.mesh);

@@ -29,13 +29,13 @@ struct BuiltField {
   Field field;
   std::shared_ptr<const DistanceFunction> exact;  ///< the exact distance that the field approximates
   std::optional<MeshReport> mesh;                 ///< empty for an analytic shape
-  double seconds = 0;                             ///< time to set up the distance function and build the field
+  double seconds = 0;  ///< time to set up the distance function, to build the field and to measure it
 };
 
-/// Loads the surface and builds its field. Progress and warnings go to the console's `err`. If `checkpoint` names a
-/// file, the construction saves its state in this file, and continues from a state that an earlier call saved there.
-/// The arguments must then include those of `checkpointParameters`. Throws `Error` naming `surface`, and `Cancelled`
-/// after Ctrl-C.
+/// Loads the surface, builds its field and measures it. Progress and warnings go to the console's `err`. If
+/// `checkpoint` names a file, the construction saves its state in this file, and continues from a state that an earlier
+/// call saved there. The arguments must then include those of `checkpointParameters`. Throws `Error` naming `surface`,
+/// and `Cancelled` after Ctrl-C.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 

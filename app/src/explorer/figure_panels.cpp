@@ -127,8 +127,14 @@ void drawStatistics(Ui& ui, Explorer& explorer) {
       {"coefficients", grouped(figures.coefficients)},
       {"memory", bytesText(double(figures.bytes))},
       {"target error", shortNumber(field.metadata().settings.targetError.weighted())},
-      {"RMS estimate", shortNumber(field.metadata().rmsEstimate(field.domain()))},
   };
+  if (const std::optional<Measurement>& m = field.metadata().measurement) {
+    rows.emplace_back("RMS error near surface", shortNumber(m->near.rms));
+    rows.emplace_back("greatest near surface", shortNumber(m->near.max));
+    rows.emplace_back("RMS error over domain", shortNumber(m->domain.rms));
+    rows.emplace_back("greatest over domain", shortNumber(m->domain.max));
+    rows.emplace_back("torn surface, %", shortNumber(100 * m->tornShare));
+  }
   if (figures.exact.leaves > 0) {
     rows.emplace_back("exact cells", grouped(figures.exact.leaves));
     rows.emplace_back("exact triangles", grouped(figures.exact.triangles));

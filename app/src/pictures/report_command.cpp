@@ -104,7 +104,6 @@ ReportPicture drawInto(const fs::path& folder, Session& session, render::Rendere
 std::vector<std::pair<std::string, std::string>> figures(const Field& field, const FieldStatistics& counts,
                                                          const BuiltField* built) {
   const FieldMetadata& metadata = field.metadata();
-  const double rms = metadata.rmsEstimate(field.domain());
   std::vector<std::pair<std::string, std::string>> rows;
   if (metadata.source.faces > 0)
     rows.emplace_back("Mesh", fmt::format("{}: {} vertices, {} faces", metadata.source.name,
@@ -122,8 +121,17 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   rows.emplace_back("Target error τ", shortNumber(metadata.settings.targetError.weighted()));
   rows.emplace_back("Total error ε",
                     fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));
-  rows.emplace_back("Estimated RMS error", fmt::format("{} in mesh units, {} of the mesh's longest side",
-                                                       shortNumber(rms), shortNumber(rms / metadata.referenceLength)));
+  if (const std::optional<Measurement>& m = metadata.measurement) {
+    const auto errorText = [&](const Measurement::Error& error) {
+      return fmt::format("RMS {}, greatest {}; over the longest side {}, {}", shortNumber(error.rms),
+                         shortNumber(error.max), shortNumber(error.rms / metadata.referenceLength),
+                         shortNumber(error.max / metadata.referenceLength));
+    };
+    rows.emplace_back("Error near the surface", errorText(m->near));
+    rows.emplace_back("Error over the domain", errorText(m->domain));
+    rows.emplace_back("Wrong signs", fmt::format("{} of {} points", grouped(m->wrongSigns), grouped(m->points)));
+    rows.emplace_back("Torn", fmt::format("{} % of the surface", shortNumber(100 * m->tornShare)));
+  }
   rows.emplace_back("Exact distances taken", grouped(metadata.exactEvaluations));
   if (built != nullptr) rows.emplace_back("Construction", fmt::format("{:.1f} s", built->seconds));
   return rows;
@@ -152,9 +160,8 @@ void runReport(Session& session, const Arguments& arguments) {
 
   const FieldStatistics counts = statistics(field);
   ReportPage page{.title = fmt::format("{} as an hp-adaptive signed distance field", plainName(current.name)),
-                  .subtitle = fmt::format("{} leaf cells{}, {}, estimated RMS error {}", grouped(counts.leaves),
-                                          exactCountText(counts), bytesText(double(counts.bytes)),
-                                          shortNumber(field.metadata().rmsEstimate(field.domain()))),
+                  .subtitle = fmt::format("{} leaf cells{}, {}, {}", grouped(counts.leaves), exactCountText(counts),
+                                          bytesText(double(counts.bytes)), measuredText(field)),
                   .figures = figures(field, counts, built ? &*built : nullptr),
                   .degrees = counts.degreeVolume,
                   .depths = counts.depthVolume,

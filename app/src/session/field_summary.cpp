@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/build_settings.h"
@@ -96,6 +97,7 @@ Json fieldJson(const CurrentField& current) {
                {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
                {"total_error", metadata.totalError},
                {"rms_estimate", metadata.rmsEstimate(field.domain())},
+               {"measured", measuredJson(field)},
                {"rounding_rms", metadata.roundingRms},
                {"exact_evaluations", metadata.exactEvaluations},
                {"steps", metadata.steps ? Json(*metadata.steps) : Json()},
@@ -129,11 +131,41 @@ Json fieldJson(const CurrentField& current) {
   return json;
 }
 
+/// Returns the unit of a field's lengths in parentheses.
 std::string unitText(const Field& field) {
   const double scale = field.metadata().source.normalization.scale;
-  if (scale == 1) return " (mesh units)";
-  return fmt::format(" (normalized; {} in mesh units)",
-                     shortNumber(field.metadata().rmsEstimate(field.domain()) / scale));
+  return scale == 1 ? " (mesh units)" : fmt::format(" (normalized: {} mesh units each)", shortNumber(1 / scale));
+}
+
+std::string errorText(const Measurement::Error& error) {
+  return fmt::format("RMS {}, greatest {}", shortNumber(error.rms), shortNumber(error.max));
+}
+
+std::string tornText(const Measurement& m) {
+  return fmt::format("{} % of the surface torn", shortNumber(100 * m.tornShare));
+}
+
+std::string wrongSignsText(const Measurement& m) {
+  return fmt::format("{} of {} points beyond {} on the wrong side", grouped(m.wrongSigns), grouped(m.points),
+                     shortNumber(m.signThreshold));
+}
+
+std::string measuredText(const Field& field) {
+  const std::optional<Measurement>& m = field.metadata().measurement;
+  if (!m) return "not measured";
+  return fmt::format("near the surface {}; over the domain {}{}{}{}", errorText(m->near), errorText(m->domain),
+                     m->wrongSigns > 0 ? "; " + wrongSignsText(*m) : "", m->tornShare > 0 ? "; " + tornText(*m) : "",
+                     unitText(field));
+}
+
+Json measuredJson(const Field& field) {
+  const std::optional<Measurement>& m = field.metadata().measurement;
+  if (!m) return {};
+  const auto errorJson = [](const Measurement::Error& error) { return Json{{"rms", error.rms}, {"max", error.max}}; };
+  return {{"points", m->points},          {"near_distance", m->nearDistance},
+          {"near", errorJson(m->near)},   {"domain", errorJson(m->domain)},
+          {"wrong_signs", m->wrongSigns}, {"sign_threshold", m->signThreshold},
+          {"torn_share", m->tornShare},   {"worst_point", vectorJson(m->worst)}};
 }
 
 std::string exactCountText(const FieldStatistics& figures) {
@@ -211,7 +243,16 @@ std::string fieldText(const CurrentField& current) {
   row("error, target",
       fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),
                   shortNumber(metadata.settings.targetError.weighted())));
-  row("estimated RMS error", shortNumber(metadata.rmsEstimate(field.domain())) + unitText(field));
+  if (const std::optional<Measurement>& m = metadata.measurement) {
+    row("error near surface", fmt::format("{}, within {} of the surface{}", errorText(m->near),
+                                          shortNumber(m->nearDistance), unitText(field)));
+    row("error over domain", errorText(m->domain) + unitText(field));
+    row("worst point", vectorText(m->worst));
+    row("signs, cracks", wrongSignsText(*m) + "; " + tornText(*m));
+  } else {
+    row("measured", "not since the field was changed; 'hpsdf verify' measures it");
+  }
+  row("weighted estimate", shortNumber(metadata.rmsEstimate(field.domain())) + ", √(ε/|Ω|)" + unitText(field));
   if (field.singlePrecision()) row("change by float", shortNumber(metadata.roundingRms) + " RMS");
   row("exact distances", grouped(metadata.exactEvaluations));
   if (metadata.steps) row("refinement steps", grouped(*metadata.steps));

@@ -26,8 +26,13 @@ Json boundsJson(const Field& field);
 Json fieldJson(const CurrentField& current);
 std::string fieldText(const CurrentField& current);
 
-/// Returns the unit of the estimated RMS error in parentheses: mesh units or normalized units.
-std::string unitText(const Field& field);
+/// Returns the measured errors of a field as text: "near the surface RMS 2.06e-4, greatest 3.12e-3; over the domain RMS
+/// 1.83e-4, greatest 4.57e-3; 2.57 % of the surface torn (mesh units)". Wrong signs are told if there are any. Returns
+/// "not measured" for a field that was changed after it was measured, or that an earlier version made.
+std::string measuredText(const Field& field);
+
+/// Returns the measured errors of a field as JSON. Returns null if the field was not measured.
+Json measuredJson(const Field& field);
 
 /// Returns the size of a field as text: "54,935 leaves, 460,210 coefficients (float), 2.3 MB". If the field has exact
 /// leaves, the text also has their number, the number of their triangles and the bytes of the field's parts.

@@ -66,7 +66,8 @@ class Field {
   bool singlePrecision() const { return data_.coefficients.index() == 1; }
 
   /// Returns the arrays that make up the field, for files, uploads to a GPU and tests.
-  const FieldData& data() const { return data_; }
+  const FieldData& data() const& { return data_; }
+  FieldData data() && { return std::move(data_); }
 
   /// Returns the grid in which queries start their descent of the octree, for uploads to a GPU and tests.
   const LookupGrid& lookupGrid() const { return lookupGrid_; }

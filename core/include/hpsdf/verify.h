@@ -73,6 +73,25 @@ struct WorstPoint {
   double error() const { return value > exact ? value - exact : exact - value; }
 };
 
+/// Options of `measure`. The points depend on the seed, not on the number of threads.
+struct MeasureOptions {
+  /// Number of random points, half of them near the surface; 0: a tenth of the points at which the construction
+  /// evaluated Φ, but 20,000 to 100,000, so that measuring takes a small part of the construction's time.
+  std::size_t points = 0;
+  double near = 0;  ///< greatest distance of points near the surface from it; 0: 1 % of the surface's longest side
+  std::uint64_t seed = 1;
+  int threads = 0;  ///< greatest number of threads; 0: all that the machine offers
+};
+
+/// Measures the errors of a field against the signed distance Φ (`distance`) that it approximates. Without triangles,
+/// points near the surface are those of the domain at which |Φ| is small, and no share of the surface is torn. Throws
+/// `Error` if Φ is not finite, and `Cancelled` when `progress` says so.
+Measurement measure(const Field& field, const DistanceFunction& distance, const MeasureOptions& options = {},
+                    const Progress& progress = {});
+
+/// Returns the field with a measurement of it in its metadata.
+Field withMeasurement(Field field, const Measurement& measurement);
+
 struct VerifyOptions {
   std::size_t points = 1'000'000;     ///< number of samples, half uniform, half near the surface; at least 2
   std::uint64_t seed = 1;             ///< seed of the random points

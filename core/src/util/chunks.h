@@ -60,6 +60,15 @@ void forEachChunk(std::size_t items, std::size_t size, const Progress& progress,
   });
 }
 
+/// Returns a callback that maps the progress of one task to the range `from` to `to` of the whole progress, which must
+/// outlive it.
+inline Progress partOf(const Progress& whole, double from, double to) {
+  if (!whole.report) return whole;
+  return {.report = [&whole, from, to](std::string_view task,
+                                       double done) { whole.report(task, from + done * (to - from)); },
+          .cancelled = whole.cancelled};
+}
+
 /// Count, sum, sum of squares and maximum of non-negative values.
 struct Sums {
   std::size_t count = 0;

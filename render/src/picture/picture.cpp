@@ -151,14 +151,15 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
 /// Adds facts about the field to the panel, in place of the legend of a picture without a colour scale.
 void addFieldFacts(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures) {
   static const std::string titles[] = {"hp distance field", "field"};
-  const std::pair<std::string, std::string> facts[] = {
-      {"cells", formatCount(figures.leaves)},
-      {"degrees", describeLevels(figures.degreeVolume)},
-      {"depths", describeLevels(figures.depthVolume)},
-      {"coefficients", formatCount(figures.coefficients)},
+  std::vector<std::pair<std::string, std::string>> facts = {
+      {"cells", formatCount(figures.leaves)},          {"degrees", describeLevels(figures.degreeVolume)},
+      {"depths", describeLevels(figures.depthVolume)}, {"coefficients", formatCount(figures.coefficients)},
       {"memory", describeBytes(figures.bytes)},
-      {"RMS estimate", formatNumber(field.metadata().rmsEstimate(field.domain()), 3)},
   };
+  if (const std::optional<Measurement>& m = field.metadata().measurement) {
+    facts.emplace_back("near RMS", formatNumber(m->near.rms, 3));
+    facts.emplace_back("near max", formatNumber(m->near.max, 3));
+  }
   addFacts(overlay, frame, titles, facts);
 }
 

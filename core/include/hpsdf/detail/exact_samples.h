@@ -32,6 +32,10 @@ struct SampleOptions {
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band = 0,
                            const SampleOptions& options = {}, const Progress& progress = {});
 
+/// Draws random points of a surface, uniformly by area. Points outside the domain are left out. Throws `Error` if the
+/// surface has no area.
+std::vector<Vector3> sampleSurface(const TriangleMesh& surface, const Box& domain, const SampleOptions& options = {});
+
 /// Draws random points near a surface and evaluates the signed distance Φ (`distance`) at them. Each point is a
 /// uniformly distributed point of the surface plus a vector that is uniformly distributed in a ball of `radius` (above
 /// 0). A point outside the domain is drawn again. Throws `Error` if hardly any point lies in the domain, if the surface

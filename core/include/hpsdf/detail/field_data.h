@@ -14,6 +14,26 @@
 
 namespace hpsdf {
 
+/// The errors |f − Φ| of a finished field f, measured at random points (`measure` in verify.h). Lengths are in the
+/// field's own units.
+struct Measurement {
+  struct Error {
+    double rms = 0;
+    double max = 0;
+  };
+
+  std::uint64_t points = 0;      ///< number of random points, half of them near the surface, half in the domain
+  double nearDistance = 0;       ///< greatest distance of the points near the surface from it
+  Error near;                    ///< errors near the surface
+  Error domain;                  ///< errors at points that are uniform in the domain or, if there is one, in the band
+  std::uint64_t wrongSigns = 0;  ///< points at which f and Φ have different signs and |Φ| exceeds `signThreshold`
+  double signThreshold = 0;
+  /// Share of the surface's area that is torn: the area of the cracks between cells, as wide as f jumps there, over the
+  /// area of the surface. It is 0 for a surface without triangles and for a blended field.
+  double tornShare = 0;
+  Vector3 worst = Vector3::Zero();  ///< the random point with the greatest error
+};
+
 /// The record of how a field was built. It is stored with the field, and the command `info` shows it. Lengths
 /// are in the field's own units.
 struct FieldMetadata {
@@ -34,6 +54,8 @@ struct FieldMetadata {
   /// in the cells; 0 if no maximum error was asked for. The effect of rounding is included if it exceeds a hundredth of
   /// the maximum error.
   double measuredError = 0;
+  /// What `measure` found of this field. It is std::nullopt if the field was not measured, or was changed afterwards.
+  std::optional<Measurement> measurement = {};
 
   /// Returns the estimated RMS error of the field over the domain, at the end of the construction: √(ε·(L/2)^5 / V)
   /// with the error ε (`totalError`), the surface's size L (`referenceLength`) and the domain's volume V.

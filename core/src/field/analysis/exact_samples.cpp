@@ -168,6 +168,19 @@ ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, 
   });
 }
 
+std::vector<Vector3> sampleSurface(const TriangleMesh& surface, const Box& domain, const SampleOptions& options) {
+  const SurfacePoints surfacePoints(surface);
+  return withThreads(options.threads, [&] {
+    std::vector<Vector3> points(options.count);
+    tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
+      detail::Random random(options.seed, n);
+      points[n] = surfacePoints.draw(random);
+    });
+    std::erase_if(points, [&](const Vector3& x) { return !domain.contains(x); });
+    return permuted(points, mortonOrder(points, domain));
+  });
+}
+
 ExactSamples sampleNear(const DistanceFunction& distance, const TriangleMesh& surface, const Box& domain, double radius,
                         const SampleOptions& options, const Progress& progress) {
   const SurfacePoints points(surface);

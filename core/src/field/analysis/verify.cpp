@@ -198,14 +198,6 @@ void checkOptions(const VerifyOptions& options) {
       throw Error("verify: a length is below 0 or not finite; give near, band and sign bound as 0 or more");
 }
 
-/// Returns a callback that maps the progress of one task to the range `from` to `to` of the whole progress.
-Progress part(const Progress& progress, double from, double to) {
-  if (!progress.report) return progress;
-  return {.report = [&progress, from, to](std::string_view task,
-                                          double done) { progress.report(task, from + done * (to - from)); },
-          .cancelled = progress.cancelled};
-}
-
 }  // namespace
 
 ErrorFigures measureError(const Field& field, const ExactSamples& samples, int threads) {
@@ -232,10 +224,10 @@ Verification verify(const Field& field, const VerifiedSurface& surface, const Ve
   Sampled uniform, near;
   uniform.samples = sampleUniform(surface.distance, field.domain(), options.band,
                                   {.count = options.points - half, .seed = options.seed, .threads = options.threads},
-                                  part(progress, 0, 0.5));
-  near.samples =
-      sampleNear(surface.distance, surface.mesh, field.domain(), result.near,
-                 {.count = half, .seed = ~options.seed, .threads = options.threads}, part(progress, 0.5, 0.8));
+                                  detail::partOf(progress, 0, 0.5));
+  near.samples = sampleNear(surface.distance, surface.mesh, field.domain(), result.near,
+                            {.count = half, .seed = ~options.seed, .threads = options.threads},
+                            detail::partOf(progress, 0.5, 0.8));
 
   return withThreads(options.threads, [&] {
     for (Sampled* kind : {&uniform, &near}) kind->found = fieldAt(field, kind->samples.points);

@@ -183,6 +183,7 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
   if (field.metadata().settings.continuityWeight)
     throw Error("the field is weakly continuous already: take it as it was before, or build it anew");
   FieldData data = field.data();
+  data.metadata.measurement.reset();
   query::toDouble(data);
   const continuity::WeakContinuityFigures figures =
       withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
@@ -198,6 +199,7 @@ Field blended(const Field& field, double width) {
     throw Error("blend zones of a width of " + std::to_string(width) + " edges are out of range: give 0 to 0.25");
   FieldData data = field.data();
   data.blend = width;
+  data.metadata.measurement.reset();
   data.bounds.clear();  // The bounds depend on which leaves contribute at a point, and blending changes this.
   return Field(std::move(data));
 }

@@ -21,8 +21,9 @@ namespace {
 // the file was transferred as text.
 constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
-// and criteria; version 4 the inside test; version 5 exact leaves.
-constexpr std::uint32_t kFieldVersion = 5;
+// and criteria; version 4 the inside test; version 6 exact leaves and the measurement.
+// Version 5 was never released.
+constexpr std::uint32_t kFieldVersion = 6;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
 constexpr detail::FileKind kFieldFile{"field file", "a .hpsdf file", "build or copy it again"};
@@ -104,6 +105,20 @@ void settingItems(Stream& stream, Settings& settings, int first, int last) {
     settingItem(stream, *std::ranges::find(buildSettings(), position, &BuildSetting::storedAt), settings);
 }
 
+/// Writes or reads the measurement of a field. If there is none, its number of points is 0, and nothing follows.
+/// `Optional` is const for writing.
+template <typename Stream, typename Optional>
+void measurementItem(Stream& stream, Optional& measurement) {
+  Measurement m = measurement.value_or(Measurement{});
+  stream.item(m.points);
+  if (m.points == 0) return;
+  for (double* number : {&m.nearDistance, &m.near.rms, &m.near.max, &m.domain.rms, &m.domain.max}) stream.item(*number);
+  stream.item(m.wrongSigns);
+  for (double* number : {&m.signThreshold, &m.tornShare, &m.worst.x(), &m.worst.y(), &m.worst.z()})
+    stream.item(*number);
+  if constexpr (!std::is_const_v<Optional>) measurement = m;
+}
+
 /// Writes or reads every scalar of the file after its magic bytes and version, in order. `Data` is const for
 /// writing.
 template <typename Stream, typename Data, typename SizesRef>
@@ -149,6 +164,8 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(sizes.triangles);
   stream.item(sizes.lists);
   stream.item(data.exact.offset);
+  if (version < 6) return;
+  measurementItem(stream, m.measurement);
 }
 
 /// Reads an array of `size` numbers of type float or double, whose size in bytes is `bytes`, into a variant of vectors.
@@ -185,8 +202,9 @@ Field load(const std::filesystem::path& file) {
   if (!version)
     reader.refuse(std::string("is not a .hpsdf file") + (isTooShort ? " (too short)" : "") +
                   "; build one with `hpsdf build`");
-  if (*version == 0 || *version > kFieldVersion)
-    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to " +
+  constexpr std::uint32_t kNeverReleased = 5;
+  if (*version == 0 || *version > kFieldVersion || *version == kNeverReleased)
+    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to 4 and " +
                   std::to_string(kFieldVersion) + "; build it again");
   FieldData data;
   Sizes sizes;
