@@ -100,7 +100,7 @@ TEST(AutomaticStrategy, allowsForTheErrorOfEstimatesFromSamples) {
 }
 
 TEST(AutomaticStrategy, doesNotDependOnTheNumberOfThreads) {
-  const TriangleMesh gear = shapes::mesh("gear,teeth=24,segments=24");
+  const TriangleMesh gear = shapes::mesh("gear,teeth=16,segments=10");
   const ExactDistance distance(gear);
   const Strategy one =
       build(distance, domainAround(gear), {.targetError = 1e-2, .threads = 1}).metadata().settings.strategy;
