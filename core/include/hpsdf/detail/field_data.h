@@ -54,7 +54,8 @@ struct FieldMetadata {
   /// in the cells; 0 if no maximum error was asked for. The effect of rounding is included if it exceeds a hundredth of
   /// the maximum error.
   double measuredError = 0;
-  /// What `measure` found of this field. It is std::nullopt if the field was not measured, or was changed afterwards.
+  /// The result of `measure` for this field. It is std::nullopt if the field was not measured or was changed
+  /// afterwards.
   std::optional<Measurement> measurement = {};
 
   /// Returns the estimated RMS error of the field over the domain, at the end of the construction: √(ε·(L/2)^5 / V)
