@@ -92,6 +92,29 @@ TEST_F(BuildCommand, failsWhereTheMeasuredErrorExceedsTheOneAskedFor) {
   EXPECT_FALSE(Json::parse(near.out).at("measured").is_null());
 }
 
+TEST_F(BuildCommand, tolerancesAreLengthsOrPercentages) {
+  const auto buildWith = [&](const std::string& mesh, const std::vector<std::string>& options) {
+    std::vector<std::string> words = {"build", mesh, "-o", at("t.hpsdf"), "--grid", "3"};
+    words.insert(words.end(), options.begin(), options.end());
+    return run({words});
+  };
+  // The box of this torus is 2 long.
+  const Outcome kept = buildWith("builtin:torus,major=0.75,minor=0.25", {"--tolerance", "1%"});
+  EXPECT_EQ(kept.status, 0) << kept.err;
+  EXPECT_THAT(kept.out, HasSubstr("tolerance: 0.02 within 0.1 of the surface"));
+  EXPECT_THAT(kept.out, HasSubstr("kept, errors reach "));
+  const std::vector<std::uint64_t> nodes = load(at("t.hpsdf")).data().nodes;
+  EXPECT_THAT(run({{"info", at("t.hpsdf")}}).out, HasSubstr("0.02 within 0.1 of the surface"));
+  ASSERT_EQ(buildWith("builtin:torus,major=0.75,minor=0.25", {"--tolerance", "0.02", "--within", "5%"}).status, 0);
+  EXPECT_EQ(load(at("t.hpsdf")).data().nodes, nodes);
+  const Outcome larger = buildWith("builtin:gear", {"--tolerance", "0.2%", "--json"});
+  ASSERT_EQ(larger.status, 0) << larger.err;
+  EXPECT_THAT(larger.err, HasSubstr("note: the field will take about "));
+  const Json measured = Json::parse(larger.out).at("measured");
+  EXPECT_LE(measured.at("tolerance_ratio"), 1);
+  EXPECT_EQ(measured.at("beyond_tolerance"), 0);
+}
+
 TEST_F(BuildCommand, analyticShapesAreNormalizedToo) {
   const Outcome built = run({{"build", "analytic:sphere,radius=0.25", "-o", at("s.hpsdf"), "--normalize",
                               "--target-error", "1e-5", "--grid", "3"}});
@@ -249,9 +272,15 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   refused({"--near-distance", "0.1"}, "near-distance belongs to near-error");
   refused({"--max-bytes", "1e3"}, "the base grid alone takes more than 1000 bytes");
   // `hpsdf study` refuses options that would have no effect or another meaning than in `hpsdf build`.
-  for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
+  refused({"--within", "0.1"}, "within belongs to tolerance");
+  refused({"--certified"}, "certified belongs to tolerance");
+  refused({"--tolerance", "0.1", "--strategy", "hp"}, "strategy has no effect with tolerance");
+  refused({"--tolerance", "0.1", "--target-error", "1e-3"}, "target-error and tolerance exclude each other");
+  refused({"--tolerance", "0.1", "--checkpoint"}, "no checkpoint");
+  refused({"--tolerance", "0.1x"}, "expected a number above 0, or a percentage, found '0.1x'");
+  for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--tolerance=1%"})
     expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");
-  for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
+  for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--tolerance=1%"})
     expectRefused({{"study", "convergence", "builtin:torus", "-o", at("study"), option}},
                   "not for 'study convergence'");
 }

@@ -131,11 +131,11 @@ void expectEqual(const BuildOptions& a, const BuildOptions& b) {
 }
 
 TEST(BuildArguments, defaultsAreThoseOfCore) {
-  expectEqual(buildOptions(parse("build", "m.obj -o f")), BuildOptions{});
+  expectEqual(buildOptions(parse("build", "m.obj -o f"), 2), BuildOptions{});
 }
 
 TEST(BuildArguments, paperIsThePapers) {
-  expectEqual(buildOptions(parse("build", "m.obj -o f --paper")), paperOptions());
+  expectEqual(buildOptions(parse("build", "m.obj -o f --paper"), 2), paperOptions());
 }
 
 TEST(BuildArguments, whatIsWrittenBesidePaperWins) {
@@ -149,7 +149,8 @@ TEST(BuildArguments, whatIsWrittenBesidePaperWins) {
   expected.coefficients = CoefficientType::float32;
   expectEqual(buildOptions(parse("build",
                                  "m.obj -o f --nearness 7 --max-degree 12 --max-depth 3 --quadrature 5 --strategy h2 "
-                                 "--cubature compact --coefficients float --paper")),
+                                 "--cubature compact --coefficients float --paper"),
+                           2),
               expected);
 }
 
@@ -157,7 +158,8 @@ TEST(BuildArguments, allAreRead) {
   const BuildOptions options = buildOptions(parse("build",
                                                   "m.obj -o f --target-error 2.5e-7 --grid 3,4,5 --strategy h1 "
                                                   "--coefficients double --band 0.25 --cubature product "
-                                                  "--threads 3 --max-steps 0"));
+                                                  "--threads 3 --max-steps 0"),
+                                            2);
   EXPECT_EQ(options.targetError.weighted(), 2.5e-7);
   EXPECT_EQ(options.grid, (std::array<std::uint32_t, 3>{3, 4, 5}));
   EXPECT_EQ(options.strategy, Strategy::h1);
@@ -169,17 +171,17 @@ TEST(BuildArguments, allAreRead) {
 }
 
 TEST(BuildArguments, targetErrorAndErrorsByDistanceExcludeEachOther) {
-  const BuildOptions options = buildOptions(parse("build", "m.obj -o f --near-error 1e-3 --far-error 1e-2"));
+  const BuildOptions options = buildOptions(parse("build", "m.obj -o f --near-error 1e-3 --far-error 1e-2"), 2);
   EXPECT_EQ(options.targetError.byDistance().near, 1e-3);
   EXPECT_EQ(options.targetError.byDistance().far, 1e-2);
-  EXPECT_THROW(buildOptions(parse("build", "m.obj -o f --near-error 1e-3 --far-error 1e-2 --target-error 1e-5")),
+  EXPECT_THROW(buildOptions(parse("build", "m.obj -o f --near-error 1e-3 --far-error 1e-2 --target-error 1e-5"), 2),
                Error);
 }
 
 /// If no option limits the size of the field, a default memory limit applies.
 TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
   const auto limit = [](const std::string& more) {
-    return buildOptions(parse("build", "m.obj -o f" + more)).memoryLimit;
+    return buildOptions(parse("build", "m.obj -o f" + more), 2).memoryLimit;
   };
   EXPECT_EQ(limit(""), 100'000'000u);
   EXPECT_EQ(limit(" --target-error 1e-6"), std::nullopt);
@@ -192,13 +194,13 @@ TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
 }
 
 TEST(BuildArguments, readContinuity) {
-  EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity none")).continuityWeight, std::nullopt);
-  EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity weak")).continuityWeight, WeakContinuity{}.weight);
+  EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity none"), 2).continuityWeight, std::nullopt);
+  EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity weak"), 2).continuityWeight, WeakContinuity{}.weight);
   const BuildOptions options =
-      buildOptions(parse("build", "m.obj -o f --continuity weak --continuity-weight 7 --enrich"));
+      buildOptions(parse("build", "m.obj -o f --continuity weak --continuity-weight 7 --enrich"), 2);
   EXPECT_EQ(options.continuityWeight, 7);
   EXPECT_TRUE(options.enrich);
-  EXPECT_THROW(buildOptions(parse("build", "m.obj -o f --continuity-weight 7")), Error);
+  EXPECT_THROW(buildOptions(parse("build", "m.obj -o f --continuity-weight 7"), 2), Error);
 }
 
 TEST(Arguments, agreeForScriptsAndCommandLine) {

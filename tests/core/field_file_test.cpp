@@ -181,12 +181,11 @@ std::string withChecksum(std::string bytes) {
 }
 
 constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8,
-                      kSinceVersion6 = 8 + 4 + 8 + 4 + 4 * 8 + 8;  // bytes that versions 3, 4 and 6 added
+                      kSinceVersion7 = 8 + 4 + 8 + 8 + 8 + 1 + 4 + 4 * 8 + 8;  // bytes that versions 3, 4 and 7 added
 
-/// Older files end their headers earlier: version 4 before settings and sizes of exact leaves and before the number of
-/// measured points, version 3 before the
-/// inside test, version 2 before the settings that follow the number of steps, and version 1 before the number of
-/// steps.
+/// Older files end their headers earlier: version 4 before settings and sizes of exact leaves, the tolerance and the
+/// number of measured points, version 3 before the inside test, version 2 before the settings that follow the number of
+/// steps, and version 1 before the number of steps.
 TEST(FieldFile, filesOfOlderVersionsAreRead) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "old.hpsdf";
@@ -198,14 +197,14 @@ TEST(FieldFile, filesOfOlderVersionsAreRead) {
   const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
   bytes[8] = 4;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion6, kSinceVersion6)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion7, kSinceVersion7)));
   EXPECT_EQ(load(file).metadata().source.insideTest, field.metadata().source.insideTest);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
   bytes[8] = 3;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion6 - kSinceVersion4, kSinceVersion4)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion7 - kSinceVersion4, kSinceVersion4)));
   EXPECT_EQ(load(file).metadata().measuredError, field.metadata().measuredError);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
-  const std::size_t sinceSteps = nodes - kSinceVersion6 - kSinceVersion4 - kSinceVersion3;
+  const std::size_t sinceSteps = nodes - kSinceVersion7 - kSinceVersion4 - kSinceVersion3;
   bytes[8] = 2;
   writeAll(file, withChecksum(bytes.erase(sinceSteps, kSinceVersion3)));
   EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
@@ -231,7 +230,9 @@ TEST(FieldFile, theMeasurementIsKept) {
                                 .wrongSigns = 5,
                                 .signThreshold = 1e-3,
                                 .tornShare = 0.0625,
-                                .worst = {0.25, -0.5, 0.75}};
+                                .worst = {0.25, -0.5, 0.75},
+                                .toleranceRatio = 1.5,
+                                .beyondTolerance = 7};
   save(withMeasurement(small(), measurement), file);
   const std::optional<Measurement> found = load(file).metadata().measurement;
   ASSERT_TRUE(found.has_value());
@@ -245,18 +246,22 @@ TEST(FieldFile, theMeasurementIsKept) {
   EXPECT_EQ(found->signThreshold, measurement.signThreshold);
   EXPECT_EQ(found->tornShare, measurement.tornShare);
   EXPECT_EQ(found->worst, measurement.worst);
+  EXPECT_EQ(found->toleranceRatio, measurement.toleranceRatio);
+  EXPECT_EQ(found->beyondTolerance, measurement.beyondTolerance);
   EXPECT_EQ(load(file).data().nodes, small().data().nodes);
 }
 
-/// Fields of version 5 were written during the development of version 0.2.0 and have other lists.
-TEST(FieldFile, versionFiveIsRefused) {
+/// Fields of versions 5 and 6 were written during the development of version 0.2.0 and have other contents.
+TEST(FieldFile, versionsThatWereNeverReleasedAreRefused) {
   support::TemporaryDirectory folder;
-  const auto file = folder.path() / "five.hpsdf";
+  const auto file = folder.path() / "never.hpsdf";
   save(small(), file);
-  std::string bytes = readAll(file);
-  bytes[8] = 5;
-  writeAll(file, withChecksum(bytes));
-  EXPECT_NE(refusal(file).find("version 5"), std::string::npos);
+  for (const char version : {char{5}, char{6}}) {
+    std::string bytes = readAll(file);
+    bytes[8] = version;
+    writeAll(file, withChecksum(bytes));
+    EXPECT_NE(refusal(file).find("version " + std::to_string(version)), std::string::npos);
+  }
 }
 
 TEST(FieldFile, continuityAndBoundsAreKept) {
@@ -272,6 +277,9 @@ TEST(FieldFile, continuityAndBoundsAreKept) {
   data.metadata.measuredError = 0.0075;
   data.metadata.settings.enrich = true;
   data.metadata.settings.continuityWeight = 3;
+  data.metadata.settings.tolerance = 0.001;
+  data.metadata.settings.within = 0.25;
+  data.metadata.settings.certified = true;
   data.metadata.source.insideTest = InsideTest::shell;
   data.metadata.source.thickness = 0.125;
   save(Field(data), file);
@@ -289,6 +297,9 @@ TEST(FieldFile, continuityAndBoundsAreKept) {
   EXPECT_EQ(again.metadata().measuredError, 0.0075);
   EXPECT_TRUE(again.metadata().settings.enrich);
   EXPECT_EQ(again.metadata().settings.continuityWeight, 3);
+  EXPECT_EQ(again.metadata().settings.tolerance, 0.001);
+  EXPECT_EQ(again.metadata().settings.within, 0.25);
+  EXPECT_TRUE(again.metadata().settings.certified);
 }
 
 /// Invalid blend widths, bounds and settings are refused even if the checksum is right.
@@ -302,7 +313,7 @@ TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   const std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(data.coefficients).size(), count = data.nodes.size();
   const std::size_t bounds = bytes.size() - 8 - 8 * count,
-                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion6;
+                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion7;
   const auto refused = [&](std::size_t at, auto value) {
     std::string forged = bytes;
     std::memcpy(&forged[at], &value, sizeof(value));

@@ -114,6 +114,14 @@ void requireAskedErrors(const Arguments& arguments, const Field& field) {
   };
   require("near-error", "an RMS error near the surface", m->near.rms);
   require("far-error", "an RMS error over the domain", m->domain.rms);
+  const FieldMetadata& metadata = field.metadata();
+  const double tolerance = metadata.settings.tolerance;
+  if (tolerance > 0 && metadata.measuredError > tolerance)
+    throw Failed(
+        fmt::format("tolerance: missed in some cells, where the error is {:.3g} times as great as allowed: the "
+                    "distance jumps there; repair the mesh, or take another inside test (--sign)",
+                    metadata.measuredError / tolerance));
+  if (m->beyondTolerance > 0) throw Failed("tolerance: " + toleranceText(field));
   require("max-error", "an error", std::max(m->near.max, m->domain.max));
 }
 
@@ -141,6 +149,7 @@ void runBuild(Session& session, const Arguments& arguments) {
   console.out << fmt::format("{}{} in {:.1f} s\nmeasured: {}\n",
                              arguments.has("output") ? arguments.text("output") + ": " : "", fieldLine(field),
                              built.seconds, measuredText(field));
+  if (hasTolerance(field)) console.out << fmt::format("tolerance: {}\n", toleranceText(field));
   requireAskedErrors(arguments, field);
 }
 

@@ -1,7 +1,11 @@
 #include "console/console.h"
 
+#include <fmt/format.h>
+
 #include <ostream>
 
+#include "console/progress_line.h"
+#include "hpsdf/detail/memory.h"
 #include "hpsdf/error.h"
 #include "text/text.h"
 
@@ -13,6 +17,12 @@ void note(const Console& console, std::string_view text) {
 
 void warn(const Console& console, std::string_view text) {
   console.err << "hpsdf: warning: " << printable(text) << std::endl;
+}
+
+void noteForecast(const Console& console, const Forecast& forecast) {
+  if (console.redrawsProgress) console.err << kEraseLine;
+  note(console,
+       fmt::format("the field will take about {} and {}", bytesText(forecast.bytes), durationText(forecast.seconds)));
 }
 
 void requireWritten(const std::ostream& out) {

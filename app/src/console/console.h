@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "hpsdf/error.h"
+
 namespace hpsdf::app {
 
 /// Observes operations that take long, such as the construction of a field, and can cancel them.
@@ -37,6 +39,9 @@ struct Console {
 /// Writes one line to the stream `err`. Control characters in `text`, which file names may contain, become blanks.
 void note(const Console& console, std::string_view text);
 void warn(const Console& console, std::string_view text);
+
+/// Writes a line that says what a long operation will take.
+void noteForecast(const Console& console, const Forecast& forecast);
 
 /// Throws `Error` if a write to `out`, the standard output, has failed.
 void requireWritten(const std::ostream& out);

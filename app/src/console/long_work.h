@@ -32,6 +32,7 @@ auto withProgress(const Console& console, const Work& work) {
           },
       .cancelled =
           [listener] { return InterruptGuard::interrupted() || (listener != nullptr && listener->wantsCancel()); },
+      .forecast = [&console](const Forecast& forecast) { noteForecast(console, forecast); },
   };
   auto result = work(progress);
   progress.throwIfCancelled();  // Ctrl-C may have come after the last check inside `work`

@@ -23,6 +23,7 @@ ParameterKind kindOf(const BuildSetting& setting) {
   kind.minimumExcluded = setting.minimumExcluded;
   if (std::isfinite(setting.minimum)) kind.minimum = setting.minimum;
   if (std::isfinite(setting.maximum)) kind.maximum = setting.maximum;
+  kind.mayBeShare = setting.mayBeShare;
   return kind.byDefault(defaultText(setting)).in(std::string(setting.unit));
 }
 
@@ -33,8 +34,10 @@ Parameter parameterFrom(const BuildSetting& setting) {
   return parameter;
 }
 
-std::vector<double> valueOf(const Arguments& arguments, const BuildSetting& setting) {
+/// Returns the value that the arguments give to a setting. Percentages refer to the mesh's longest side.
+std::vector<double> valueOf(const Arguments& arguments, const BuildSetting& setting, double longestSide) {
   const std::string name(setting.name);
+  if (arguments.isShare(name)) return {arguments.number(name) * longestSide};
   if (setting.type == BuildSetting::Type::flag) return {arguments.flag(name) ? 1.0 : 0.0};
   if (setting.type != BuildSetting::Type::choice) return arguments.numbers(name);
   return {double(std::ranges::find(setting.words, arguments.text(name)) - setting.words.begin())};
@@ -76,6 +79,16 @@ bool isAnyGiven(const Arguments& arguments, std::initializer_list<BuildSetting::
   return std::ranges::any_of(endParameters(endings), [&](const std::string& name) { return arguments.given(name); });
 }
 
+/// Throws `Error` for a setting that is given and has no effect on a construction within a tolerance.
+void requireEffect(const Arguments& arguments) {
+  for (const BuildSetting& setting : buildSettings())
+    if (setting.isOffered && arguments.given(setting.name) && !setting.hasEffectWithTolerance &&
+        setting.ending != BuildSetting::Ending::tolerance && setting.ending != BuildSetting::Ending::target)
+      throw Error(fmt::format("{} has no effect with tolerance, which decides how the field is built: leave one out",
+                              setting.name));
+  if (arguments.flag("paper")) throw Error("paper and tolerance exclude each other: give one of them");
+}
+
 InsideTest insideTestOf(const std::string& name) {
   if (name == "pseudonormal") return InsideTest::pseudonormal;
   if (name == "winding") return InsideTest::winding;
@@ -91,7 +104,7 @@ Parameter settingParameter(const char* name) { return parameterFrom(buildSetting
 Strategy strategyOf(const Arguments& arguments) {
   const BuildSetting& setting = buildSetting("strategy");
   BuildOptions options;
-  setting.set(options, valueOf(arguments, setting));
+  setting.set(options, valueOf(arguments, setting, 1));
   return options.strategy;
 }
 
@@ -139,18 +152,19 @@ std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Endin
   return names;
 }
 
-BuildOptions buildOptions(const Arguments& arguments) {
+BuildOptions buildOptions(const Arguments& arguments, double longestSide) {
   using Ending = BuildSetting::Ending;
   BuildOptions options = arguments.flag("paper") ? paperOptions() : BuildOptions{};
-  const bool endsOtherwise = isAnyGiven(arguments, {Ending::byDistance, Ending::otherQuantity});
+  const bool endsOtherwise = isAnyGiven(arguments, {Ending::byDistance, Ending::otherQuantity, Ending::tolerance});
   if (endsOtherwise) options.targetError = 0;
+  if (arguments.given("tolerance")) requireEffect(arguments);
   for (const BuildSetting& setting : buildSettings()) {
     if (!setting.isOffered || !arguments.given(setting.name)) continue;
     if (!setting.exclusive.empty() && arguments.given(setting.exclusive))
       throw Error(fmt::format("{} and {} exclude each other: give one of them", setting.exclusive, setting.name));
     if (setting.hasOwner != nullptr)
       requireOwner(arguments, setting.name.data(), setting.owner.data(), setting.hasOwner(options));
-    setting.set(options, valueOf(arguments, setting));
+    setting.set(options, valueOf(arguments, setting, longestSide));
   }
   const bool isSizeGiven =
       endsOtherwise || isAnyGiven(arguments, {Ending::target, Ending::steps}) || arguments.given("grid");
@@ -197,7 +211,7 @@ Box domainFrom(const Arguments& arguments, const Box& surface) {
 void requireConsistent(const Arguments& arguments) {
   const Box any(Vector3::Constant(-1), Vector3::Constant(1));
   distanceOptions(arguments);
-  checkBuild(domainFrom(arguments, any), buildOptions(arguments));
+  checkBuild(domainFrom(arguments, any), buildOptions(arguments, any.sizes().maxCoeff()));
 }
 
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven) {

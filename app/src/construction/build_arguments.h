@@ -40,8 +40,9 @@ Parameter pointsParameter(std::string help, std::string count, double minimum);
 Parameter seedParameter(std::string help = "Which points.");
 
 /// Converts the arguments of `buildParameters` into the options of a construction. Explicitly given arguments override
-/// the preset --paper.
-BuildOptions buildOptions(const Arguments& arguments);
+/// the preset --paper. Lengths that are given as a percentage refer to `longestSide`, the longest side of the surface's
+/// box in world units.
+BuildOptions buildOptions(const Arguments& arguments, double longestSide);
 
 /// Returns the options of the distance function, among them the method that tells inside from outside.
 DistanceOptions distanceOptions(const Arguments& arguments);

@@ -21,7 +21,7 @@ void warnOfCutSurface(const Console& console, const Box& surface, const Box& dom
 }
 
 void warnOfErrorLeft(const Console& console, const FieldMetadata& built) {
-  if (built.measuredError > built.settings.maxError)
+  if (built.settings.maxError > 0 && built.measuredError > built.settings.maxError)
     warn(console,
          fmt::format("errors of {} are left, above the maximum error {}: allow a higher degree, a greater depth, "
                      "more steps or bytes",
@@ -63,13 +63,14 @@ std::filesystem::path checkpointOf(const std::filesystem::path& output) { return
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
   return namingSurface(surface, [&]() -> BuildInput {
     // Convert the arguments to options first, to find mistakes in the arguments before the long work starts.
-    BuildOptions options = buildOptions(arguments);
+    buildOptions(arguments, 1);
     const DistanceOptions insideOptions = distanceOptions(arguments);
     refuseInsideTestOfAnalytic(surface, arguments);
 
     // Load the surface, check its domain, and warn if the domain cuts the surface off.
     const PreparedSurface prepared = prepareSurface(console, surface, wantsNormalized(arguments));
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
+    BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
     checkBuild(domain, options);
     warnOfCutSurface(console, box, domain);
 

@@ -45,7 +45,8 @@ struct ParameterKind {
   std::optional<double> minimum = {};
   std::optional<double> maximum = {};
   bool minimumExcluded = false;
-  char letter = 0;  ///< one-letter spelling: o for -o
+  bool mayBeShare = false;  ///< `number` also accepts a percentage, such as 0.02%; see `Arguments::isShare`
+  char letter = 0;          ///< one-letter spelling: o for -o
   bool isPositional = false;
   bool isRepeatable = false;
   Need need = Need::optional;
@@ -60,6 +61,7 @@ struct ParameterKind {
   ParameterKind& within(double least, double most) { return atLeast(least).atMost(most); }
   ParameterKind& above(double limit) { return atLeast(limit).set(minimumExcluded, true); }
   ParameterKind& orWords(std::vector<std::string> words) { return set(choices, std::move(words)); }
+  ParameterKind& orShare() { return set(mayBeShare, true); }
   ParameterKind& as(char option) { return set(letter, option); }
   ParameterKind& alsoCalled(std::string name) { return set(synonym, std::move(name)); }
   ParameterKind& positional() { return set(isPositional, true); }

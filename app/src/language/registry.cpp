@@ -90,9 +90,10 @@ std::optional<std::vector<double>> parseNumbers(const Parameter& parameter, std:
   const bool whole = parameter.whole || parameter.type == ParameterType::wholeNumber;
   std::vector<double> numbers;
   for (const std::string_view part : split(text, parameter.type == ParameterType::size ? 'x' : ',')) {
-    const auto number = parseNumber(part);
+    const bool isShare = parameter.mayBeShare && part.ends_with('%');
+    const auto number = parseNumber(part.substr(0, part.size() - (isShare ? 1 : 0)));
     if (!number || !inRange(parameter, *number) || (whole && *number != std::floor(*number))) return std::nullopt;
-    numbers.push_back(*number);
+    numbers.push_back(isShare ? *number / 100 : *number);
   }
   const std::vector<std::size_t> one = {1};
   const auto& counts =
@@ -119,7 +120,7 @@ std::string expectedValue(const Parameter& parameter) {
     case ParameterType::outputPath:
       return "a file name";
     case ParameterType::number:
-      return "a number" + rangeText(parameter);
+      return "a number" + rangeText(parameter) + (parameter.mayBeShare ? ", or a percentage" : "");
     case ParameterType::wholeNumber:
       return "a whole number" + rangeText(parameter);
     case ParameterType::choice:
@@ -357,6 +358,7 @@ class ArgumentReader {
       case ParameterType::numbers:
       case ParameterType::size:
         if (contains(parameter.choices, text)) break;
+        value.isShare = parameter.mayBeShare && text.ends_with('%');
         if (auto numbers = parseNumbers(parameter, text))
           value.numbers = std::move(*numbers);
         else
@@ -397,6 +399,7 @@ std::string Arguments::textOr(std::string_view name, std::string fallback) const
   return has(name) ? text(name) : std::move(fallback);
 }
 double Arguments::number(std::string_view name) const { return single(name).numbers.at(0); }
+bool Arguments::isShare(std::string_view name) const { return has(name) && single(name).isShare; }
 int Arguments::whole(std::string_view name) const { return static_cast<int>(number(name)); }
 std::vector<double> Arguments::numbers(std::string_view name) const { return single(name).numbers; }
 bool Arguments::flag(std::string_view name) const { return number(name) != 0; }

@@ -33,6 +33,8 @@ class Arguments {
   std::string textOr(std::string_view name, std::string fallback) const;
   std::vector<std::string> texts(std::string_view name) const;
   double number(std::string_view name) const;
+  /// Returns true if the value is given as a percentage; `number` then returns it as a share: 0.0002 for 0.02%.
+  bool isShare(std::string_view name) const;
   int whole(std::string_view name) const;
   std::vector<double> numbers(std::string_view name) const;
   bool flag(std::string_view name) const;
@@ -43,6 +45,7 @@ class Arguments {
   struct Value {
     std::string text = {};
     std::vector<double> numbers = {};
+    bool isShare = false;  ///< the number was given as a percentage
   };
   struct Entry {
     bool given = false;

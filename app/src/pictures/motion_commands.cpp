@@ -168,7 +168,8 @@ void runFrames(Session& session, const Registry& commands, const Arguments& argu
     film.add(drawFrame(stage, call, scale).image, figures);
   };
   withProgress(session.console(), [&](const Progress& progress) {
-    buildStages(*exact, finished.domain(), buildOptions(arguments), std::span(steps).first(steps.size() - 1),
+    buildStages(*exact, finished.domain(), buildOptions(arguments, finished.metadata().referenceLength),
+                std::span(steps).first(steps.size() - 1),
                 [&](Field field) {
                   progress.update("drawing frames", double(film.frames()) / double(steps.size()));
                   addStage(std::move(field));

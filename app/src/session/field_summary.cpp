@@ -150,6 +150,21 @@ std::string wrongSignsText(const Measurement& m) {
                      shortNumber(m.signThreshold));
 }
 
+bool hasTolerance(const Field& field) { return field.metadata().settings.tolerance > 0; }
+
+std::string toleranceText(const Field& field) {
+  const BuildOptions& settings = field.metadata().settings;
+  const std::optional<Measurement>& m = field.metadata().measurement;
+  std::string text = fmt::format("{} within {} of the surface, and 1 % of the distance beyond",
+                                 shortNumber(settings.tolerance), shortNumber(settings.within));
+  if (!m) return text;
+  if (m->beyondTolerance > 0)
+    return text + fmt::format("; missed at {} of {} points, where the error is up to {:.3g} times as great",
+                              grouped(m->beyondTolerance), grouped(m->points), m->toleranceRatio);
+  return text + fmt::format("; {}, errors reach {:.0f} % of it at {} random points",
+                            settings.certified ? "certified" : "kept", 100 * m->toleranceRatio, grouped(m->points));
+}
+
 std::string measuredText(const Field& field) {
   const std::optional<Measurement>& m = field.metadata().measurement;
   if (!m) return "not measured";
@@ -162,10 +177,16 @@ Json measuredJson(const Field& field) {
   const std::optional<Measurement>& m = field.metadata().measurement;
   if (!m) return {};
   const auto errorJson = [](const Measurement::Error& error) { return Json{{"rms", error.rms}, {"max", error.max}}; };
-  return {{"points", m->points},          {"near_distance", m->nearDistance},
-          {"near", errorJson(m->near)},   {"domain", errorJson(m->domain)},
-          {"wrong_signs", m->wrongSigns}, {"sign_threshold", m->signThreshold},
-          {"torn_share", m->tornShare},   {"worst_point", vectorJson(m->worst)}};
+  return {{"points", m->points},
+          {"near_distance", m->nearDistance},
+          {"near", errorJson(m->near)},
+          {"domain", errorJson(m->domain)},
+          {"wrong_signs", m->wrongSigns},
+          {"sign_threshold", m->signThreshold},
+          {"torn_share", m->tornShare},
+          {"worst_point", vectorJson(m->worst)},
+          {"tolerance_ratio", hasTolerance(field) ? Json(m->toleranceRatio) : Json()},
+          {"beyond_tolerance", hasTolerance(field) ? Json(m->beyondTolerance) : Json()}};
 }
 
 std::string exactCountText(const FieldStatistics& figures) {
@@ -240,9 +261,12 @@ std::string fieldText(const CurrentField& current) {
   if (figures.exact.leaves > 0) row("exact triangles", exactTrianglesText(figures.exact));
   row("memory", memoryText(field));
   if (current.fileBytes) row("file", bytesText(double(*current.fileBytes)));
-  row("error, target",
-      fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),
-                  shortNumber(metadata.settings.targetError.weighted())));
+  if (hasTolerance(field))
+    row("tolerance", toleranceText(field) + unitText(field));
+  else
+    row("error, target",
+        fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),
+                    shortNumber(metadata.settings.targetError.weighted())));
   if (const std::optional<Measurement>& m = metadata.measurement) {
     row("error near surface", fmt::format("{}, within {} of the surface{}", errorText(m->near),
                                           shortNumber(m->nearDistance), unitText(field)));
@@ -252,13 +276,16 @@ std::string fieldText(const CurrentField& current) {
   } else {
     row("measured", "not since the field was changed; 'hpsdf verify' measures it");
   }
-  row("weighted estimate", shortNumber(metadata.rmsEstimate(field.domain())) + ", √(ε/|Ω|)" + unitText(field));
+  if (!hasTolerance(field))
+    row("weighted estimate", shortNumber(metadata.rmsEstimate(field.domain())) + ", √(ε/|Ω|)" + unitText(field));
   if (field.singlePrecision()) row("change by float", shortNumber(metadata.roundingRms) + " RMS");
   row("exact distances", grouped(metadata.exactEvaluations));
   if (metadata.steps) row("refinement steps", grouped(*metadata.steps));
   row("base grid", fmt::format("{} x {} x {}", grid[0], grid[1], grid[2]));
-  row("settings", settingsText(metadata.settings, false));
-  row("", settingsText(metadata.settings, true));
+  if (!hasTolerance(field)) {
+    row("settings", settingsText(metadata.settings, false));
+    row("", settingsText(metadata.settings, true));
+  }
   if (metadata.settings.maxError > 0) row("greatest error", shortNumber(metadata.measuredError));
   if (const double width = field.data().blend; width > 0)
     row("continuity", fmt::format("exact: blended within {} of an edge from faces", width));

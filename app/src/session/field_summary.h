@@ -31,6 +31,11 @@ std::string fieldText(const CurrentField& current);
 /// "not measured" for a field that was changed after it was measured, or that an earlier version made.
 std::string measuredText(const Field& field);
 
+/// Returns true if the field was built within a tolerance.
+bool hasTolerance(const Field& field);
+/// Returns the tolerance of a field, and whether the measurement found it kept.
+std::string toleranceText(const Field& field);
+
 /// Returns the measured errors of a field as JSON. Returns null if the field was not measured.
 Json measuredJson(const Field& field);
 

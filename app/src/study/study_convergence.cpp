@@ -269,7 +269,7 @@ void runConvergence(Session& session, const Arguments& arguments) {
 std::vector<Parameter> unweightedBuildParameters() {
   using Ending = BuildSetting::Ending;
   std::vector<std::string> left =
-      endParameters({Ending::target, Ending::byDistance, Ending::otherQuantity, Ending::steps});
+      endParameters({Ending::target, Ending::byDistance, Ending::tolerance, Ending::otherQuantity, Ending::steps});
   left.insert(left.end(), {"near-distance", "strategy", "coefficients", "band", "bounds", "paper"});
   std::vector<Parameter> parameters = buildParametersWithout(left);
   parameterNamed("nearness", parameters).defaultText = "0";

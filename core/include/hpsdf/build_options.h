@@ -124,6 +124,19 @@ class ErrorTarget {
   std::variant<double, NearFarError> asked_;
 };
 
+/// The error |f − Φ| that a tolerance allows: the tolerance itself up to a distance from the surface, and beyond it 1 %
+/// of the further distance in addition.
+struct AllowedError {
+  double tolerance = 0;
+  double within = 0;
+
+  double at(double distance) const {
+    constexpr double kShareBeyond = 0.01;
+    const double beyond = (distance < 0 ? -distance : distance) - within;
+    return beyond > 0 ? tolerance + kShareBeyond * beyond : tolerance;
+  }
+};
+
 /// Settings of a field's construction (paper, Algorithm 1). The defaults differ from the settings of the paper, which
 /// `paperOptions` returns.
 struct BuildOptions {
@@ -142,6 +155,17 @@ struct BuildOptions {
   /// probed without blending. The remaining error is stored in `FieldMetadata::measuredError`; rounding and the limits
   /// of degree, depth, steps and bytes can keep it above the limit.
   double maxError = 0;
+  /// Greatest allowed error |f − Φ| within `within` of the surface, in the field's own units; 0: no tolerance. Beyond
+  /// it the allowed error grows (`AllowedError`), so that the sign is right wherever |Φ| exceeds the tolerance. The
+  /// construction then chooses the octree, the polynomials and the exact leaves that take the fewest bytes, in place of
+  /// Algorithm 1. Of the other settings only the grid, blending, bounds, coefficients, memory and threads have an
+  /// effect. Errors are checked at 1241 points or more of each cell; see `certified` for a proof.
+  /// Where the distance jumps, the tolerance cannot be kept; `FieldMetadata::measuredError` is greater then.
+  double tolerance = 0;
+  double within = 0;  ///< distance from the surface up to which `tolerance` holds; 0: 5 % of L (see `targetError`)
+  /// With `tolerance`: takes only polynomials whose errors are proven not to exceed the allowed error at any point of
+  /// their cell (see `safe_distance.h`). For closed surfaces alone. Excludes blending.
+  bool certified = false;
   /// Greatest number of bytes of the field in memory. The construction builds the best field within this limit that the
   /// other settings allow. If `maxError` is set too, the construction ends as soon as this error is reached. With a
   /// limit of bytes, `CoefficientType::automatic` chooses float32.
@@ -185,6 +209,9 @@ struct BuildOptions {
   std::optional<std::uint64_t> memoryLimit = {};
   int threads = 0;  ///< greatest number of threads, up to 1024; 0: all of the machine. It does not affect the result.
 };
+
+/// Returns the error that the tolerance of these options allows on a surface whose longest side is `referenceLength`.
+AllowedError allowedError(const BuildOptions& options, double referenceLength);
 
 /// Returns the settings of the paper, except the target error τ and the base grid, which have their defaults.
 BuildOptions paperOptions();

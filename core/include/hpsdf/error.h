@@ -48,15 +48,24 @@ class Cancelled : public std::runtime_error {
   Cancelled() : std::runtime_error("cancelled") {}
 };
 
-/// The link between a long operation and its caller: progress reports and cancellation. Both functions may be empty.
+/// An estimate of what a long operation will take, made at an early moment from a sample of its work.
+struct Forecast {
+  double bytes = 0;    ///< memory of the result
+  double seconds = 0;  ///< time of the whole operation, from its start
+};
+
+/// The link between a long operation and its caller: progress reports and cancellation. All functions may be empty.
 struct Progress {
   /// Receives the name of the current task and the estimated fraction of it that is done, 0 to 1. Calls never
   /// overlap, even if they come from several threads.
-  std::function<void(std::string_view task, double fraction)> report;
+  std::function<void(std::string_view task, double fraction)> report = {};
 
   /// The operation calls this function often and from any thread. Once the function returns true, the operation
   /// throws `Cancelled`.
-  std::function<bool()> cancelled;
+  std::function<bool()> cancelled = {};
+
+  /// Receives the forecast of an operation that makes one, once, before a tenth of the work is done.
+  std::function<void(const Forecast&)> forecast = {};
 
   /// Throws `Cancelled` if the caller asks to stop. Operations call this function between steps.
   void throwIfCancelled() const {

@@ -20,6 +20,11 @@ BuildOptions paperOptions() {
   return options;
 }
 
+AllowedError allowedError(const BuildOptions& options, double referenceLength) {
+  constexpr double kShareWithin = 0.05;
+  return {options.tolerance, options.within > 0 ? options.within : kShareWithin * referenceLength};
+}
+
 Box domainAround(const Box& surface, DomainShape shape, double margin) {
   if (surface.isEmpty()) throw Error("cannot place a domain around an empty surface");
   if (!(margin > -1) || !std::isfinite(margin)) throw Error("margin: expected a number above -1");

@@ -71,6 +71,8 @@ struct Kind : BuildSetting {
   Kind& inJson(std::string_view nameInJson) { return with(key, nameInJson); }
   Kind& advanced() { return with(isAdvanced, true); }
   Kind& undeciding() { return with(decides, false); }
+  Kind& orShare() { return with(mayBeShare, true); }
+  Kind& suitsTolerance() { return with(hasEffectWithTolerance, true); }
   Kind& hidden() { return with(isOffered, false); }
 
  private:
@@ -137,6 +139,7 @@ constexpr Access kContinuity = {
       options.blend = (kinds & 2) != 0 ? kDefaultBlend : 0;
     }};
 
+bool isTolerant(const BuildOptions& options) { return options.tolerance > 0; }
 bool isByDistance(const BuildOptions& options) { return options.targetError.byDistance().near > 0; }
 bool isSmoothed(const BuildOptions& options) { return options.continuityWeight.has_value(); }
 bool isBlended(const BuildOptions& options) { return options.blend > 0; }
@@ -156,11 +159,39 @@ struct Row : BuildSetting {
 
 const std::vector<Row> kRows = {
     // settings for the goal of the construction and for its limit of bytes
+    {"tolerance", kAsked,
+     number()
+         .above(0)
+         .in("world units, or % of the mesh's longest side")
+         .orShare()
+         .ends(Ending::tolerance)
+         .insteadOf("target-error")
+         .stored(17),
+     positive<&BuildOptions::tolerance>,
+     "Greatest error of the distance near the surface: 0.01, or 0.02% of the mesh's longest side. It holds within "
+     "--within of the surface; beyond it, 1 % of the further distance is allowed in addition, so that the sign is "
+     "right "
+     "wherever the distance exceeds the tolerance. Polynomials, exact cells and precision follow: those that take the "
+     "fewest bytes. The error is checked in every cell and measured at the end."},
+    {"within", kAsked,
+     number()
+         .above(0)
+         .in("world units, or % of the mesh's longest side")
+         .orShare()
+         .of("tolerance", isTolerant)
+         .suitsTolerance()
+         .stored(18),
+     positive<&BuildOptions::within>,
+     "Distance from the surface up to which --tolerance holds. When left out, 5 % of the mesh's longest side."},
+    {"certified", kAsked, flag().of("tolerance", isTolerant).suitsTolerance().stored(19),
+     member<&BuildOptions::certified>,
+     "Takes only polynomials whose errors are proven to be within the tolerance at every point, not only at those that "
+     "are checked. It takes longer and gives a larger field; it needs a mesh without holes."},
     {"target-error", kAsked, number().above(0).in("units^5 at that scale").ends(Ending::target).stored(1),
      kWeightedError,
      "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, where L is "
      "that side in mesh units, so that the same τ gives the same cells in any unit. Smaller is more exact."},
-    {"grid", kMethod, wholeNumbers().within(1, kMostInt), member<&BuildOptions::grid>,
+    {"grid", kMethod, wholeNumbers().within(1, kMostInt).suitsTolerance(), member<&BuildOptions::grid>,
      "Base cells an axis: one number for all, or NX,NY,NZ."},
     {"nearness", kMethod, number().within(0, 1000).stored(2).advanced(), member<&BuildOptions::nearness>,
      "θ: how much more an error counts near the surface than far away; 0 weighs all cells alike."},
@@ -186,7 +217,7 @@ const std::vector<Row> kRows = {
      member<&BuildOptions::maxBytes>,
      "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given; with "
      "max-error it ends where that is reached."},
-    {"memory-limit", kMethod, wholeNumber().within(1, kMostBytes).in("bytes").undeciding().advanced(),
+    {"memory-limit", kMethod, wholeNumber().within(1, kMostBytes).in("bytes").undeciding().suitsTolerance().advanced(),
      member<&BuildOptions::memoryLimit>,
      "Memory that the construction may take, the mesh's exact distance included. Where more will be needed it stops as "
      "soon as that is certain, and tells how much. Weak continuity's solver takes about 50 bytes a coefficient on top, "
@@ -235,7 +266,8 @@ const std::vector<Row> kRows = {
      "Number of triangles above which an exact cell of strategy hpx is divided, down to max-depth. Up to twice as many "
      "stay together where dividing would hardly shorten the list. Raise it for fewer cells and a smaller field, lower "
      "it for faster queries."},
-    {"coefficients", kResult, choice({"auto", "float", "double"}).advanced(), member<&BuildOptions::coefficients>,
+    {"coefficients", kResult, choice({"auto", "float", "double"}).suitsTolerance().advanced(),
+     member<&BuildOptions::coefficients>,
      "Precision of the coefficients. auto takes float where that changes the error by less than 1 %."},
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,
      "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of the distances "
@@ -250,7 +282,7 @@ const std::vector<Row> kRows = {
     {"enrich", kMethod, flag().stored(12).inJson("enriched").advanced(), member<&BuildOptions::enrich>,
      "Fit every cell anew at the end, one degree higher where max-degree allows: about twice the bytes, with which "
      "weak continuity costs hardly any error."},
-    {"continuity", kResult, choice({"none", "weak", "exact", "both"}), kContinuity,
+    {"continuity", kResult, choice({"none", "weak", "exact", "both"}).suitsTolerance(), kContinuity,
      "What is done about the jumps from cell to cell. weak lets the cells' polynomials give way to each other at the "
      "end, so that the field jumps less for somewhat more error ('study continuity' shows the trade). exact: value and "
      "gradient are continuous everywhere, neighbours being blended in a thin zone along their faces; queries take up "
@@ -272,15 +304,16 @@ const std::vector<Row> kRows = {
          .atMost(kMaxBlend)
          .byDefault(kDefaultBlend)
          .of("continuity exact", isBlended)
+         .suitsTolerance()
          .inJson("blend")
          .advanced(),
      positive<&BuildOptions::blend>,
      "How wide the blended zones are on either side of a face, as a part of a cell's edges: the wider, the gentler the "
      "gradients, and the slower the queries."},
-    {"bounds", kResult, flag(), member<&BuildOptions::bounds>,
+    {"bounds", kResult, flag().suitsTolerance(), member<&BuildOptions::bounds>,
      "Keep for each cell a proven bound of its error, and of its slope. With them rays and collisions miss nothing. "
      "They hold for closed meshes that do not intersect themselves."},
-    {"threads", "General", wholeNumber().within(0, 1024).undeciding(), member<&BuildOptions::threads>,
+    {"threads", "General", wholeNumber().within(0, 1024).undeciding().suitsTolerance(), member<&BuildOptions::threads>,
      "Threads to use; 0 for all. The field is the same whatever their number."},
 };
 
@@ -288,7 +321,7 @@ const std::vector<Row> kRows = {
 /// a name to the list of members here.
 [[maybe_unused]] void requireAllMembers(const BuildOptions& options) {
   [[maybe_unused]] const auto& [m1, m2, m3, m4, m5, m6, m7, m8, m9, m10, m11, m12, m13, m14, m15, m16, m17, m18, m19,
-                                m20, m21, m22, m23, m24, m25, m26] = options;
+                                m20, m21, m22, m23, m24, m25, m26, m27, m28, m29] = options;
 }
 
 std::string numberText(double number) {

@@ -66,7 +66,8 @@ inline Progress partOf(const Progress& whole, double from, double to) {
   if (!whole.report) return whole;
   return {.report = [&whole, from, to](std::string_view task,
                                        double done) { whole.report(task, from + done * (to - from)); },
-          .cancelled = whole.cancelled};
+          .cancelled = whole.cancelled,
+          .forecast = whole.forecast};
 }
 
 /// Count, sum, sum of squares and maximum of non-negative values.

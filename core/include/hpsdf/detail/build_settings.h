@@ -30,6 +30,7 @@ struct BuildSetting {
     none,           ///< the setting does not end the construction
     target,         ///< the target error is reached
     byDistance,     ///< both errors of `NearFarError`, given instead of the target error, are reached
+    tolerance,      ///< every cell is within a tolerance, given instead of the target error
     otherQuantity,  ///< a maximum error or a limit of bytes is reached; the target error then has no default
     steps,          ///< a number of steps is done, even if the target error is not reached
   };
@@ -48,10 +49,12 @@ struct BuildSetting {
   std::string_view exclusive = {};  ///< name of a setting that cannot be given together with this one
   std::string_view owner = {};      ///< the option without which this setting has no effect, such as "continuity weak"
   bool (*hasOwner)(const BuildOptions&) = nullptr;
-  int storedAt = 0;           ///< position among the settings in a field's file; 0: not stored
-  bool decides = true;        ///< the finished field depends on the value of this setting
-  bool isOffered = true;      ///< the command-line program has an option for this setting
-  bool isAdvanced = false;    ///< only the complete help texts show this setting
+  int storedAt = 0;                     ///< position among the settings in a field's file; 0: not stored
+  bool decides = true;                  ///< the finished field depends on the value of this setting
+  bool mayBeShare = false;              ///< users may give the value as a percentage of the mesh's longest side
+  bool hasEffectWithTolerance = false;  ///< the setting has an effect on a construction with a tolerance
+  bool isOffered = true;                ///< the command-line program has an option for this setting
+  bool isAdvanced = false;              ///< only the complete help texts show this setting
   bool isChecked = false;     ///< `checkBuild` checks the range, because C++ code could set a value out of range
   std::string_view key = {};  ///< name in JSON if it differs from `name` with underscores
   std::vector<double> (*get)(const BuildOptions&) = nullptr;

@@ -32,6 +32,9 @@ struct Measurement {
   /// area of the surface. It is 0 for a surface without triangles and for a blended field.
   double tornShare = 0;
   Vector3 worst = Vector3::Zero();  ///< the random point with the greatest error
+  /// Greatest error over the error that the field's tolerance allows (`AllowedError`); 0 for a field without tolerance.
+  double toleranceRatio = 0;
+  std::uint64_t beyondTolerance = 0;  ///< points whose error is greater than the tolerance allows
 };
 
 /// The record of how a field was built. It is stored with the field, and the command `info` shows it. Lengths
@@ -52,7 +55,8 @@ struct FieldMetadata {
   double roundingRms = 0;  ///< RMS change of the field by rounding its coefficients to float; 0 for double
   /// Estimate of the greatest error |f − Φ| of the field f without blending, from points that the construction probed
   /// in the cells; 0 if no maximum error was asked for. The effect of rounding is included if it exceeds a hundredth of
-  /// the maximum error.
+  /// the maximum error. With a tolerance it is the greatest error found in a cell, over the allowed error, times the
+  /// tolerance.
   double measuredError = 0;
   /// The result of `measure` for this field. It is std::nullopt if the field was not measured or was changed
   /// afterwards.

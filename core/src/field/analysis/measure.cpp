@@ -15,36 +15,38 @@ namespace {
 
 constexpr std::size_t kPointsPerPart = 2048;
 
-/// Sums over points, and the point with the greatest error.
-struct ErrorSums {
-  detail::Sums errors;
-  std::uint64_t wrongSigns = 0;
-  double greatest = -1;
-  Vector3 worst = Vector3::Zero();
-
-  void add(const ErrorSums& other) {
-    errors.add(other.errors);
-    wrongSigns += other.wrongSigns;
-    if (other.greatest <= greatest) return;
-    greatest = other.greatest;
-    worst = other.worst;
+/// The errors of a field at points, in the order of the points.
+struct ErrorsAtPoints {
+  ErrorsAtPoints(const Field& field, ExactSamples taken) : samples(std::move(taken)), values(samples.points.size()) {
+    field.values(samples.points, values);
+    for (std::size_t n = 0; n < values.size(); ++n) sums.add(error(n));
   }
+
+  double error(std::size_t n) const { return std::abs(values[n] - samples.distances[n]); }
+  bool hasWrongSign(std::size_t n, double threshold) const {
+    return values[n] * samples.distances[n] < 0 && std::abs(samples.distances[n]) > threshold;
+  }
+
+  ExactSamples samples;
+  std::vector<double> values;
+  detail::Sums sums;
 };
 
-ErrorSums errorsAt(const Field& field, const ExactSamples& samples, double signThreshold) {
-  const auto addChunk = [&](ErrorSums& sums, std::size_t first, std::size_t count) {
-    std::vector<double> values(count);
-    field.values(std::span(samples.points).subspan(first, count), values);
-    for (std::size_t n = 0; n < count; ++n) {
-      const double exact = samples.distances[first + n], error = std::abs(values[n] - exact);
-      sums.errors.add(error);
-      sums.wrongSigns += values[n] * exact < 0 && std::abs(exact) > signThreshold;
-      if (error <= sums.greatest) continue;
-      sums.greatest = error;
-      sums.worst = samples.points[first + n];
+/// Adds to a measurement what depends on single points: wrong signs, the worst point and the points beyond the
+/// tolerance.
+void addPoints(Measurement& result, double& greatest, const ErrorsAtPoints& at, const AllowedError& allowed) {
+  for (std::size_t n = 0; n < at.values.size(); ++n) {
+    const double error = at.error(n);
+    result.wrongSigns += at.hasWrongSign(n, result.signThreshold);
+    if (error > greatest) {
+      greatest = error;
+      result.worst = at.samples.points[n];
     }
-  };
-  return detail::sumOfChunks<ErrorSums>(samples.points.size(), kPointsPerPart, {}, "", addChunk);
+    if (!(allowed.tolerance > 0)) continue;
+    const double ratio = error / allowed.at(at.samples.distances[n]);
+    result.toleranceRatio = std::max(result.toleranceRatio, ratio);
+    result.beyondTolerance += ratio > 1;
+  }
 }
 
 /// Returns true if x lies within half of the field's jump across a face of its cell from this face. Where the field
@@ -110,7 +112,8 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
   const FieldMetadata& metadata = field.metadata();
   const double length = metadata.referenceLength;
   Measurement result;
-  result.nearDistance = options.near > 0 ? options.near : 0.01 * length;
+  const double usual = metadata.settings.tolerance > 0 ? allowedError(metadata.settings, length).within : 0.01 * length;
+  result.nearDistance = options.near > 0 ? options.near : usual;
   const std::size_t points =
       options.points > 0 ? options.points : std::clamp(metadata.exactEvaluations / 10, kFewest, kMost);
   const SampleOptions half{
@@ -119,18 +122,17 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
   other.seed = ~options.seed;
   const std::optional<TriangleMesh> surface = surfaceOf(distance);
   return withThreads(options.threads, [&] {
-    const ExactSamples uniform =
-        sampleUniform(distance, field.domain(), metadata.settings.band, half, detail::partOf(progress, 0, 0.45));
-    const ExactSamples near =
-        samplesNear(distance, surface, field.domain(), result.nearDistance, other, detail::partOf(progress, 0.45, 0.9));
-    result.points = uniform.points.size() + near.points.size();
-    const ErrorSums nearErrors = errorsAt(field, near, 0);
-    result.near = {nearErrors.errors.rms(), nearErrors.errors.max};
+    const ErrorsAtPoints uniform(field, sampleUniform(distance, field.domain(), metadata.settings.band, half,
+                                                      detail::partOf(progress, 0, 0.45)));
+    const ErrorsAtPoints near(field, samplesNear(distance, surface, field.domain(), result.nearDistance, other,
+                                                 detail::partOf(progress, 0.45, 0.9)));
+    result.points = uniform.values.size() + near.values.size();
+    result.near = {near.sums.rms(), near.sums.max};
+    result.domain = {uniform.sums.rms(), uniform.sums.max};
     result.signThreshold = std::max(10 * result.near.rms, kLeastThreshold * length);
-    const ErrorSums domainErrors = errorsAt(field, uniform, result.signThreshold);
-    result.domain = {domainErrors.errors.rms(), domainErrors.errors.max};
-    result.wrongSigns = domainErrors.wrongSigns + errorsAt(field, near, result.signThreshold).wrongSigns;
-    result.worst = nearErrors.greatest > domainErrors.greatest ? nearErrors.worst : domainErrors.worst;
+    const AllowedError allowed = allowedError(metadata.settings, length);
+    double greatest = -1;
+    for (const ErrorsAtPoints* at : {&near, &uniform}) addPoints(result, greatest, *at, allowed);
     progress.update("measuring", 0.95);
     if (surface) result.tornShare = tornShareOf(field, *surface, half);
     return result;

@@ -7,11 +7,13 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "field/build/automatic_strategy.h"
 #include "field/build/checkpoint_file.h"
 #include "field/build/refiner.h"
+#include "field/build/tolerance_build.h"
 #include "field/cells/cell_bounds.h"
 #include "field/cells/prune.h"
 #include "field/continuity/continuity.h"
@@ -36,12 +38,8 @@ double nearDistance(const BuildOptions& options, double referenceLength) {
 }
 
 std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, const Box& domain) {
-  const bool hasTriangles = distance.triangleSearch() != nullptr && distance.triangleSearch()->hasSigns();
-  if (options.strategy != Strategy::hpx || !hasTriangles) return std::nullopt;
-  // Queries of exact leaves square lengths in single precision.
-  constexpr double kShortest = 1e-16, kLongest = 1e18;
   const double length = referenceLength(distance.source(), domain);
-  if (!(length > kShortest && length < kLongest)) return std::nullopt;
+  if (options.strategy != Strategy::hpx || !mayHaveExactLeaves(distance, length)) return std::nullopt;
   return ExactCells(*distance.triangleSearch(), options.exactWithin * length,
                     static_cast<std::size_t>(options.exactTriangles), options.blend);
 }
@@ -72,6 +70,13 @@ BuildOptions settled(BuildOptions options, const DistanceFunction& distance, con
     requireMemoryForExact(exactEstimate(distance, options, domain, mostNodes(options), progress), options);
   }
   return options;
+}
+
+/// Throws `Error` if the options ask for a tolerance, which goes without the steps of Algorithm 1.
+void refuseTolerance(const BuildOptions& options, const char* what) {
+  if (options.tolerance > 0)
+    throw Error(std::string("a construction within a tolerance has no steps, and so no ") + what +
+                ": leave one of them out");
 }
 
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.
@@ -216,6 +221,7 @@ Field build(const DistanceFunction& distance, const Box& domain, const BuildOpti
             const Progress& progress) {
   checkOptions(domain, options);
   return Field(withThreads(options.threads, [&] {
+    if (options.tolerance > 0) return buildWithinTolerance(distance, domain, options, progress);
     const BuildOptions settings = settled(options, distance, domain, progress);
     Construction construction(distance, domain, settings, progress);
     construction.grow();
@@ -226,6 +232,7 @@ Field build(const DistanceFunction& distance, const Box& domain, const BuildOpti
 Field buildResumably(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                      const Checkpoint& checkpoint, const Progress& progress) {
   checkOptions(domain, options);
+  refuseTolerance(options, "checkpoint");
   return Field(withThreads(options.threads, [&] {
     const BuildOptions settings = settled(options, distance, domain, progress);
     CheckpointFile file(checkpoint, distance, domain, settings);
@@ -244,6 +251,7 @@ void buildStages(const DistanceFunction& distance, const Box& domain, const Buil
   BuildOptions limited = options;
   limited.maxSteps = std::min(options.maxSteps.value_or(steps.back()), steps.back());
   checkOptions(domain, limited);
+  refuseTolerance(options, "stages");
   withThreads(options.threads, [&] {
     limited.strategy = settled(options, distance, domain, progress).strategy;
     Construction construction(distance, domain, limited, progress);

@@ -8,6 +8,7 @@
 
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/triangle_search.h"
 #include "util/refuse.h"
 
 namespace hpsdf::detail {
@@ -77,6 +78,12 @@ void checkEnds(const BuildOptions& options) {
   if (!hasEnd(options))
     refuse(
         "target error 0: expected a number above 0, or another end: near and far error, maximum error, bytes, steps");
+  if (options.tolerance > 0 && (options.maxError > 0 || options.maxBytes || options.targetError.isByDistance()))
+    refuse("a tolerance decides alone: leave out maximum error, bytes, near and far error");
+  if (options.tolerance > 0 && (options.continuityWeight || options.enrich || options.band > 0))
+    refuse("a tolerance does not outlive weak continuity, and needs no band: leave out one of them");
+  if (options.certified && options.blend > 0)
+    refuse("blending changes what is certified: leave out blending or the certificate");
   if (options.maxError > 0 && (options.continuityWeight || options.enrich))
     refuse("a maximum error does not outlive weak continuity or one degree more: leave out one of them");
   if (options.estimator == Estimator::checked && options.trialSamples == TrialSamples::own)
@@ -180,6 +187,13 @@ double referenceLength(const Source& source, const Box& domain) {
   const double longest = source.box.sizes().maxCoeff();
   if (!(longest > 0) || !std::isfinite(longest)) throw Error(ErrorKind::mesh, source.name, "the surface has no extent");
   return longest;
+}
+
+bool mayHaveExactLeaves(const DistanceFunction& distance, double referenceLength) {
+  // Queries of exact leaves square lengths in single precision.
+  constexpr double kShortest = 1e-16, kLongest = 1e18;
+  const TriangleSearch* search = distance.triangleSearch();
+  return search != nullptr && search->hasSigns() && referenceLength > kShortest && referenceLength < kLongest;
 }
 
 ByteBudget::ByteBudget(const BuildOptions& options)

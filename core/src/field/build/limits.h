@@ -27,6 +27,9 @@ int mostDegree(const BuildOptions& options);
 /// for a surface without extent.
 double referenceLength(const Source& source, const Box& domain);
 
+/// Returns true if a field of this distance can have exact leaves.
+bool mayHaveExactLeaves(const DistanceFunction& distance, double referenceLength);
+
 /// Returns the errors at which a construction ends, in the units of its field.
 ErrorGoal errorGoal(const BuildOptions& options, double referenceLength);
 

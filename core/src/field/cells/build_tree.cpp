@@ -10,14 +10,14 @@
 
 namespace hpsdf::detail {
 
-Box BuildTree::boxOf(const BuildNode& node) const {
-  const double scale = std::ldexp(1.0, -int(node.depth));
+Box BuildTree::boxOf(const CellPlace& place) const {
+  const double scale = std::ldexp(1.0, -int(place.depth));
   Vector3 lo, hi;
   for (int axis = 0; axis < 3; ++axis) {
     const double origin = domain.min()[axis];
     const double size = domain.max()[axis] - origin;
-    lo[axis] = origin + node.cellIndex[axis] * scale / grid[axis] * size;
-    hi[axis] = origin + (node.cellIndex[axis] + 1.0) * scale / grid[axis] * size;
+    lo[axis] = origin + place.index[axis] * scale / grid[axis] * size;
+    hi[axis] = origin + (place.index[axis] + 1.0) * scale / grid[axis] * size;
   }
   return Box(lo, hi);
 }
@@ -33,9 +33,9 @@ void BuildTree::addBaseCells() {
 void BuildTree::setChildIndices(std::uint32_t parent) {
   const BuildNode& above = nodes[parent];
   for (std::uint32_t child = 0; child < 8; ++child) {
-    BuildNode& node = nodes[above.firstChild + child];
-    node.depth = above.depth + 1;
-    for (int axis = 0; axis < 3; ++axis) node.cellIndex[axis] = 2 * above.cellIndex[axis] + ((child >> axis) & 1);
+    const CellPlace place = CellPlace{above.depth, above.cellIndex}.child(child);
+    nodes[above.firstChild + child].depth = place.depth;
+    nodes[above.firstChild + child].cellIndex = place.index;
   }
 }
 
@@ -140,7 +140,10 @@ void roundCoefficients(CoefficientType type, FieldData& field) {
   const query::Rounding rounding = query::floatRounding(field);
   FieldMetadata& metadata = field.metadata;
   const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;
-  const bool isNegligible = rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
+  const double tolerance = metadata.settings.tolerance;
+  const bool isNegligible = tolerance > 0
+                                ? rounding.max < kNegligible * tolerance
+                                : rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
   if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isNegligible)) return;
   query::toFloat(field);
   query::roundVertices(field.exact);

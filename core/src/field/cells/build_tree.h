@@ -11,6 +11,18 @@
 
 namespace hpsdf::detail {
 
+/// The place of a cell in an octree.
+struct CellPlace {
+  std::uint32_t depth = 0;
+  std::array<std::uint32_t, 3> index{};  ///< position, in cells of this depth, from the domain's lower corner
+
+  CellPlace child(std::uint32_t number) const {
+    CellPlace place{depth + 1, {}};
+    for (int axis = 0; axis < 3; ++axis) place.index[axis] = 2 * index[axis] + (number >> axis & 1);
+    return place;
+  }
+};
+
 struct BuildNode {
   std::uint32_t firstChild = 0;  ///< 0 for a leaf
   std::uint32_t depth = 0;
@@ -28,7 +40,8 @@ struct BuildTree {
   std::vector<BuildNode> nodes;
 
   std::size_t baseCells() const { return std::size_t(grid[0]) * grid[1] * grid[2]; }
-  Box boxOf(const BuildNode& node) const;
+  Box boxOf(const CellPlace& place) const;
+  Box boxOf(const BuildNode& node) const { return boxOf({node.depth, node.cellIndex}); }
 
   /// Adds the base cells, without fits, to an empty tree.
   void addBaseCells();

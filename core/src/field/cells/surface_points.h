@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "hpsdf/detail/triangle_search.h"
@@ -58,6 +60,41 @@ class SurfacePoints {
 
   std::vector<Vector3> points_;  ///< in the order of the triangles, in which neighbours in space are close
   std::vector<Box> boxes_;       ///< node n ≥ 1 has the children 2n and 2n + 1; the second half are the leaves
+};
+
+/// Points of a surface in cells: the corners and centroids of the parts of triangles that lie in a cell or, where there
+/// are very many triangles, centroids of triangles.
+class SurfaceInCells {
+ public:
+  /// Keeps a reference to the search.
+  explicit SurfaceInCells(const TriangleSearch& search) : search_(search), centroids_(search) {}
+
+  /// Calls visit(point) for points of the surface in a cell, in a fixed order.
+  template <typename F>
+  void forEachIn(const Box& cell, const F& visit) const {
+    constexpr std::size_t kMost = 256;
+    const std::optional<TriangleList> list = search_.nearestTo(cell, kMost);
+    if (!list) return centroids_.forEachIn(cell, visit);
+    for (const std::uint32_t triangle : list->triangles) {
+      const std::vector<Vector3> part = partInCell(triangle, cell);
+      if (part.empty()) continue;
+      Vector3 sum = Vector3::Zero();
+      for (const Vector3& corner : part) {
+        sum += corner;
+        visit(corner);
+      }
+      visit(Vector3(sum / double(part.size())));
+    }
+  }
+
+  /// Distances are measured to the surface and made smaller by this length: half of the thickness of a shell.
+  double offset() const { return search_.offset(); }
+
+ private:
+  std::vector<Vector3> partInCell(std::uint32_t triangle, const Box& cell) const;
+
+  const TriangleSearch& search_;
+  SurfacePoints centroids_;
 };
 
 }  // namespace hpsdf::detail

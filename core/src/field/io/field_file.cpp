@@ -21,9 +21,9 @@ namespace {
 // the file was transferred as text.
 constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
-// and criteria; version 4 the inside test; version 6 exact leaves and the measurement.
-// Version 5 was never released.
-constexpr std::uint32_t kFieldVersion = 6;
+// and criteria; version 4 the inside test; version 7 exact leaves, the tolerance and the measurement.
+// Versions 5 and 6 were never released.
+constexpr std::uint32_t kFieldVersion = 7;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
 constexpr detail::FileKind kFieldFile{"field file", "a .hpsdf file", "build or copy it again"};
@@ -114,8 +114,9 @@ void measurementItem(Stream& stream, Optional& measurement) {
   if (m.points == 0) return;
   for (double* number : {&m.nearDistance, &m.near.rms, &m.near.max, &m.domain.rms, &m.domain.max}) stream.item(*number);
   stream.item(m.wrongSigns);
-  for (double* number : {&m.signThreshold, &m.tornShare, &m.worst.x(), &m.worst.y(), &m.worst.z()})
+  for (double* number : {&m.signThreshold, &m.tornShare, &m.worst.x(), &m.worst.y(), &m.worst.z(), &m.toleranceRatio})
     stream.item(*number);
+  stream.item(m.beyondTolerance);
   if constexpr (!std::is_const_v<Optional>) measurement = m;
 }
 
@@ -157,14 +158,13 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   if (version < 4) return;
   stream.item(m.source.insideTest);
   stream.item(m.source.thickness);
-  if (version < 5) return;
-  settingItems(stream, m.settings, 14, 16);
+  if (version < kFieldVersion) return;
+  settingItems(stream, m.settings, 14, 19);
   stream.item(sizes.vertexBytes);
   stream.item(sizes.vertices);
   stream.item(sizes.triangles);
   stream.item(sizes.lists);
   stream.item(data.exact.offset);
-  if (version < 6) return;
   measurementItem(stream, m.measurement);
 }
 
@@ -202,8 +202,8 @@ Field load(const std::filesystem::path& file) {
   if (!version)
     reader.refuse(std::string("is not a .hpsdf file") + (isTooShort ? " (too short)" : "") +
                   "; build one with `hpsdf build`");
-  constexpr std::uint32_t kNeverReleased = 5;
-  if (*version == 0 || *version > kFieldVersion || *version == kNeverReleased)
+  constexpr std::uint32_t kLastBefore = 4;
+  if (*version == 0 || (*version > kLastBefore && *version != kFieldVersion))
     reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to 4 and " +
                   std::to_string(kFieldVersion) + "; build it again");
   FieldData data;

@@ -1,0 +1,66 @@
+#pragma once
+// The octree that takes the fewest bytes within a tolerance.
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "field/build/limits.h"
+#include "field/cells/build_tree.h"
+#include "field/cells/exact_leaves.h"
+#include "field/cells/tolerance_fit.h"
+
+namespace hpsdf::detail {
+
+/// A cell of an octree within a tolerance: a leaf, or a cell with eight children.
+struct CheapCell {
+  Fit fit;             ///< as a leaf; empty if the cell has children
+  double bytes = 0;    ///< of the leaf, or of all descendants, in the finished field
+  double ratio = 0;    ///< error of the cell's best polynomial over the allowed error
+  bool isMissed = false;  ///< the leaf is a polynomial that misses the tolerance, in a cell that is not divided further
+  std::unique_ptr<std::array<CheapCell, 8>> children = {};
+};
+
+/// Finds the octree of a cell that takes the fewest bytes within a tolerance. A leaf is a polynomial of low degree or,
+/// if the distance is measured to triangles, an exact leaf. A cell is divided if its children take fewer bytes.
+/// Thread-safe.
+class LeastBytes {
+ public:
+  /// Keeps references to its arguments. `tree` gives the boxes of cells. `exact` is empty if there can be no exact
+  /// leaves. A cell of depth `maxDepth` is not divided.
+  LeastBytes(const BuildTree& tree, const ToleranceFitter& fitter, const std::optional<ExactCells>& exact,
+             std::uint32_t maxDepth, const ByteBudget& budget)
+      : tree_(tree), fitter_(fitter), exact_(exact), maxDepth_(maxDepth), budget_(budget) {}
+
+  /// Makes the leaf of a cell that takes the fewest bytes. Returns true if the cell's children might take fewer bytes,
+  /// or if there is no such leaf. `ratioAbove` is the error ratio of the parent, 0 if there is none.
+  bool makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove) const;
+  /// Gives a cell eight children without fits.
+  static void divide(CheapCell& cell) { cell.children = std::make_unique<std::array<CheapCell, 8>>(); }
+  /// Decides between the leaf of a cell and its children, which are settled, and removes the other.
+  void settle(CheapCell& cell) const;
+  /// Makes the octree of a cell: all of the above, down to its leaves.
+  void solve(CheapCell& cell, const CellPlace& place, double ratioAbove) const;
+
+  /// Number of cells that were looked at so far.
+  std::uint64_t cells() const { return cells_; }
+
+ private:
+  void consider(CheapCell& cell, Fit&& fit, double bytes) const;
+  double polynomialBytes(const Fit& fit) const { return budget_.bytes(1, double(fit.coefficients.size())); }
+  double exactBytes(const Fit& fit, const Box& box) const;
+  void makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&& polynomial) const;
+
+  const BuildTree& tree_;
+  const ToleranceFitter& fitter_;
+  const std::optional<ExactCells>& exact_;
+  std::uint32_t maxDepth_;
+  const ByteBudget& budget_;
+  mutable std::atomic<std::uint64_t> cells_ = 0;
+};
+
+}  // namespace hpsdf::detail

@@ -1,0 +1,223 @@
+#include "field/cells/tolerance_fit.h"
+
+#include <array>
+#include <utility>
+
+#include "field/cells/cell_bounds.h"
+#include "field/query/evaluate.h"
+
+namespace hpsdf::detail {
+namespace {
+
+constexpr std::size_t kPointsAtOnce = 512;
+
+/// Greatest ratio of an error to the allowed error that a polynomial may have at the checked points. The rest is for
+/// errors between them and for the rounding of coefficients.
+constexpr double kMostRatio = 0.93;
+
+/// Where a parent's error is so many times the allowed error, not even the error of a smooth distance, which falls by
+/// 2^6 in a cell of half the size, would be within the tolerance.
+constexpr double kHopeless = 200;
+
+/// Share of the difference between the errors at two neighbouring points that is added to the greater one.
+constexpr double kShareOfDifference = 0.25;
+
+double valueAt(const Fit& fit, const Vector3& local) {
+  return query::evaluate(fit.coefficients.data(), fit.degree, {local.x(), local.y(), local.z()});
+}
+
+Vector3 worldPoint(const Box& cell, const Vector3& local) {
+  return cell.center() + (cell.sizes() / 2).cwiseProduct(local);
+}
+
+/// Returns true if the distance changes faster between two neighbouring points than a signed distance can.
+bool hasJump(const CellLattice& lattice, const Box& cell, std::span<const double> distances) {
+  constexpr double kRoundingOfSlope = 1.001;
+  const Vector3 half = cell.sizes() / 2;
+  return std::ranges::any_of(lattice.neighbours(), [&](const auto& pair) {
+    const Vector3 step = half.cwiseProduct(lattice.points()[pair.first] - lattice.points()[pair.second]);
+    return std::abs(distances[pair.first] - distances[pair.second]) > kRoundingOfSlope * step.norm();
+  });
+}
+
+Fit polynomial(std::vector<double> coefficients, int degree, const Box& cell) {
+  Fit fit;
+  fit.degree = degree;
+  fit.coefficients = std::move(coefficients);
+  fit.isFinal = true;
+  fit.error.volume = cell.volume();
+  return fit;
+}
+
+}  // namespace
+
+ToleranceFitter::ToleranceFitter(const DistanceFunction& distance, const AllowedError& allowed, const Box& domain,
+                                 double blend, bool certified, const Progress& progress)
+    : distance_(distance),
+      allowed_(allowed),
+      domain_(domain),
+      lattice_(1 + 2 * blend),
+      certified_(certified),
+      progress_(progress) {
+  if (distance.triangleSearch() != nullptr) surface_.emplace(*distance.triangleSearch());
+}
+
+std::vector<double> ToleranceFitter::distances(const Box& cell, std::span<const Vector3> local) const {
+  progress_.throwIfCancelled();
+  std::vector<Vector3> points(local.size());
+  std::vector<double> values(local.size());
+  for (std::size_t i = 0; i < local.size(); ++i) points[i] = worldPoint(cell, local[i]);
+  for (std::size_t first = 0; first < local.size(); first += kPointsAtOnce) {
+    const std::size_t count = std::min(kPointsAtOnce, local.size() - first);
+    distance_(std::span(points).subspan(first, count), std::span(values).subspan(first, count));
+  }
+  requireFinite(points, values);
+  evaluations_ += local.size();
+  return values;
+}
+
+/// Returns the greatest error at the lattice, in multiples of the allowed error. A part of the difference between
+/// neighbours is added, because errors between them may be greater.
+double ToleranceFitter::latticeRatio(std::span<const double> errors, std::span<const double> allowed) const {
+  double ratio = 0;
+  for (const auto& [a, b] : lattice_.neighbours()) {
+    const double error = std::max(std::abs(errors[a]), std::abs(errors[b])) +
+                         kShareOfDifference * std::abs(errors[a] - errors[b]);
+    ratio = std::max(ratio, error / std::min(allowed[a], allowed[b]));
+  }
+  return ratio;
+}
+
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::check(const Fit& fit, const Box& cell,
+                                                                  std::span<const Vector3> local) const {
+  const std::vector<double> exact = distances(cell, local);
+  std::vector<CheckedPoint> points(local.size());
+  for (std::size_t i = 0; i < local.size(); ++i)
+    points[i] = {local[i], std::abs(valueAt(fit, local[i]) - exact[i]) / allowed_.at(exact[i])};
+  return points;
+}
+
+/// Returns the worst ones of the points, which lie apart from each other.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::vector<CheckedPoint> points) const {
+  constexpr std::size_t kMost = 16;
+  constexpr double kLeast = 0.5, kApart = 0.8;  // ratio of the error, and distance in spacings of the lattice
+  std::erase_if(points, [](const CheckedPoint& point) { return point.ratio < kLeast; });
+  std::ranges::stable_sort(points, std::greater(), &CheckedPoint::ratio);
+  std::vector<CheckedPoint> tops;
+  for (const CheckedPoint& point : points) {
+    if (tops.size() == kMost) break;
+    const bool isApart = std::ranges::all_of(tops, [&](const CheckedPoint& top) {
+      return (top.local - point.local).norm() >= kApart * lattice_.spacing();
+    });
+    if (isApart) tops.push_back(point);
+  }
+  return tops;
+}
+
+/// Searches for greater errors uphill from several points at once. Returns the greatest ratio, or one that is too
+/// great.
+double ToleranceFitter::climb(const Fit& fit, const Box& cell, std::vector<CheckedPoint> tops) const {
+  constexpr int kRounds = 7;
+  constexpr int kDirections = 6;
+  std::vector<double> steps(tops.size(), lattice_.spacing() / 2);
+  double greatest = 0;
+  for (const CheckedPoint& top : tops) greatest = std::max(greatest, top.ratio);
+  for (int round = 0; round < kRounds && !tops.empty() && greatest <= kMostRatio; ++round) {
+    std::vector<Vector3> around;
+    for (std::size_t t = 0; t < tops.size(); ++t)
+      for (int direction = 0; direction < kDirections; ++direction) {
+        Vector3 point = tops[t].local;
+        double& x = point[direction / 2];
+        x = std::clamp(x + (direction % 2 == 0 ? steps[t] : -steps[t]), -lattice_.reach(), lattice_.reach());
+        around.push_back(point);
+      }
+    const std::vector<CheckedPoint> checked = check(fit, cell, around);
+    for (std::size_t t = 0; t < tops.size(); ++t) {
+      const auto own = std::span(checked).subspan(kDirections * t, kDirections);
+      const auto best = std::ranges::max_element(own, {}, &CheckedPoint::ratio);
+      if (best->ratio > tops[t].ratio)
+        tops[t] = *best;
+      else
+        steps[t] /= 2;
+      greatest = std::max(greatest, tops[t].ratio);
+    }
+  }
+  return greatest;
+}
+
+/// Adds points of the surface in a cell, where the distance is known. They show narrow slots and thin ribs between the
+/// points of the lattice.
+void ToleranceFitter::addSurfacePoints(const Fit& fit, const Box& cell, std::vector<CheckedPoint>& points) const {
+  if (!surface_) return;
+  const Vector3 half = cell.sizes() / 2;
+  surface_->forEachIn(cell, [&](const Vector3& point) {
+    const Vector3 local = (point - cell.center()).cwiseQuotient(half);
+    points.push_back({local, std::abs(valueAt(fit, local) + surface_->offset()) / allowed_.at(surface_->offset())});
+  });
+}
+
+/// Returns the greatest ratio found in a cell, or one that is too great. `points` are the points of the lattice.
+double ToleranceFitter::greatestRatio(const Fit& fit, const Box& cell, std::vector<CheckedPoint> points) const {
+  const std::vector<CheckedPoint> between = check(fit, cell, lattice_.pointsBetween());
+  points.insert(points.end(), between.begin(), between.end());
+  addSurfacePoints(fit, cell, points);
+  const double greatest = std::ranges::max_element(points, {}, &CheckedPoint::ratio)->ratio;
+  return greatest > kMostRatio ? greatest : std::max(greatest, climb(fit, cell, topsOf(std::move(points))));
+}
+
+ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {
+  ToleranceFit result;
+  if (ratioAbove > kHopeless) {
+    result.ratio = ratioAbove / 2;  // the least by which an error falls if the distance has a kink in the cell
+    return result;
+  }
+  const std::vector<double> exact = distances(cell, lattice_.points());
+  result.jumps = hasJump(lattice_, cell, exact);
+  std::vector<double> allowed(exact.size());
+  std::ranges::transform(exact, allowed.begin(), [&](double distance) { return allowed_.at(distance); });
+
+  std::vector<double> errors(exact.size());
+  const auto tried = [&](int degree) {
+    Fit fit = polynomial(lattice_.fit(exact, degree), degree, cell);
+    errors = lattice_.valuesOf(fit.coefficients, degree);
+    for (std::size_t i = 0; i < exact.size(); ++i) errors[i] -= exact[i];
+    return fit;
+  };
+  const auto keepCloser = [&](Fit&& fit, double ratio) {
+    if (!result.closest.coefficients.empty() && ratio >= result.ratio) return;
+    result.closest = std::move(fit);
+    result.ratio = ratio;
+  };
+
+  for (int degree = 1; degree <= CellLattice::kMostDegree; ++degree) {
+    if (degree == 3) {  // before the degrees in between are tried, the highest one must be within the tolerance
+      Fit highest = tried(CellLattice::kMostDegree);
+      const double ratio = latticeRatio(errors, allowed);
+      keepCloser(std::move(highest), ratio);
+      if (ratio > kMostRatio) return result;
+    }
+    Fit fit = tried(degree);
+    double ratio = latticeRatio(errors, allowed);
+    if (ratio <= kMostRatio) {
+      std::vector<CheckedPoint> points(exact.size());
+      for (std::size_t i = 0; i < exact.size(); ++i)
+        points[i] = {lattice_.points()[i], std::abs(errors[i]) / allowed[i]};
+      ratio = greatestRatio(fit, cell, std::move(points));
+      if (ratio <= kMostRatio && (!certified_ || isProven(fit, cell))) {
+        result.ratio = ratio;
+        result.fit = std::move(fit);
+        return result;
+      }
+    }
+    if (degree == 2 && ratio > kHopeless / 2) {
+      keepCloser(std::move(fit), ratio);
+      return result;
+    }
+    keepCloser(std::move(fit), ratio);
+  }
+  return result;
+}
+
+bool ToleranceFitter::isProven(const Fit&, const Box&) const { return false; }
+
+}  // namespace hpsdf::detail

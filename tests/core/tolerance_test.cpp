@@ -1,0 +1,225 @@
+// Tests fields that are built within a tolerance.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "field/cells/cell_lattice.h"
+#include "field/cells/surface_points.h"
+#include "hpsdf/build.h"
+#include "hpsdf/detail/exact_samples.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/shapes.h"
+#include "hpsdf/verify.h"
+#include "support/made_meshes.h"
+
+namespace hpsdf {
+namespace tolerance_test {
+
+/// Returns the greatest error over the allowed error at random points near the surface and in the domain.
+double greatestRatio(const Field& field, const DistanceFunction& distance, const TriangleMesh& surface) {
+  const FieldMetadata& metadata = field.metadata();
+  const AllowedError allowed = allowedError(metadata.settings, metadata.referenceLength);
+  const SampleOptions options{.count = 200'000, .seed = 3};
+  double greatest = 0;
+  for (const ExactSamples& samples : {sampleNear(distance, surface, field.domain(), allowed.within, options),
+                                      sampleUniform(distance, field.domain(), 0, options)}) {
+    std::vector<double> values(samples.points.size());
+    field.values(samples.points, values);
+    for (std::size_t n = 0; n < values.size(); ++n)
+      greatest = std::max(greatest, std::abs(values[n] - samples.distances[n]) / allowed.at(samples.distances[n]));
+  }
+  return greatest;
+}
+
+TEST(Tolerance, allowsMoreFarFromTheSurface) {
+  const AllowedError allowed{.tolerance = 0.5, .within = 2};
+  EXPECT_EQ(allowed.at(0), 0.5);
+  EXPECT_EQ(allowed.at(-2), 0.5);
+  EXPECT_DOUBLE_EQ(allowed.at(-12), 0.6);
+  EXPECT_DOUBLE_EQ(allowed.at(12), 0.6);
+}
+
+TEST(Tolerance, isKept) {
+  for (const char* shape : {"torus,segments=48,sides=24", "gear,teeth=7", "sphere"}) {
+    const TriangleMesh mesh = shapes::mesh(shape);
+    const ExactDistance distance(mesh);
+    std::size_t before = 0;
+    for (const double tolerance : {0.02, 0.002}) {
+      SCOPED_TRACE(std::string(shape) + ", tolerance " + std::to_string(tolerance));
+      const Field field = build(distance, domainAround(mesh), {.tolerance = tolerance});
+      EXPECT_LE(greatestRatio(field, distance, mesh), 1);
+      EXPECT_LE(field.metadata().measuredError, tolerance);
+      EXPECT_EQ(field.metadata().settings.tolerance, tolerance);
+      EXPECT_GT(field.bytes(), before) << "a smaller tolerance takes more bytes";
+      before = field.bytes();
+      const Measurement measured = measure(field, distance);
+      EXPECT_LE(measured.toleranceRatio, 1);
+      EXPECT_GT(measured.toleranceRatio, 0.2) << "the tolerance is made use of";
+      EXPECT_EQ(measured.beyondTolerance, 0U);
+    }
+  }
+}
+
+TEST(Tolerance, isKeptAtAnyScale) {
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=5");
+  const TriangleMesh large = support::moved(mesh, {1e4, 0, 0}, 1000);
+  const ExactDistance distance(mesh), distanceOfLarge(large);
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 0.01});
+  const Field fieldOfLarge = build(distanceOfLarge, domainAround(large), {.tolerance = 10});
+  EXPECT_NEAR(double(fieldOfLarge.bytes()) / double(field.bytes()), 1, 0.1);
+  EXPECT_LE(greatestRatio(fieldOfLarge, distanceOfLarge, large), 1);
+}
+
+TEST(Tolerance, takesExactLeavesWhereTheseAreSmaller) {
+  const TriangleMesh mesh = support::boxOfTwo();
+  const ExactDistance distance(mesh);
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 1e-3});
+  EXPECT_GT(statistics(field).exact.leaves, 100U);
+  EXPECT_LT(field.bytes(), 12'000U);
+  const DistanceFunction withoutTriangles([&](const Vector3& x) { return distance(x); }, distance.source());
+  const Field polynomials = build(withoutTriangles, domainAround(mesh), {.tolerance = 4e-3});
+  EXPECT_EQ(statistics(polynomials).exact.leaves, 0U);
+  EXPECT_GT(polynomials.bytes(), 10 * field.bytes());
+  EXPECT_LE(greatestRatio(polynomials, withoutTriangles, mesh), 1);
+}
+
+TEST(Tolerance, doesNotDependOnThreads) {
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=7");
+  const ExactDistance distance(mesh);
+  const Field one = build(distance, domainAround(mesh), {.tolerance = 0.004, .threads = 1});
+  const Field all = build(distance, domainAround(mesh), {.tolerance = 0.004});
+  EXPECT_EQ(one.data().nodes, all.data().nodes);
+  EXPECT_EQ(one.data().coefficients, all.data().coefficients);
+  EXPECT_EQ(one.data().exact.lists, all.data().exact.lists);
+}
+
+/// A slot that is far narrower than the points of the lattice are apart, in a block that a few large cells cover.
+TEST(Tolerance, seesNarrowSlots) {
+  for (const double width : {0.01, 0.003}) {
+    TriangleMesh mesh = support::boxBetween({-1, -1, -1}, {-width / 2, 1, 1});
+    mesh = support::joined(std::move(mesh), support::boxBetween({width / 2, -1, -1}, {1, 1, 1}));
+    mesh = support::joined(std::move(mesh), support::boxBetween({-width, -1, -1.5}, {width, 1, -0.9}));
+    const ExactDistance distance(mesh);
+    const Field field = build(distance, domainAround(mesh), {.tolerance = width / 8});
+    EXPECT_LE(greatestRatio(field, distance, mesh), 1) << width;
+    for (const Vector3& x : support::placesIn(Box(Vector3(-width / 8, -0.8, -0.7), Vector3(width / 8, 0.8, 0.8)), 1000))
+      EXPECT_GT(field.value(x), 0) << x.transpose();
+  }
+}
+
+TEST(Tolerance, includesBlending) {
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=5");
+  const ExactDistance distance(mesh);
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 0.01, .blend = 0.04});
+  EXPECT_EQ(field.data().blend, 0.04);
+  EXPECT_LE(greatestRatio(field, distance, mesh), 1);
+}
+
+TEST(Tolerance, takesDoubleWhereFloatIsTooCoarse) {
+  const TriangleMesh mesh = support::moved(support::boxOfTwo(), {1e5, 0, 0});
+  const auto distance = [](const Vector3& x) { return (x - Vector3(1e5, 0, 0)).norm() - 1 + 1e6; };
+  const Box domain = domainAround(mesh);
+  EXPECT_FALSE(build(distance, domain, {.tolerance = 1e-3}).singlePrecision());
+  const auto near = [](const Vector3& x) { return (x - Vector3(1e5, 0, 0)).norm() - 1; };
+  EXPECT_TRUE(build(near, domain, {.tolerance = 1e-3}).singlePrecision());
+}
+
+/// No polynomial can follow a distance that jumps.
+TEST(Tolerance, saysWhereItCannotBeKept) {
+  const auto distance = [](const Vector3& x) { return x.norm() - 0.8 + (x.z() > 0.05 ? 0.2 : 0); };
+  const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
+  const Field field = build(distance, domain, {.tolerance = 0.02});
+  EXPECT_GT(field.metadata().measuredError, 0.02);
+  const Measurement measured = measure(field, distance);
+  EXPECT_GT(measured.beyondTolerance, 0U);
+  EXPECT_LT(double(measured.beyondTolerance), 0.05 * double(measured.points)) << "only beside the jump";
+  EXPECT_GT(measured.toleranceRatio, 1);
+}
+
+TEST(Tolerance, foretellsBytesOnceAndEarly) {
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=24");
+  const ExactDistance distance(mesh);
+  std::vector<Forecast> forecasts;
+  double fraction = 0, fractionThen = 1;
+  const Progress progress{.report = [&](std::string_view, double done) { fraction = done; },
+                          .forecast =
+                              [&](const Forecast& forecast) {
+                                forecasts.push_back(forecast);
+                                fractionThen = fraction;
+                              }};
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 5e-4}, progress);
+  ASSERT_EQ(forecasts.size(), 1U);
+  EXPECT_LE(fractionThen, 0.1);
+  EXPECT_GT(forecasts[0].seconds, 0);
+  EXPECT_GT(forecasts[0].bytes, double(field.bytes()) / 2);
+  EXPECT_LT(forecasts[0].bytes, double(field.bytes()) * 2);
+}
+
+TEST(Tolerance, isRefusedEarlyWhereMemoryIsShort) {
+  const TriangleMesh mesh = shapes::mesh("torus,segments=96,sides=48");
+  const ExactDistance distance(mesh);
+  const BuildOptions options{.tolerance = 1e-6, .memoryLimit = distance.bytes() + 3'000'000};
+  double fraction = 0;
+  try {
+    build(distance, domainAround(mesh), options,
+          {.report = [&](std::string_view, double done) { fraction = std::max(fraction, done); }});
+    FAIL() << "expected an error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos) << error.what();
+  }
+  EXPECT_LT(fraction, 0.1);
+}
+
+TEST(Tolerance, goesWithoutOtherGoals) {
+  const auto distance = [](const Vector3& x) { return x.norm() - 1; };
+  const Box domain(Vector3::Constant(-1.1), Vector3::Constant(1.1));
+  EXPECT_THROW(build(distance, domain, {.tolerance = -1}), Error);
+  EXPECT_THROW(build(distance, domain, {.maxError = 0.1, .tolerance = 0.1}), Error);
+  EXPECT_THROW(build(distance, domain, {.tolerance = 0.1, .maxBytes = 1'000'000}), Error);
+  EXPECT_THROW(build(distance, domain, {.tolerance = 0.1, .band = 0.1}), Error);
+  EXPECT_THROW(build(distance, domain, {.tolerance = 0.1, .certified = true, .blend = 0.04}), Error);
+  EXPECT_THROW(buildResumably(distance, domain, {.tolerance = 0.1}, {.file = "state"}), Error);
+}
+
+TEST(CellLattice, fitsPolynomialsExactly) {
+  for (const double reach : {1.0, 1.08}) {
+    const detail::CellLattice lattice(reach);
+    ASSERT_EQ(lattice.points().size(), 512U);
+    EXPECT_EQ(lattice.pointsBetween().size(), 729U);
+    std::vector<double> samples;
+    for (const Vector3& x : lattice.points())
+      samples.push_back(1 + x.x() * x.y() * x.z() - std::pow(x.x(), 5) + 2 * x.y() * x.y());
+    const std::vector<double> values = lattice.valuesOf(lattice.fit(samples, 5), 5);
+    for (std::size_t i = 0; i < samples.size(); ++i) EXPECT_NEAR(values[i], samples[i], 1e-12);
+    double greatest = 0;
+    for (const Vector3& x : lattice.points()) greatest = std::max(greatest, x.cwiseAbs().maxCoeff());
+    EXPECT_DOUBLE_EQ(greatest, reach);
+    for (const auto& [a, b] : lattice.neighbours())
+      EXPECT_NEAR((lattice.points()[a] - lattice.points()[b]).norm(), lattice.spacing(), 1e-12);
+  }
+}
+
+TEST(SurfaceInCells, clipsTriangles) {
+  const TriangleMesh mesh = support::boxOfTwo();
+  const ExactDistance distance(mesh);
+  const detail::SurfaceInCells surface(distance.triangleSearch());
+  const Box cell(Vector3(0.5, 0.25, 0.25), Vector3(1.5, 0.5, 0.5));  // one face of the box cuts this cell
+  std::size_t count = 0;
+  Box reached;
+  surface.forEachIn(cell, [&](const Vector3& point) {
+    ++count;
+    reached.extend(point);
+    EXPECT_NEAR(point.x(), 1, 1e-12);
+    EXPECT_NEAR(distance(point), 0, 1e-12);
+  });
+  EXPECT_GE(count, 5U);
+  EXPECT_TRUE(reached.min().isApprox(Vector3(1, 0.25, 0.25), 1e-9));
+  EXPECT_TRUE(reached.max().isApprox(Vector3(1, 0.5, 0.5), 1e-9));
+}
+
+}  // namespace tolerance_test
+}  // namespace hpsdf
