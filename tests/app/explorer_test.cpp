@@ -347,6 +347,25 @@ TEST(Explorer, aRebuildKeepsContinuity) {
   EXPECT_EQ(bench.session.current().field.metadata().settings.continuityWeight, std::nullopt);
 }
 
+TEST(Explorer, rebuildsWithinATolerance) {
+  Bench bench;
+  bench.run("build builtin:gear,teeth=3 tolerance=1% ; show size=900x1100 ; panel view=false");
+  const auto settings = [&] { return bench.session.current().field.metadata().settings; };
+  const double tolerance = settings().tolerance;
+  EXPECT_TRUE(bench.explorer().widgets().contains("build/tolerance"));
+  EXPECT_FALSE(bench.explorer().widgets().contains("build/strategy"));
+  bench.run("settings grid=5 ; rebuild");
+  EXPECT_EQ(settings().tolerance, tolerance);
+  EXPECT_EQ(bench.session.current().field.grid()[0], 5U);
+  bench.run("settings tolerance=2% ; rebuild");
+  EXPECT_EQ(settings().tolerance, 2 * tolerance);
+  bench.run("settings target-error=1e-3 ; rebuild");
+  EXPECT_EQ(settings().tolerance, 0);
+  EXPECT_EQ(settings().targetError.weighted(), 1e-3);
+  bench.run("settings tolerance=2% ; rebuild");
+  EXPECT_EQ(settings().tolerance, 2 * tolerance);
+}
+
 TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
   Bench bench;
   bench.run("build analytic:torus target-error=1e-2 ; show size=900x1100 ; panel view=false");

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "field/cells/cell_bounds.h"
 #include "field/cells/cell_lattice.h"
 #include "field/cells/surface_points.h"
 #include "hpsdf/build.h"
@@ -172,6 +175,33 @@ TEST(Tolerance, isRefusedEarlyWhereMemoryIsShort) {
     EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos) << error.what();
   }
   EXPECT_LT(fraction, 0.1);
+}
+
+TEST(Tolerance, canBeCertified) {
+  const TriangleMesh mesh = shapes::mesh("torus,segments=24,sides=12");
+  const ExactDistance distance(mesh);
+  const BuildOptions checked{.tolerance = 0.01}, certified{.tolerance = 0.01, .certified = true};
+  const Field field = build(distance, domainAround(mesh), certified);
+  EXPECT_TRUE(field.metadata().settings.certified);
+  EXPECT_LE(field.metadata().measuredError, 0.01);
+  EXPECT_LE(greatestRatio(field, distance, mesh), 1);
+  EXPECT_GT(field.bytes(), build(distance, domainAround(mesh), checked).bytes());
+}
+
+/// The bound of a constant is proven where the distance stays below the allowed error, and nowhere else.
+TEST(Tolerance, isProvenOnlyWhereItHolds) {
+  const auto plane = [](const Vector3& x) { return x.z(); };
+  const DistanceFunction distance(plane);
+  const Box cell(Vector3::Constant(-1), Vector3::Constant(1)), domain(Vector3::Constant(-9), Vector3::Constant(9));
+  std::atomic<std::uint64_t> evaluations = 0;
+  const auto isProven = [&](const std::vector<double>& coefficients, int degree, double tolerance) {
+    return detail::isProvenWithin({coefficients, degree, cell, domain, distance}, {tolerance, 10}, 0, evaluations);
+  };
+  EXPECT_FALSE(isProven({0}, 0, 0.99)) << "the error is 1 at the upper and the lower face";
+  EXPECT_TRUE(isProven({0}, 0, 1.5));
+  EXPECT_TRUE(isProven({0, 1, 0, 0}, 1, 0.2)) << "the distance itself";
+  EXPECT_FALSE(isProven({0.25, 1, 0, 0}, 1, 0.2));
+  EXPECT_GT(evaluations, 0U);
 }
 
 TEST(Tolerance, goesWithoutOtherGoals) {

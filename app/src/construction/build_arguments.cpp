@@ -160,6 +160,8 @@ BuildOptions buildOptions(const Arguments& arguments, double longestSide) {
   if (arguments.given("tolerance")) requireEffect(arguments);
   for (const BuildSetting& setting : buildSettings()) {
     if (!setting.isOffered || !arguments.given(setting.name)) continue;
+    if (setting.hasOwner != nullptr && setting.type == BuildSetting::Type::flag && !arguments.flag(setting.name))
+      continue;  // the flag is off, as it is without its owner
     if (!setting.exclusive.empty() && arguments.given(setting.exclusive))
       throw Error(fmt::format("{} and {} exclude each other: give one of them", setting.exclusive, setting.name));
     if (setting.hasOwner != nullptr)

@@ -72,6 +72,8 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
     BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
     checkBuild(domain, options);
+    if (options.certified && prepared.report && !prepared.report->closed())
+      throw Error("certified: the mesh has holes, beside which nothing is proven: close them, or leave certified out");
     warnOfCutSurface(console, box, domain);
 
     // Set up the exact distance function and measure how long this takes. The default memory limit is meant for the

@@ -111,7 +111,8 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
   BuildOptions built = settingsOf(field.data());
   // If the construction had no target error, use the error that the field reached as the target.
-  if (built.targetError.isNone() && !(built.maxError > 0)) built.targetError = field.metadata().totalError;
+  if (built.targetError.isNone() && !(built.maxError > 0) && !(built.tolerance > 0))
+    built.targetError = field.metadata().totalError;
   std::map<std::string, std::string> settings;
   for (const BuildSetting& setting : buildSettings()) {
     const std::string text = settingText(setting, built);
@@ -129,8 +130,14 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
 void Explorer::rebuild(std::optional<int> maxSteps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
-  for (const BuildSetting& setting : buildSettings())
+  const bool isWithinTolerance =
+      settings_.contains("tolerance") || (settings.contains("tolerance") && !settings_.contains("target-error"));
+  for (const BuildSetting& setting : buildSettings()) {
     if (settings_.contains(std::string(setting.name))) settings.erase(std::string(setting.exclusive));
+    const bool ofTolerance = setting.name == "tolerance" || setting.owner == "tolerance";
+    if (isWithinTolerance ? !ofTolerance && !setting.hasEffectWithTolerance : ofTolerance)
+      settings.erase(std::string(setting.name));
+  }
   for (const auto& [name, value] : settings_) settings[name] = value;
   // If the settings name a kind of continuity (weak, exact, both or none), drop the parameters of the kinds not named.
   const auto continuity = settings_.find("continuity");

@@ -173,14 +173,8 @@ void drawViewPanel(const Controls& controls, Explorer& explorer) {
   controls.field("view/beside", "beside", view.beside, "beside ", true);
 }
 
-void drawBuildPanel(const Controls& controls, Explorer& explorer) {
-  const CurrentField& current = explorer.session().current();
-  const Field& field = current.field;
-  const BuildOptions built = settingsOf(field.data());
-  const BuildControls build{controls, explorer.settings()};
-  build.field("mesh", current.madeFrom());
-  build.field("target-error", shortNumber(built.targetError.weighted()));
-  build.field("grid", settingText(buildSetting("grid"), built));
+/// Draws the settings of Algorithm 1, which have no effect on a construction within a tolerance.
+void drawRefinement(const BuildControls& build, const BuildOptions& built) {
   build.slider("nearness", built.nearness, 0, 8, "%.1f");
   for (const char* name : {"max-degree", "max-depth"}) {
     const BuildSetting& setting = buildSetting(name);
@@ -190,6 +184,21 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer) {
     const BuildSetting& setting = buildSetting(name);
     build.choice(name, {setting.words.begin(), setting.words.end()}, settingText(setting, built));
   }
+}
+
+void drawBuildPanel(const Controls& controls, Explorer& explorer) {
+  const CurrentField& current = explorer.session().current();
+  const Field& field = current.field;
+  const BuildOptions built = settingsOf(field.data());
+  const BuildControls build{controls, explorer.settings()};
+  build.field("mesh", current.madeFrom());
+  const bool isTolerant = hasTolerance(field);
+  if (isTolerant)
+    build.field("tolerance", shortNumber(built.tolerance));
+  else
+    build.field("target-error", shortNumber(built.targetError.weighted()));
+  build.field("grid", settingText(buildSetting("grid"), built));
+  if (!isTolerant) drawRefinement(build, built);
   drawContinuity(build, field);
   const bool bounds = build.value("bounds", field.data().bounds.empty() ? "false" : "true") == "true";
   controls.checkbox("build/bounds", "bounds", bounds, "settings bounds=");

@@ -47,9 +47,9 @@ void LeastBytes::makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&
       return consider(cell, std::move(*fit), bytes);
     }
   if (polynomial.closest.coefficients.empty()) polynomial = fitter_.fit(box, 0);
-  Fit fit = polynomial.fit ? std::move(*polynomial.fit) : std::move(polynomial.closest);
+  cell.isMissed = !polynomial.fit;
+  Fit fit = cell.isMissed ? std::move(polynomial.closest) : std::move(*polynomial.fit);
   cell.ratio = polynomial.ratio;
-  cell.isMissed = cell.ratio > 1;
   const double bytes = polynomialBytes(fit);
   consider(cell, std::move(fit), bytes);
 }
@@ -85,8 +85,8 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
   // Where the distance jumps, no polynomial is within the tolerance. Cells that are hardly larger than the tolerance
   // show the place of the jump well enough.
   constexpr double kSmallestAtJump = 4;
-  const bool isSmallest = place.depth >= maxDepth_ || (polynomial.jumps && box.sizes().maxCoeff() <
-                                                                         kSmallestAtJump * fitter_.allowed().tolerance);
+  const bool isSmallest = place.depth >= maxDepth_ ||
+                          (polynomial.jumps && box.sizes().maxCoeff() < kSmallestAtJump * fitter_.allowed().tolerance);
   if (!isSmallest) return true;
   if (cell.bytes == kNone) makeSmallestLeaf(cell, box, std::move(polynomial));
   return false;

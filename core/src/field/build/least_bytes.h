@@ -18,9 +18,9 @@ namespace hpsdf::detail {
 
 /// A cell of an octree within a tolerance: a leaf, or a cell with eight children.
 struct CheapCell {
-  Fit fit;             ///< as a leaf; empty if the cell has children
-  double bytes = 0;    ///< of the leaf, or of all descendants, in the finished field
-  double ratio = 0;    ///< error of the cell's best polynomial over the allowed error
+  Fit fit;                ///< as a leaf; empty if the cell has children
+  double bytes = 0;       ///< of the leaf, or of all descendants, in the finished field
+  double ratio = 0;       ///< error of the cell's best polynomial over the allowed error
   bool isMissed = false;  ///< the leaf is a polynomial that misses the tolerance, in a cell that is not divided further
   std::unique_ptr<std::array<CheapCell, 8>> children = {};
 };

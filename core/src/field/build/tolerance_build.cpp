@@ -161,7 +161,10 @@ class ToleranceBuild {
   double moveToTree(std::uint32_t node, CheapCell&& cell) {
     if (!cell.children) {
       const bool isPolynomial = cell.isMissed || !cell.fit.isExact();
-      const double ratio = cell.isMissed ? cell.ratio : isPolynomial ? std::min(cell.ratio, 1.0) : 0;
+      constexpr double kUnproven = 1.001;  // counts as missed, whatever its error at the checked points
+      const double ratio = cell.isMissed  ? std::max(cell.ratio, kUnproven)
+                           : isPolynomial ? std::min(cell.ratio, 1.0)
+                                          : 0;
       tree_.nodes[node].fit = std::move(cell.fit);
       return ratio;
     }

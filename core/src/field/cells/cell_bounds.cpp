@@ -75,18 +75,23 @@ void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
     part.products[std::ranges::find(order, 0) - order.begin()] = coefficient;
 }
 
-/// Returns a leaf's polynomial over one octant of a box. The octant's number is x + 2y + 4z.
-Part partOf(const std::vector<double>& cube, int degree, const Box& box, int number, const Halves& halves) {
+/// Returns the coefficients of a leaf's polynomial in local coordinates of one octant of a box.
+std::vector<double> octantCoefficients(const std::vector<double>& cube, int degree, int number, const Halves& halves) {
   std::array<const LegendreRows*, 3> rows;
+  for (int axis = 0; axis < 3; ++axis) rows[axis] = halves[axis][number >> axis & 1];
+  return partCoefficients(cube, degree, rows);
+}
+
+/// Returns a leaf's polynomial over one octant of a box. The octant's number is x + 2y + 4z. `c` holds the coefficients
+/// in local coordinates of the octant.
+Part partOf(const std::vector<double>& c, int degree, const Box& box, int number) {
   Part part;
   for (int axis = 0; axis < 3; ++axis) {
     const bool upper = number >> axis & 1;
-    rows[axis] = halves[axis][upper];
     const double half = box.sizes()[axis] / 2;
     part.center[axis] = box.center()[axis] + (upper ? 0.5 : -0.5) * half;
     part.half[axis] = 0.5 * half;
   }
-  const std::vector<double> c = partCoefficients(cube, degree, rows);
   part.gradient.setZero();
   part.restGradient.setZero();
   basis::forEachCoefficient(degree, [&](int i, int j, int k, int) {
@@ -166,6 +171,57 @@ double errorBound(const Part& part, std::span<const Vector3> partPoints, std::sp
   }
   return std::max(above, below) + part.rest;
 }
+
+/// Proves that a polynomial is within the allowed error.
+class Proof {
+ public:
+  Proof(const CellPolynomial& polynomial, const AllowedError& allowed, double rounding,
+        std::atomic<std::uint64_t>& evaluations)
+      : polynomial_(polynomial), allowed_(allowed), rounding_(rounding), evaluations_(evaluations) {
+    halves_.fill({&below_, &above_});
+  }
+
+  bool holds() const {
+    constexpr int kHalvings = 2;
+    std::vector<double> cube(cubeIndex(polynomial_.degree, polynomial_.degree, polynomial_.degree, polynomial_.degree) +
+                             1);
+    basis::forEachCoefficient(polynomial_.degree, [&](int i, int j, int k, int index) {
+      cube[cubeIndex(i, j, k, polynomial_.degree)] = polynomial_.coefficients[index];
+    });
+    return holdsIn(cube, polynomial_.cell, kHalvings);
+  }
+
+ private:
+  /// Returns true if the error is proven to be within the allowed error in all octants of a box. `cube` holds the
+  /// polynomial's coefficients in local coordinates of the box.
+  bool holdsIn(const std::vector<double>& cube, const Box& box, int halvings) const {
+    const int degree = polynomial_.degree;
+    for (int number = 0; number < 8; ++number) {
+      const std::vector<double> c = octantCoefficients(cube, degree, number, halves_);
+      const Part part = partOf(c, degree, box, number);
+      if (isWithin(part, box.sizes().maxCoeff())) continue;
+      const Box octant(part.center - part.half, part.center + part.half);
+      if (halvings == 0 || !holdsIn(c, octant, halvings - 1)) return false;
+    }
+    return true;
+  }
+
+  bool isWithin(const Part& part, double edge) const {
+    const auto points = pointsOf(part, polynomial_.domain, edge);
+    std::array<double, kPointsPerPart> distances;
+    polynomial_.distance(points, distances);
+    evaluations_ += points.size();
+    const double least = std::max(0.0, std::abs(distances[0]) - part.half.norm());
+    return errorBound(part, points, distances) + rounding_ <= allowed_.at(least);
+  }
+
+  const CellPolynomial& polynomial_;
+  const AllowedError& allowed_;
+  double rounding_;
+  std::atomic<std::uint64_t>& evaluations_;
+  LegendreRows below_ = legendreOfPart(-0.5, 0.5, kMaxDegree), above_ = legendreOfPart(0.5, 0.5, kMaxDegree);
+  Halves halves_;
+};
 
 float roundedUp(double number) {
   const auto nearest = static_cast<float>(number);
@@ -287,7 +343,7 @@ class BoundFinder {
     std::array<std::array<Vector3, kPointsPerPart>, 8> partPoints;
     std::array<Vector3, 8 * kPointsPerPart> points;  // neighbours are adjacent, which makes exact distances faster
     for (int number = 0; number < 8; ++number) {
-      parts[number] = partOf(cube, degree, box, number, halves);
+      parts[number] = partOf(octantCoefficients(cube, degree, number, halves), degree, box, number);
       partPoints[number] = pointsOf(parts[number], field_.domain, box.sizes().maxCoeff());
       for (std::size_t p = 0; p < kPointsPerPart; ++p) points[8 * p + number] = partPoints[number][p];
     }
@@ -469,6 +525,12 @@ void widenForBlending(FieldData& field, BoundFinder& find, const std::vector<que
 }
 
 }  // namespace
+
+bool isProvenWithin(const CellPolynomial& polynomial, const AllowedError& allowed, double rounding,
+                    std::atomic<std::uint64_t>& evaluations) {
+  const double ofValues = kRounding * polynomial.domain.diagonal().norm();
+  return Proof(polynomial, allowed, rounding + ofValues, evaluations).holds();
+}
 
 std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, const Progress& progress) {
   field.bounds.clear();

@@ -1,6 +1,7 @@
 #include "field/cells/tolerance_fit.h"
 
 #include <array>
+#include <limits>
 #include <utility>
 
 #include "field/cells/cell_bounds.h"
@@ -81,8 +82,8 @@ std::vector<double> ToleranceFitter::distances(const Box& cell, std::span<const 
 double ToleranceFitter::latticeRatio(std::span<const double> errors, std::span<const double> allowed) const {
   double ratio = 0;
   for (const auto& [a, b] : lattice_.neighbours()) {
-    const double error = std::max(std::abs(errors[a]), std::abs(errors[b])) +
-                         kShareOfDifference * std::abs(errors[a] - errors[b]);
+    const double error =
+        std::max(std::abs(errors[a]), std::abs(errors[b])) + kShareOfDifference * std::abs(errors[a] - errors[b]);
     ratio = std::max(ratio, error / std::min(allowed[a], allowed[b]));
   }
   return ratio;
@@ -106,9 +107,8 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::vector<C
   std::vector<CheckedPoint> tops;
   for (const CheckedPoint& point : points) {
     if (tops.size() == kMost) break;
-    const bool isApart = std::ranges::all_of(tops, [&](const CheckedPoint& top) {
-      return (top.local - point.local).norm() >= kApart * lattice_.spacing();
-    });
+    const bool isApart = std::ranges::all_of(
+        tops, [&](const CheckedPoint& top) { return (top.local - point.local).norm() >= kApart * lattice_.spacing(); });
     if (isApart) tops.push_back(point);
   }
   return tops;
@@ -218,6 +218,11 @@ ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {
   return result;
 }
 
-bool ToleranceFitter::isProven(const Fit&, const Box&) const { return false; }
+bool ToleranceFitter::isProven(const Fit& fit, const Box& cell) const {
+  double magnitude = 0;  // of the greatest change when all coefficients are rounded to float
+  for (const double coefficient : fit.coefficients) magnitude += std::abs(coefficient);
+  const double rounding = magnitude * std::numeric_limits<float>::epsilon();
+  return isProvenWithin({fit.coefficients, fit.degree, cell, domain_, distance_}, allowed_, rounding, evaluations_);
+}
 
 }  // namespace hpsdf::detail
