@@ -124,7 +124,8 @@ std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request) 
   const std::string subtitle = failures == 0
                                    ? fmt::format("All {} comparisons are as they should be", outcome.items.size())
                                    : fmt::format("{} of {} comparisons failed", failures, outcome.items.size());
-  std::string html = htmlHead("Check of " + request.folder.string(), subtitle, std::string(kPictureRowStyle) + std::string(kCheckStyle));
+  std::string html = htmlHead("Check of " + request.folder.string(), subtitle,
+                              std::string(kPictureRowStyle) + std::string(kCheckStyle));
   html += "<h2>All comparisons</h2>\n" + overview(outcome);
   html += fmt::format("<code>{}</code>\n", htmlEscaped(checkCommand(request)));
   for (const CheckedItem& item : outcome.items)

@@ -43,14 +43,15 @@ void requireComparable(const std::vector<CurrentField>& fields) {
   };
   for (const CurrentField& other : fields) {
     const Source& its = other.field.metadata().source;
-    if (its.normalization.scale != source.normalization.scale || its.normalization.center != source.normalization.center)
+    if (its.normalization.scale != source.normalization.scale ||
+        its.normalization.center != source.normalization.center)
       throw Error(fmt::format("{} and {} are in different units; build both with --normalize, or both without",
                               first.name, other.name));
     if (its.insideTest != source.insideTest && (isOwnSurface(its) || isOwnSurface(source)))
-      throw Error(fmt::format("{} and {} are of different surfaces of the mesh ({} and {}); build both with the same "
-                              "--sign and --hull",
-                              first.name, other.name, insideTestName(source.insideTest),
-                              insideTestName(its.insideTest)));
+      throw Error(
+          fmt::format("{} and {} are of different surfaces of the mesh ({} and {}); build both with the same "
+                      "--sign and --hull",
+                      first.name, other.name, insideTestName(source.insideTest), insideTestName(its.insideTest)));
     if (its.thickness != source.thickness)
       throw Error(fmt::format("{} and {} are of walls of different thickness; build both with the same --thickness",
                               first.name, other.name));
@@ -61,10 +62,11 @@ void requireSameMesh(const std::vector<CurrentField>& fields) {
   const Source& source = fields.front().field.metadata().source;
   for (const CurrentField& other : fields)
     if (const Source& its = other.field.metadata().source; !isMadeFrom(source, its))
-      throw Error(fmt::format("{} was made from {}, but {} from another mesh, {}; compare fields of one mesh, or give "
-                              "--mesh with --any-mesh",
-                              fields.front().name, source.name.empty() ? "something unknown" : source.name, other.name,
-                              its.name.empty() ? "something unknown" : its.name));
+      throw Error(
+          fmt::format("{} was made from {}, but {} from another mesh, {}; compare fields of one mesh, or give "
+                      "--mesh with --any-mesh",
+                      fields.front().name, source.name.empty() ? "something unknown" : source.name, other.name,
+                      its.name.empty() ? "something unknown" : its.name));
 }
 
 /// Returns the surface from which the fields were made: a shape, or a file of the mesh's name in the current folder or
@@ -101,7 +103,8 @@ CompareOptions compareOptions(const Arguments& arguments) {
           .times = !arguments.flag("no-times")};
 }
 
-/// Returns the settings of the pictures. Without the argument `offset`, the plane goes through the middle of the surface.
+/// Returns the settings of the pictures. Without the argument `offset`, the plane goes through the middle of the
+/// surface.
 ViewSettings viewSettings(const Arguments& arguments, const Vector3& middle) {
   const int axis = arguments.text("axis")[0] - 'x';
   return {{axis, arguments.has("offset") ? arguments.number("offset") : middle[axis]},
@@ -131,7 +134,7 @@ void runCompare(Session& session, const Arguments& arguments) {
   const Box shown = reference.distance->source().box.intersection(domain);
   const ViewSettings settings = viewSettings(arguments, shown.isEmpty() ? domain.center() : shown.center());
   if (writesPage) checkViews(domain, settings);
-  Comparison comparison = compareFields(console, fields, reference, compareOptions(arguments));
+  FieldComparison comparison = compareFields(console, fields, reference, compareOptions(arguments));
   comparison.surface = printable(surface);
   Json json = comparisonJson(comparison);
   if (writesPage) {

@@ -44,19 +44,18 @@ const FigureRow kFigureRows[] = {
     {"  farthest from the surface", [](FF f) { return f.farthestWrongSign; }, shortNumber},
     {"torn share of the surface", [](FF f) { return f.tornShare; }, percentText}};
 
-const FigureRow kTimeRows[] = {
-    {"time of a single query", [](FF f) { return f.times->single; }, nanosecondsText},
-    {"  over A", [](FF f) { return f.times->single; }, ratioText, true},
-    {"time of a query in a batch", [](FF f) { return f.times->batched; }, nanosecondsText},
-    {"  over A", [](FF f) { return f.times->batched; }, ratioText, true}};
+const FigureRow kTimeRows[] = {{"time of a single query", [](FF f) { return f.times->single; }, nanosecondsText},
+                               {"  over A", [](FF f) { return f.times->single; }, ratioText, true},
+                               {"time of a query in a batch", [](FF f) { return f.times->batched; }, nanosecondsText},
+                               {"  over A", [](FF f) { return f.times->batched; }, ratioText, true}};
 
-std::vector<FigureRow> rowsOf(const Comparison& comparison) {
+std::vector<FigureRow> rowsOf(const FieldComparison& comparison) {
   std::vector<FigureRow> rows(std::begin(kFigureRows), std::end(kFigureRows));
   if (comparison.options.times) rows.insert(rows.end(), std::begin(kTimeRows), std::end(kTimeRows));
   return rows;
 }
 
-std::string cellText(const FigureRow& row, const Comparison& comparison, const FieldFigures& figures) {
+std::string cellText(const FigureRow& row, const FieldComparison& comparison, const FieldFigures& figures) {
   const double value = row.value(figures);
   if (!row.isRatio) return row.text(value);
   const double first = row.value(comparison.fields.front());
@@ -64,7 +63,7 @@ std::string cellText(const FigureRow& row, const Comparison& comparison, const F
 }
 
 /// Returns a sentence about the points of the comparison.
-std::string pointsText(const Comparison& comparison) {
+std::string pointsText(const FieldComparison& comparison) {
   const CompareOptions& options = comparison.options;
   const std::string band =
       options.band > 0 ? fmt::format(" within {} of the surface", shortNumber(options.band)) : std::string();
@@ -78,10 +77,8 @@ constexpr std::string_view kTimesNote =
     "Times are of one thread of this machine, at random points of the domain; the ratios were taken in one run.";
 
 Json errorJson(const ErrorFigures& error) {
-  return {{"points", error.samples},
-          {"rms", error.rms},
-          {"percentile_99", error.percentiles.at(99)},
-          {"max", error.max}};
+  return {
+      {"points", error.samples}, {"rms", error.rms}, {"percentile_99", error.percentiles.at(99)}, {"max", error.max}};
 }
 
 Json timesJson(const FieldFigures& figures, const FieldFigures& first) {
@@ -96,24 +93,17 @@ Json timesJson(const FieldFigures& figures, const FieldFigures& first) {
 Json figuresJson(const FieldFigures& figures, const FieldFigures& first) {
   Json bins = Json::array();
   for (const ErrorBin& bin : figures.bins)
-    bins.push_back(
-        {{"from", bin.from}, {"to", bin.to}, {"points", bin.points}, {"rms", bin.rms}, {"max", bin.max}});
-  return {{"letter", figures.letter},
-          {"field", figures.file},
-          {"bytes", figures.counts.bytes},
-          {"file_bytes", figures.fileBytes},
-          {"leaves", figures.counts.leaves},
-          {"exact_leaves", figures.counts.exact.leaves},
-          {"near", errorJson(figures.near)},
-          {"domain", errorJson(figures.domain)},
-          {"wrong_signs", figures.wrongSigns},
-          {"farthest_wrong_sign", figures.farthestWrongSign},
-          {"torn_share", figures.tornShare},
-          {"query", timesJson(figures, first)},
+    bins.push_back({{"from", bin.from}, {"to", bin.to}, {"points", bin.points}, {"rms", bin.rms}, {"max", bin.max}});
+  return {{"letter", figures.letter},          {"field", figures.file},
+          {"bytes", figures.counts.bytes},     {"file_bytes", figures.fileBytes},
+          {"leaves", figures.counts.leaves},   {"exact_leaves", figures.counts.exact.leaves},
+          {"near", errorJson(figures.near)},   {"domain", errorJson(figures.domain)},
+          {"wrong_signs", figures.wrongSigns}, {"farthest_wrong_sign", figures.farthestWrongSign},
+          {"torn_share", figures.tornShare},   {"query", timesJson(figures, first)},
           {"error_by_distance", bins}};
 }
 
-std::string worstText(const Comparison& comparison) {
+std::string worstText(const FieldComparison& comparison) {
   if (comparison.worst.empty()) return {};
   std::string text =
       fmt::format("\nworst places of each field, and the errors f − Φ of all fields there\n  {:<5} {:<36} {:>10}",
@@ -146,17 +136,19 @@ svg.chart { display: block; max-width: 100%; height: auto; }
 /// Returns a square in the colour of a field's curves.
 std::string swatchHtml(std::size_t field) { return fmt::format("<i style=\"background:{}\"></i>", curveColor(field)); }
 
-std::string nameOf(const FieldFigures& figures) { return fmt::format("{} {}", figures.letter, plainName(figures.file)); }
+std::string nameOf(const FieldFigures& figures) {
+  return fmt::format("{} {}", figures.letter, plainName(figures.file));
+}
 
 /// Returns the head of a table's columns for the fields, with their letters.
-std::string letterCells(const Comparison& comparison) {
+std::string letterCells(const FieldComparison& comparison) {
   std::string html;
   for (std::size_t n = 0; n < comparison.fields.size(); ++n)
     html += fmt::format("<th style=\"text-align:right\">{}{}</th>", swatchHtml(n), comparison.fields[n].letter);
   return html;
 }
 
-std::string figuresHtml(const Comparison& comparison) {
+std::string figuresHtml(const FieldComparison& comparison) {
   std::string html;
   for (std::size_t n = 0; n < comparison.fields.size(); ++n)
     html += fmt::format("<p class=\"key\">{}{}&ensp;{}</p>\n", swatchHtml(n), comparison.fields[n].letter,
@@ -174,7 +166,7 @@ std::string figuresHtml(const Comparison& comparison) {
   return html + "</p>\n";
 }
 
-std::string curvesHtml(const Comparison& comparison) {
+std::string curvesHtml(const FieldComparison& comparison) {
   Chart chart{.xLabel = fmt::format("distance from the surface |Φ| [{}]", comparison.unit),
               .yLabel = fmt::format("error |f − Φ| [{}]", comparison.unit),
               .solid = "RMS error",
@@ -193,25 +185,25 @@ std::string curvesHtml(const Comparison& comparison) {
   return "<h2>Error over distance from the surface</h2>\n" + chartSvg(chart);
 }
 
-std::string viewHtml(const Comparison& comparison, const ComparedView& view) {
+std::string viewHtml(const FieldComparison& comparison, const ComparedView& view) {
   std::vector<PagePicture> row;
   std::vector<std::string> names;
   for (std::size_t n = 0; n < comparison.fields.size(); ++n) {
     names.push_back(nameOf(comparison.fields[n]));
     row.push_back({names.back(), view.pngs[n]});
   }
-  std::string html =
-      fmt::format("<h2>{}</h2>\n<p>{}</p>\n", htmlEscaped(view.title),
+  std::string html = fmt::format("<h2>{}</h2>\n<p>{}</p>\n", htmlEscaped(view.title),
                                  htmlEscaped(view.caption + (view.showsLength ? ", in " + comparison.unit : "") + "."));
   if (!view.legend.empty()) html += fmt::format("<p class=\"legend\">{}</p>\n", view.legend);
   return html + pictureRow(row) + pictureSlider(names);
 }
 
-std::string worstHtml(const Comparison& comparison) {
+std::string worstHtml(const FieldComparison& comparison) {
   if (comparison.worst.empty()) return {};
   std::string html =
       "<h2>Worst places</h2>\n<p>The points with the greatest errors of each field, one of each cell, and the errors "
-      "f − Φ of all fields there.</p>\n<div class=\"wide-table\"><table class=\"figures\">\n<tr><th>worst of</th><th>at</th>"
+      "f − Φ of all fields there.</p>\n<div class=\"wide-table\"><table class=\"figures\">\n<tr><th>worst "
+      "of</th><th>at</th>"
       "<th>exact Φ</th>" +
       letterCells(comparison) + "</tr>\n";
   for (const WorstPlace& place : comparison.worst) {
@@ -228,7 +220,7 @@ std::string worstHtml(const Comparison& comparison) {
 
 }  // namespace
 
-std::string comparisonText(const Comparison& comparison) {
+std::string comparisonText(const FieldComparison& comparison) {
   std::string text = fmt::format("{}\n{}\n", comparison.surface, pointsText(comparison));
   for (const FieldFigures& figures : comparison.fields) text += fmt::format("  {}  {}\n", figures.letter, figures.file);
   text += fmt::format("\n  {:<30}", "");
@@ -244,7 +236,7 @@ std::string comparisonText(const Comparison& comparison) {
   return text + worstText(comparison);
 }
 
-Json comparisonJson(const Comparison& comparison) {
+Json comparisonJson(const FieldComparison& comparison) {
   Json fields = Json::array(), worst = Json::array();
   for (const FieldFigures& figures : comparison.fields)
     fields.push_back(figuresJson(figures, comparison.fields.front()));
@@ -257,16 +249,21 @@ Json comparisonJson(const Comparison& comparison) {
                      {"errors", errors}});
   }
   const CompareOptions& options = comparison.options;
-  return {{"mesh", comparison.surface}, {"points", options.points}, {"seed", options.seed},
-          {"near", options.near},       {"band", options.band},     {"unit", comparison.unit}, {"domain", boxJson(comparison.domain)},
-          {"fields", fields},           {"worst", worst}};
+  return {{"mesh", comparison.surface},
+          {"points", options.points},
+          {"seed", options.seed},
+          {"near", options.near},
+          {"band", options.band},
+          {"unit", comparison.unit},
+          {"domain", boxJson(comparison.domain)},
+          {"fields", fields},
+          {"worst", worst}};
 }
 
-std::string comparisonHtml(const Comparison& comparison, const ComparedViews& views) {
-  std::string html =
-      htmlHead(fmt::format("{} fields of {}", comparison.fields.size(), plainName(comparison.surface)),
-               "Compared with the exact distance to " + comparison.surface,
-               std::string(kPictureRowStyle) + std::string(kCompareStyle));
+std::string comparisonHtml(const FieldComparison& comparison, const ComparedViews& views) {
+  std::string html = htmlHead(fmt::format("{} fields of {}", comparison.fields.size(), plainName(comparison.surface)),
+                              "Compared with the exact distance to " + comparison.surface,
+                              std::string(kPictureRowStyle) + std::string(kCompareStyle));
   html += "<h2>Figures</h2>\n" + figuresHtml(comparison) + curvesHtml(comparison);
   for (const ComparedView& view : views.views) html += viewHtml(comparison, view);
   html += worstHtml(comparison);

@@ -9,10 +9,10 @@
 
 namespace hpsdf::app {
 
-std::string comparisonText(const Comparison& comparison);
-Json comparisonJson(const Comparison& comparison);
+std::string comparisonText(const FieldComparison& comparison);
+Json comparisonJson(const FieldComparison& comparison);
 
 /// Returns a page that contains all pictures and needs no network.
-std::string comparisonHtml(const Comparison& comparison, const ComparedViews& views);
+std::string comparisonHtml(const FieldComparison& comparison, const ComparedViews& views);
 
 }  // namespace hpsdf::app

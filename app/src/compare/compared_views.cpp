@@ -84,8 +84,7 @@ class FieldView {
 /// Extends a colour scale so that it holds the values of another one.
 void widen(render::ScaleOptions& scale, const render::ScaleOptions& other) {
   if (scale.limits && other.limits)
-    scale.limits = {std::min((*scale.limits)[0], (*other.limits)[0]),
-                    std::max((*scale.limits)[1], (*other.limits)[1])};
+    scale.limits = {std::min((*scale.limits)[0], (*other.limits)[0]), std::max((*scale.limits)[1], (*other.limits)[1])};
   else if (other.limits)
     scale.limits = other.limits;
   scale.levels.insert(scale.levels.end(), other.levels.begin(), other.levels.end());
@@ -119,8 +118,8 @@ ComparedViews drawViews(const std::vector<CurrentField>& fields, const DistanceF
       progress.update("choosing colours", done++ / all);
       widen(scale, drawer.draw(kind, {}, 1).scale);
     }
-    ComparedView view{.title = titleOf(kind, settings.plane), .caption = kind.caption,
-                      .showsLength = kind.color == ColorBy::error};
+    ComparedView view{
+        .title = titleOf(kind, settings.plane), .caption = kind.caption, .showsLength = kind.color == ColorBy::error};
     for (FieldView& drawer : drawers) {
       progress.update("drawing", done++ / all);
       const render::Drawn drawn = drawer.draw(kind, scale, settings.camera.samples);

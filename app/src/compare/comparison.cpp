@@ -31,8 +31,7 @@ double narrowestBand(const std::vector<CurrentField>& fields) {
 PointSets drawPoints(const ReferenceSurface& reference, const Box& domain, const CompareOptions& options,
                      const Progress& progress) {
   const std::size_t half = options.points / 2;
-  const SampleOptions uniform{
-      .count = options.points - half, .seed = options.seed, .threads = options.threads};
+  const SampleOptions uniform{.count = options.points - half, .seed = options.seed, .threads = options.threads};
   const SampleOptions near{.count = half, .seed = ~options.seed, .threads = options.threads};
   return {sampleUniform(*reference.distance, domain, options.band, uniform, progress),
           sampleNear(*reference.distance, reference.mesh, domain, options.near, near, progress)};
@@ -60,8 +59,8 @@ void forEachPoint(const PointSets& sets, const std::array<std::vector<double>, 2
     for (std::size_t n = 0; n < values[k].size(); ++n) visit(sets[k].points[n], sets[k].distances[n], values[k][n]);
 }
 
-/// Returns the errors by distance from the surface, in ranges of a quarter of a power of ten. Ranges with too few points
-/// for a meaningful figure are left out.
+/// Returns the errors by distance from the surface, in ranges of a quarter of a power of ten. Ranges with too few
+/// points for a meaningful figure are left out.
 std::vector<ErrorBin> binsOf(const PointSets& sets, const std::array<std::vector<double>, 2>& values) {
   constexpr int kBinsPerDecade = 4;
   constexpr std::size_t kFewestPoints = 50;
@@ -145,10 +144,10 @@ Box commonDomain(const std::vector<CurrentField>& fields) {
 
 double ErrorBin::middle() const { return std::sqrt(from * to); }
 
-Comparison compareFields(const Console& console, const std::vector<CurrentField>& fields,
-                         const ReferenceSurface& reference, const CompareOptions& options) {
+FieldComparison compareFields(const Console& console, const std::vector<CurrentField>& fields,
+                              const ReferenceSurface& reference, const CompareOptions& options) {
   const bool isNormalized = !fields.front().field.metadata().source.normalization.isIdentity();
-  Comparison result;
+  FieldComparison result;
   result.unit = isNormalized ? "normalized units" : "mesh units";
   result.domain = commonDomain(fields);
   result.options = options;

@@ -18,8 +18,8 @@ namespace hpsdf::app {
 struct CompareOptions {
   std::size_t points = 1'000'000;  ///< number of points, half uniform in the domain, half near the surface
   std::uint64_t seed = 1;
-  double near = 0;  ///< greatest distance of points near the surface; 0: 1 % of the surface's longest side
-  double band = 0;  ///< greatest |Φ| of the uniform points; 0: the narrowest band of the fields, else no limit
+  double near = 0;        ///< greatest distance of points near the surface; 0: 1 % of the surface's longest side
+  double band = 0;        ///< greatest |Φ| of the uniform points; 0: the narrowest band of the fields, else no limit
   std::size_t worst = 5;  ///< number of worst places of each field
   int threads = 0;
   bool times = true;  ///< measures the time of queries, which differs from run to run
@@ -60,7 +60,7 @@ struct FieldFigures {
   std::optional<QueryTimes> times = {};
 };
 
-struct Comparison {
+struct FieldComparison {
   std::string surface;
   std::string unit;        ///< unit of all lengths: "mesh units" or "normalized units"
   CompareOptions options;  ///< with the `near` and the `band` that were used
@@ -75,8 +75,8 @@ Box commonDomain(const std::vector<CurrentField>& fields);
 /// Measures the fields. The points are those of `verify` if all fields have the same domain. Otherwise they lie where
 /// all domains overlap. All figures but times are the same for any number of threads. Throws `Error` if the domains do
 /// not overlap, and `Cancelled` after Ctrl-C.
-Comparison compareFields(const Console& console, const std::vector<CurrentField>& fields,
-                         const ReferenceSurface& reference, const CompareOptions& options);
+FieldComparison compareFields(const Console& console, const std::vector<CurrentField>& fields,
+                              const ReferenceSurface& reference, const CompareOptions& options);
 
 /// Measures the time of queries. Queries of all fields alternate, and the minimum of many repetitions counts, so that
 /// other work of the machine changes the ratios little. `progress` may cancel the measurement.

@@ -112,8 +112,8 @@ std::string pictureSlider(const std::vector<std::string>& names) {
     if (names.size() == 2) return htmlEscaped(names[shown]);
     std::string options;
     for (std::size_t n = 0; n < names.size(); ++n)
-      options += fmt::format("<option value=\"{}\"{}>{}</option>", n, n == shown ? " selected" : "",
-                             htmlEscaped(names[n]));
+      options +=
+          fmt::format("<option value=\"{}\"{}>{}</option>", n, n == shown ? " selected" : "", htmlEscaped(names[n]));
     return "<select>" + options + "</select>";
   };
   return fmt::format(

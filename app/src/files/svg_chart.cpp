@@ -41,7 +41,8 @@ LogAxis axisFor(const Chart& chart, int coordinate, double from, double to) {
   return {low / space, high * space, from, to};
 }
 
-/// Returns the values at which an axis has ticks: the powers of ten, and their multiples by 2 and 5 where there is room.
+/// Returns the values at which an axis has ticks: the powers of ten, and their multiples by 2 and 5 where there is
+/// room.
 std::vector<double> ticksOf(const LogAxis& axis) {
   const double decades = std::log10(axis.high / axis.low);
   const int step = std::max(1, int(decades / 9));
@@ -109,8 +110,9 @@ std::string curveSvg(const ChartCurve& curve, const LogAxis& x, const LogAxis& y
   for (const auto& [px, py] : curve.points) {
     if (!(px > 0 && py > 0)) continue;
     line += fmt::format("{}{:.2f} {:.2f}", line.empty() ? "M" : "L", x.at(px), y.at(py));
-    marks += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2.6\" fill=\"{}\"><title>{}: {}, {}</title></circle>\n",
-                         x.at(px), y.at(py), curve.color, htmlEscaped(curve.name), shortNumber(px), shortNumber(py));
+    marks +=
+        fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2.6\" fill=\"{}\"><title>{}: {}, {}</title></circle>\n",
+                    x.at(px), y.at(py), curve.color, htmlEscaped(curve.name), shortNumber(px), shortNumber(py));
   }
   return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}/>\n{}", line, curve.color,
                      curve.dashed ? " stroke-dasharray=\"6 4\" stroke-opacity=\"0.8\"" : "", marks);
@@ -120,9 +122,9 @@ std::string legendSvg(const Chart& chart) {
   std::string svg;
   double y = kPlotTop + 12;
   const auto entry = [&](const std::string& name, const std::string& color, bool dashed) {
-    svg += lineSvg(kLegendLeft, y - 4, kLegendLeft + 26, y - 4,
-                   fmt::format("stroke=\"{}\" stroke-width=\"2.5\"{}", color, dashed ? " stroke-dasharray=\"6 4\"" : "")
-                       .c_str());
+    svg += lineSvg(
+        kLegendLeft, y - 4, kLegendLeft + 26, y - 4,
+        fmt::format("stroke=\"{}\" stroke-width=\"2.5\"{}", color, dashed ? " stroke-dasharray=\"6 4\"" : "").c_str());
     svg += textSvg(kLegendLeft + 34, y, "start", legendText(name));
     y += kLegendLine;
   };

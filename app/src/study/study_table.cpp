@@ -43,8 +43,8 @@ constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree
 /// A picture of a slice through the middle of the domain, coloured by degree or depth, and a bar in the same colours.
 /// The bar shows which share of the domain's volume each degree or depth takes.
 struct LevelPicture {
-  std::string png = {};  ///< bytes of the slice's PNG file
-  std::string svg = {};  ///< the bar as SVG text
+  std::string png = {};     ///< bytes of the slice's PNG file
+  std::string svg = {};     ///< the bar as SVG text
   LevelColors colors = {};  ///< colours of the degrees or depths that occur in any row
 };
 

@@ -39,7 +39,7 @@ struct TradeoffPoint {
 struct Tradeoff {
   std::string mesh, name;
   std::vector<TradeoffPoint> points = {};
-  std::string recommendation = {};  ///< "" if no limit was given
+  std::string recommendation = {};              ///< "" if no limit was given
   std::optional<std::size_t> recommended = {};  ///< index of the recommended point
 
   const TradeoffPoint* best() const { return recommended ? &points[*recommended] : nullptr; }
@@ -87,8 +87,7 @@ std::vector<double> targetsOf(const Arguments& arguments) {
 /// Orders fields by exactness: by the RMS error near the surface, and by that over the domain where both fields equal
 /// the surface but for rounding.
 auto inexactness(const TradeoffPoint& point) {
-  return std::tuple(std::max(point.measured.near.rms, point.leastError), point.measured.domain.rms,
-                    point.counts.bytes);
+  return std::tuple(std::max(point.measured.near.rms, point.leastError), point.measured.domain.rms, point.counts.bytes);
 }
 
 /// Chooses the most exact field of the range that keeps the limits of the arguments, and says so in a sentence.
@@ -104,9 +103,9 @@ void recommend(Tradeoff& tradeoff, const Arguments& arguments) {
     if (keepsLimits(tradeoff.points[n]) && (best == nullptr || inexactness(tradeoff.points[n]) < inexactness(*best)))
       tradeoff.recommended = n;
   }
-  const std::string limits = fmt::format(
-      "{}{}{}", hasBudget ? bytesText(arguments.number("budget")) : "", hasBudget && hasTime ? " and " : "",
-      hasTime ? fmt::format("{} s", shortNumber(arguments.number("within-seconds"))) : "");
+  const std::string limits =
+      fmt::format("{}{}{}", hasBudget ? bytesText(arguments.number("budget")) : "", hasBudget && hasTime ? " and " : "",
+                  hasTime ? fmt::format("{} s", shortNumber(arguments.number("within-seconds"))) : "");
   if (const TradeoffPoint* best = tradeoff.best()) {
     tradeoff.recommendation = fmt::format(
         "Within {}, the most exact field of the range is that of τ = {}: it takes {} and {} s, and its RMS error is {} "
@@ -115,8 +114,8 @@ void recommend(Tradeoff& tradeoff, const Arguments& arguments) {
         shortNumber(best->measured.near.rms), shortNumber(best->measured.domain.rms));
     return;
   }
-  const TradeoffPoint& smallest = *std::ranges::min_element(
-      tradeoff.points, {}, [](const TradeoffPoint& point) { return point.counts.bytes; });
+  const TradeoffPoint& smallest =
+      *std::ranges::min_element(tradeoff.points, {}, [](const TradeoffPoint& point) { return point.counts.bytes; });
   tradeoff.recommendation = fmt::format(
       "No field of the range keeps within {}: the smallest, that of τ = {}, takes {} and {} s. Give greater target "
       "errors or wider limits.",
@@ -132,8 +131,8 @@ Tradeoff tradeoffOf(Session& session, const Arguments& arguments, std::size_t me
   for (const double target : targets) {
     const Arguments point = pointArguments(session, arguments, mesh, target);
     console.work = fmt::format("{} of {}, τ = {}: ", tradeoff.points.size() + 1, targets.size(), exactText(target));
-    tradeoff.points.push_back(namingSurface(
-        tradeoff.mesh, [&] { return tradeoffPoint(console, input, point, arguments, target); }));
+    tradeoff.points.push_back(
+        namingSurface(tradeoff.mesh, [&] { return tradeoffPoint(console, input, point, arguments, target); }));
     tradeoff.points.back().command = buildCommandLine(tradeoff.mesh, name + ".hpsdf", point);
   }
   recommend(tradeoff, arguments);
@@ -142,11 +141,11 @@ Tradeoff tradeoffOf(Session& session, const Arguments& arguments, std::size_t me
 
 Json pointJson(const TradeoffPoint& point) {
   const Measurement& m = point.measured;
-  return {{"target_error", point.target}, {"bytes", point.counts.bytes},
+  return {{"target_error", point.target},  {"bytes", point.counts.bytes},
           {"leaves", point.counts.leaves}, {"exact_leaves", point.counts.exact.leaves},
-          {"seconds", point.seconds},     {"near_rms", m.near.rms},
-          {"near_max", m.near.max},       {"domain_rms", m.domain.rms},
-          {"domain_max", m.domain.max},   {"wrong_signs", m.wrongSigns},
+          {"seconds", point.seconds},      {"near_rms", m.near.rms},
+          {"near_max", m.near.max},        {"domain_rms", m.domain.rms},
+          {"domain_max", m.domain.max},    {"wrong_signs", m.wrongSigns},
           {"torn_share", m.tornShare}};
 }
 
@@ -172,10 +171,14 @@ std::string tradeoffCsv(const std::vector<Tradeoff>& tradeoffs) {
 /// Returns the figures of a point as text, in the order of `kTradeoffHeads`.
 std::vector<std::string> tradeoffCells(const TradeoffPoint& point) {
   const Measurement& m = point.measured;
-  return {exactText(point.target),      bytesText(double(point.counts.bytes)),
-          grouped(point.counts.leaves), fmt::format("{:.2f} s", point.seconds),
-          shortNumber(m.near.rms),      shortNumber(m.near.max),
-          shortNumber(m.domain.rms),    shortNumber(m.domain.max),
+  return {exactText(point.target),
+          bytesText(double(point.counts.bytes)),
+          grouped(point.counts.leaves),
+          fmt::format("{:.2f} s", point.seconds),
+          shortNumber(m.near.rms),
+          shortNumber(m.near.max),
+          shortNumber(m.domain.rms),
+          shortNumber(m.domain.max),
           shortNumber(100 * m.tornShare) + " %"};
 }
 
@@ -202,7 +205,8 @@ std::string tradeoffChart(const Tradeoff& tradeoff, const std::string& costLabel
   using Error = Measurement::Error;
   const std::pair<const char*, Error Measurement::*> kinds[] = {{"near the surface", &Measurement::near},
                                                                 {"over the domain", &Measurement::domain}};
-  Chart chart{.xLabel = costLabel, .yLabel = "error [units of the field]", .solid = "RMS error", .dashed = "greatest error"};
+  Chart chart{
+      .xLabel = costLabel, .yLabel = "error [units of the field]", .solid = "RMS error", .dashed = "greatest error"};
   for (std::size_t n = 0; n < std::size(kinds); ++n) {
     ChartCurve rms{.name = kinds[n].first, .color = curveColor(n)}, greatest = rms;
     greatest.dashed = true;
@@ -227,7 +231,8 @@ svg.chart { display: block; max-width: 100%; height: auto; margin: 1rem 0; }
 )";
 
 constexpr const char* kTradeoffNote =
-    "Errors are measured at random points, half of them within a hundredth of the mesh's longest side of the surface, and "
+    "Errors are measured at random points, half of them within a hundredth of the mesh's longest side of the surface, "
+    "and "
     "are in the units of the field. Time is that of the construction on this machine.";
 
 std::string tradeoffSection(const Tradeoff& tradeoff) {
@@ -243,12 +248,13 @@ std::string tradeoffSection(const Tradeoff& tradeoff) {
   if (!tradeoff.recommendation.empty()) html += fmt::format("<p>{}</p>\n", htmlEscaped(tradeoff.recommendation));
   if (tradeoff.recommended) html += fmt::format("<code>{}</code>\n", htmlEscaped(tradeoff.best()->command));
   html += tradeoffChart(tradeoff, "memory [bytes]", [](const TradeoffPoint& p) { return double(p.counts.bytes); });
-  return html + tradeoffChart(tradeoff, "time of the construction [s]", [](const TradeoffPoint& p) { return p.seconds; });
+  return html +
+         tradeoffChart(tradeoff, "time of the construction [s]", [](const TradeoffPoint& p) { return p.seconds; });
 }
 
 std::string tradeoffHtml(const std::vector<Tradeoff>& tradeoffs) {
-  std::string html = htmlHead("Size, time and accuracy", "Fields of the same mesh for a range of target errors τ",
-                              kTradeoffStyle);
+  std::string html =
+      htmlHead("Size, time and accuracy", "Fields of the same mesh for a range of target errors τ", kTradeoffStyle);
   for (const Tradeoff& tradeoff : tradeoffs) html += tradeoffSection(tradeoff);
   return html + fmt::format("<p>{}</p>\n", htmlEscaped(kTradeoffNote)) + htmlFoot(versionText());
 }
@@ -304,9 +310,12 @@ which errors are measured lie near the surface. Writes index.html with the table
 tradeoff.json.)"),
       .parameters = joined(
           {{{"target-errors", numbers("τ,τ,…", countsFrom(1, 20)).above(0).byDefault("1e-4,3e-5,1e-5,3e-6,1e-6,3e-7"),
-             "The target errors of the range. Each makes a field of its own, so that the smallest one takes most of the "
+             "The target errors of the range. Each makes a field of its own, so that the smallest one takes most of "
+             "the "
              "time."},
-            {"budget", number().above(0).in("bytes"), "Recommends the most exact field that takes at most this memory. To build for a budget without a study, use "
+            {"budget", number().above(0).in("bytes"),
+             "Recommends the most exact field that takes at most this memory. To build for a budget without a study, "
+             "use "
              "'build --max-bytes'."},
             {"within-seconds", number().above(0).in("seconds"),
              "Recommends the most exact field whose construction takes at most this time on this machine."}},
