@@ -303,12 +303,16 @@ TEST_F(Compare, scriptsCompareToo) {
 
 TEST_F(Compare, foreignFieldsAreRefused) {
   build("builtin:gear", "gear", {"--target-error", "1e-3"});
+  build("builtin:gear", "far", {"--target-error", "1e-2", "--domain", "8,8,8,9,9,9"});
+  build("builtin:torus", "far-torus", {"--target-error", "1e-2", "--domain", "8,8,8,9,9,9"});
   build("builtin:torus", "normalized", {"--target-error", "1e-3", "--normalize"});
   build("builtin:torus", "shell", {"--target-error", "1e-3", "--sign", "unsigned-shell", "--thickness", "0.1"});
   const std::string torus = field("fine");
   expectRefused({"compare", torus}, "needs two fields or more");
   expectRefused({"compare", torus, field("gear"), "-o", at("x.html")}, "from another mesh, builtin:gear");
   expectRefused({"compare", torus, field("gear"), "--mesh", "builtin:torus"}, "from another mesh");
+  expectRefused({"compare", torus, field("far")}, "from another mesh");
+  expectRefused({"compare", torus, field("far-torus")}, "its domain does not overlap");
   expectRefused({"compare", torus, field("coarse"), "--mesh", "builtin:gear"}, "not from builtin:gear");
   expectRefused({"compare", torus, field("normalized")}, "different units");
   expectRefused({"compare", torus, field("shell")}, "different surfaces");

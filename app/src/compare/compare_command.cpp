@@ -81,16 +81,21 @@ std::string foundSurface(const std::vector<CurrentField>& fields) {
   return surfaceOf(fields.front(), "--mesh");
 }
 
-/// Returns the surface with which the fields are compared. Throws `Error` if one of them was made from another one.
-std::pair<std::string, ReferenceSurface> comparedSurface(const Console& console,
-                                                         const std::vector<CurrentField>& fields,
-                                                         const Arguments& arguments) {
-  const bool isAny = arguments.flag("any-mesh");
-  if (!isAny) requireSameMesh(fields);
-  const std::string surface = arguments.has("mesh") ? arguments.text("mesh") : foundSurface(fields);
-  ReferenceSurface reference = referenceSurface(console, surface, fields.front().field.metadata().source);
-  if (!isAny) refuseForeign(fields.front(), reference, surface, ", or --any-mesh to compare them anyway");
-  return {surface, std::move(reference)};
+/// The surface with which the fields are compared, and its name.
+struct ComparedSurface {
+  std::string name;
+  ReferenceSurface reference;
+};
+
+/// Returns the surface that the arguments name, or the one from which the fields were made. Throws `Error` if the
+/// fields were made from another one.
+ComparedSurface comparedSurface(const Console& console, const std::vector<CurrentField>& fields,
+                                const Arguments& arguments) {
+  const std::string name = arguments.has("mesh") ? arguments.text("mesh") : foundSurface(fields);
+  ReferenceSurface reference = referenceSurface(console, name, fields.front().field.metadata().source);
+  if (!arguments.flag("any-mesh"))
+    refuseForeign(fields.front(), reference, name, ", or --any-mesh to compare them anyway");
+  return {name, std::move(reference)};
 }
 
 CompareOptions compareOptions(const Arguments& arguments) {
@@ -128,19 +133,20 @@ void runCompare(Session& session, const Arguments& arguments) {
   if (writesPage) checkWritable(arguments.text("output"));
   const std::vector<CurrentField> fields = loadFields(arguments.texts("field"));
   requireComparable(fields);
+  if (!arguments.flag("any-mesh")) requireSameMesh(fields);
   const Console& console = session.console();
   const Box domain = commonDomain(fields);
-  const auto [surface, reference] = comparedSurface(console, fields, arguments);
-  const Box shown = reference.distance->source().box.intersection(domain);
+  const ComparedSurface surface = comparedSurface(console, fields, arguments);
+  const DistanceFunction& exact = *surface.reference.distance;
+  const Box shown = exact.source().box.intersection(domain);
   const ViewSettings settings = viewSettings(arguments, shown.isEmpty() ? domain.center() : shown.center());
   if (writesPage) checkViews(domain, settings);
-  FieldComparison comparison = compareFields(console, fields, reference, compareOptions(arguments));
-  comparison.surface = printable(surface);
+  FieldComparison comparison = compareFields(console, fields, surface.reference, compareOptions(arguments));
+  comparison.surface = printable(surface.name);
   Json json = comparisonJson(comparison);
   if (writesPage) {
-    const ComparedViews views = withProgress(console, [&](const Progress& progress) {
-      return drawViews(fields, *reference.distance, domain, settings, progress);
-    });
+    const ComparedViews views = withProgress(
+        console, [&](const Progress& progress) { return drawViews(fields, exact, domain, settings, progress); });
     writeTextFile(arguments.text("output"), comparisonHtml(comparison, views));
     json["page"] = arguments.text("output");
   }

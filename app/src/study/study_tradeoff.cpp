@@ -174,7 +174,7 @@ std::vector<std::string> tradeoffCells(const TradeoffPoint& point) {
   return {exactText(point.target),
           bytesText(double(point.counts.bytes)),
           grouped(point.counts.leaves),
-          fmt::format("{:.2f} s", point.seconds),
+          shortNumber(point.seconds) + " s",
           shortNumber(m.near.rms),
           shortNumber(m.near.max),
           shortNumber(m.domain.rms),
