@@ -327,6 +327,15 @@ TEST_F(Compare, foreignFieldsAreRefused) {
   EXPECT_EQ(any["mesh"], "builtin:torus,segments=64");
 }
 
+TEST_F(Compare, differentInsideTestsAreTold) {
+  build("builtin:torus", "winding", {"--target-error", "1e-2", "--sign", "winding"});
+  const Outcome outcome =
+      runHere({"compare", field("coarse"), field("winding"), field("fine"), "--points", "2000", "--no-times"});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(countOf(outcome.err, "hpsdf: note:"), 1u) << outcome.err;
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr(field("winding")), HasSubstr("signs are compared with those of")));
+}
+
 TEST_F(Compare, theMeshIsFoundBesideAField) {
   TriangleMesh mesh = loadMesh("builtin:torus");
   saveMesh(mesh, at("ring.obj"));

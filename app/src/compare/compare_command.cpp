@@ -69,6 +69,16 @@ void requireSameMesh(const std::vector<CurrentField>& fields) {
                       its.name.empty() ? "something unknown" : its.name));
 }
 
+/// Tells if fields differ in their inside tests. Only open or flawed meshes have other signs then.
+void noteInsideTests(const Console& console, const std::vector<CurrentField>& fields) {
+  const InsideTest first = fields.front().field.metadata().source.insideTest;
+  for (const CurrentField& other : fields)
+    if (const InsideTest its = other.field.metadata().source.insideTest; its != first)
+      note(console, fmt::format("{} was made with the inside test {}, {} with {}; signs are compared with those of {}",
+                                fields.front().name, insideTestName(first), other.name, insideTestName(its),
+                                fields.front().name));
+}
+
 /// Returns the surface from which the fields were made: a shape, or a file of the mesh's name in the current folder or
 /// beside one of the fields.
 std::string foundSurface(const std::vector<CurrentField>& fields) {
@@ -136,6 +146,7 @@ void runCompare(Session& session, const Arguments& arguments) {
   if (!arguments.flag("any-mesh")) requireSameMesh(fields);
   const Console& console = session.console();
   const Box domain = commonDomain(fields);
+  noteInsideTests(console, fields);
   const ComparedSurface surface = comparedSurface(console, fields, arguments);
   const DistanceFunction& exact = *surface.reference.distance;
   const Box shown = exact.source().box.intersection(domain);
