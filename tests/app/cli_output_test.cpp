@@ -118,6 +118,8 @@ TEST_F(Outputs, interruptStopsTheConstruction) {
         std::vector<std::string>{"frames", "builtin:gear", "-o", at("frames"), "--target-error", "1e-12"},
         std::vector<std::string>{"turntable", field(), "-o", at("turn"), "--frames", "9999", "--size", "160x120",
                                  "--cpu"},
+        std::vector<std::string>{"compare", field(), field(), "-o", at("page.html"), "--points", "2e7"},
+        std::vector<std::string>{"study", "tradeoff", "builtin:gear", "-o", at("study"), "--target-errors", "1e-12"},
         std::vector<std::string>{"export", field(), "-o", at("grid.cdf"), "--resolution", "3", "--points", "1e8"}}) {
     Process process({words});
     process.waitForErrorLine();

@@ -17,59 +17,22 @@ table.items th, table.items td { padding-right: 1.2rem; }
 table.items tr.failed td { font-weight: 600; }
 td.number { text-align: right; }
 h2.failure { margin-top: 3.5rem; padding-top: 1rem; border-top: 3px solid var(--bar); overflow-wrap: anywhere; }
-.trio { display: grid; grid-template-columns: repeat(auto-fit, minmax(18rem, 1fr)); gap: 0 1rem; }
-.trio figure { margin-bottom: 1rem; }
-.trio img { cursor: zoom-in; }
-.trio figure.wide { grid-column: 1 / -1; }
-.trio figure.wide img { width: 100%; cursor: zoom-out; image-rendering: pixelated; }
-.slider { position: relative; display: none; margin: .5rem 0 1rem; }
-.slider img { display: block; width: 100%; border: 1px solid var(--line); border-radius: 4px; box-sizing: border-box; }
-.slider img.over { position: absolute; top: 0; left: 0; clip-path: inset(0 0 0 50%); }
-.slider input { width: 100%; margin: .5rem 0 0; }
-.ends { display: flex; justify-content: space-between; color: var(--quiet); font-size: .9rem; }
 i.color { display: inline-block; width: 1em; height: 1em; margin-right: .4em; border: 1px solid var(--line);
           vertical-align: -.15em; }
 )";
 
-/// JavaScript that copies the baseline and the actual picture into the comparison slider below them. The page therefore
-/// needs to embed every picture only once.
-constexpr std::string_view kScript = R"(<script>
-for (const slider of document.querySelectorAll('.slider')) {
-  const [under, over] = slider.querySelectorAll('img');
-  const images = slider.previousElementSibling.querySelectorAll('img');
-  under.src = images[0].src;
-  over.src = images[1].src;
-  slider.style.display = 'block';
-  slider.querySelector('input').oninput = (event) => {
-    over.style.clipPath = 'inset(0 0 0 ' + event.target.value + '%)';
-  };
-}
-for (const image of document.querySelectorAll('.trio img'))
-  image.onclick = () => image.parentElement.classList.toggle('wide');
-</script>
-)";
-
-constexpr std::string_view kSlider =
-    "<div class=\"slider\"><img alt=\"baseline\"><img class=\"over\" alt=\"actual\">"
-    "<input type=\"range\" min=\"0\" max=\"100\" step=\"0.1\" value=\"50\" aria-label=\"how much of the baseline is "
-    "seen\"><div class=\"ends\"><span>left of the knob the baseline</span><span>right of it the actual picture</span>"
-    "</div></div>\n";
-
-std::string figureOf(const std::string& title, const fs::path& file) {
-  return fmt::format("<figure><img src=\"{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
-                     htmlPng(readWholeFile(file.string())), htmlEscaped(title));
-}
-
 bool isPicture(const fs::path& file) { return lowerExtension(file) == ".png" && fs::exists(file); }
 
 std::string pictures(const CheckedItem& item) {
-  std::string html = "<div class=\"trio\">\n";
-  if (isPicture(item.baseline)) html += figureOf("Baseline", item.baseline);
-  if (isPicture(item.actual)) html += figureOf("Actual", item.actual);
-  if (isPicture(item.difference))
-    html += figureOf("Difference: dark grey is free, from mid grey to white counts", item.difference);
-  html += "</div>\n";
-  return isPicture(item.difference) ? html + std::string(kSlider) : html;
+  std::vector<PagePicture> row;
+  const auto add = [&](const std::string& title, const fs::path& file) {
+    if (isPicture(file)) row.push_back({title, readWholeFile(file.string())});
+  };
+  add("Baseline", item.baseline);
+  add("Actual", item.actual);
+  add("Difference: dark grey is free, from mid grey to white counts", item.difference);
+  const std::string html = pictureRow(row);
+  return isPicture(item.difference) ? html + pictureSlider({"the baseline", "the actual picture"}) : html;
 }
 
 std::string swatch(const std::string& value) {
@@ -161,12 +124,13 @@ std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request) 
   const std::string subtitle = failures == 0
                                    ? fmt::format("All {} comparisons are as they should be", outcome.items.size())
                                    : fmt::format("{} of {} comparisons failed", failures, outcome.items.size());
-  std::string html = htmlHead("Check of " + request.folder.string(), subtitle, kCheckStyle);
+  std::string html = htmlHead("Check of " + request.folder.string(), subtitle,
+                              std::string(kPictureRowStyle) + std::string(kCheckStyle));
   html += "<h2>All comparisons</h2>\n" + overview(outcome);
   html += fmt::format("<code>{}</code>\n", htmlEscaped(checkCommand(request)));
   for (const CheckedItem& item : outcome.items)
     if (item.verdict != Verdict::passed) html += failure(item, request);
-  return html + std::string(kScript) + htmlFoot(versionText());
+  return html + std::string(kPictureRowScript) + htmlFoot(versionText());
 }
 
 std::string junitXml(const CheckOutcome& outcome) {

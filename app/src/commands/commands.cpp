@@ -1,6 +1,7 @@
 #include "commands/commands.h"
 
 #include "check/check_command.h"
+#include "compare/compare_command.h"
 #include "explorer/explorer_commands.h"
 #include "language/help.h"
 #include "pictures/picture_commands.h"
@@ -15,6 +16,7 @@ Registry makeRegistry() {
   addJumpsCommand(registry);
   addVerifyCommand(registry);
   addPictureCommands(registry);
+  addCompareCommand(registry);
   addMotionCommands(registry);
   addFigureCommands(registry);
   addProbeCommand(registry);

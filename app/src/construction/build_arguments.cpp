@@ -237,4 +237,16 @@ std::string decidingArguments(const Arguments& arguments) {
   return text;
 }
 
+std::string buildCommandLine(const std::string& surface, const std::string& file, const Arguments& arguments) {
+  std::string line = fmt::format("hpsdf build {} -o {}", shellWord(surface), file);
+  for (const Parameter& parameter : buildParameters()) {
+    if (!arguments.given(parameter.name)) continue;
+    const std::string text = arguments.text(parameter.name);
+    line += parameter.type == ParameterType::flag && arguments.flag(parameter.name)
+                ? fmt::format(" --{}", parameter.name)
+                : fmt::format(" --{}={}", parameter.name, text);
+  }
+  return line;
+}
+
 }  // namespace hpsdf::app

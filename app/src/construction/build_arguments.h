@@ -66,4 +66,8 @@ bool decides(const Parameter& parameter);
 /// Returns all arguments on which the resulting field depends, one per line.
 std::string decidingArguments(const Arguments& arguments);
 
+/// Returns the command line 'hpsdf build …' that builds the field of `surface` with the arguments that are given, and
+/// writes it to `file`.
+std::string buildCommandLine(const std::string& surface, const std::string& file, const Arguments& arguments);
+
 }  // namespace hpsdf::app

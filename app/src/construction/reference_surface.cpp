@@ -46,10 +46,6 @@ Vector3 exactNormal(const ExactDistance& exact, const Vector3& x, double signedD
   return offset / (thickness == 0 && signedDistance < 0 ? -distance : distance);
 }
 
-bool isMadeFrom(const Source& candidate, const Source& source) {
-  return candidate.fingerprint == source.fingerprint && (source.fingerprint != 0 || candidate.name == source.name);
-}
-
 void warnIfForeign(const Console& console, const std::string& surface, const Source& found, const Source& source) {
   if (!isMadeFrom(found, source))
     warn(console, fmt::format("{} is not what the field was made from ({})", surface,
@@ -81,6 +77,10 @@ ReferenceSurface meshReference(const Console& console, PreparedSurface&& prepare
 }
 
 }  // namespace
+
+bool isMadeFrom(const Source& candidate, const Source& source) {
+  return candidate.fingerprint == source.fingerprint && (source.fingerprint != 0 || candidate.name == source.name);
+}
 
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {

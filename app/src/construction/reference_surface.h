@@ -22,6 +22,10 @@ struct ReferenceSurface {
   bool fieldIsMadeFromIt = false;
 };
 
+/// Returns true if a field with the source `source` was made from the surface `candidate`. Meshes are known by their
+/// fingerprints, analytic shapes by their names.
+bool isMadeFrom(const Source& candidate, const Source& source);
+
 /// Loads a mesh file or a shape and converts it to the units of a field that was made from `source`. Throws `Error`
 /// naming `surface`.
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);

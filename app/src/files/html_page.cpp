@@ -62,6 +62,68 @@ std::string figure(const ReportPicture& picture) {
 
 }  // namespace
 
+const std::string_view kPictureRowStyle = R"(
+.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(18rem, 1fr)); gap: 0 1rem; }
+.pictures figure { margin-bottom: 1rem; }
+.pictures img { cursor: zoom-in; }
+.pictures figure.wide { grid-column: 1 / -1; }
+.pictures figure.wide img { width: 100%; cursor: zoom-out; image-rendering: pixelated; }
+.slider { display: none; margin: .5rem 0 1rem; }
+.slider .shown { position: relative; }
+.slider img { display: block; width: 100%; border: 1px solid var(--line); border-radius: 4px; box-sizing: border-box; }
+.slider img.over { position: absolute; top: 0; left: 0; clip-path: inset(0 0 0 50%); }
+.slider input { width: 100%; margin: .5rem 0 0; }
+.ends { display: flex; justify-content: space-between; color: var(--quiet); font-size: .9rem; }
+.ends select { font: inherit; }
+)";
+
+// Copies two pictures of the row into the slider behind it, so that the page contains every picture only once.
+const std::string_view kPictureRowScript = R"(<script>
+for (const slider of document.querySelectorAll('.slider')) {
+  const [under, over] = slider.querySelectorAll('img');
+  const images = slider.previousElementSibling.querySelectorAll('img');
+  const chosen = slider.querySelectorAll('select');
+  const show = () => {
+    under.src = images[chosen.length ? chosen[0].value : 0].src;
+    over.src = images[chosen.length ? chosen[1].value : 1].src;
+  };
+  for (const choice of chosen) choice.onchange = show;
+  show();
+  slider.style.display = 'block';
+  slider.querySelector('input').oninput = (event) => {
+    over.style.clipPath = 'inset(0 0 0 ' + event.target.value + '%)';
+  };
+}
+for (const image of document.querySelectorAll('.pictures img'))
+  image.onclick = () => image.parentElement.classList.toggle('wide');
+</script>
+)";
+
+std::string pictureRow(const std::vector<PagePicture>& pictures) {
+  std::string html = "<div class=\"pictures\">\n";
+  for (const PagePicture& picture : pictures)
+    html += fmt::format("<figure><img src=\"{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
+                        htmlPng(picture.png), htmlEscaped(picture.title));
+  return html + "</div>\n";
+}
+
+std::string pictureSlider(const std::vector<std::string>& names) {
+  const auto side = [&](std::size_t shown) {
+    if (names.size() == 2) return htmlEscaped(names[shown]);
+    std::string options;
+    for (std::size_t n = 0; n < names.size(); ++n)
+      options +=
+          fmt::format("<option value=\"{}\"{}>{}</option>", n, n == shown ? " selected" : "", htmlEscaped(names[n]));
+    return "<select>" + options + "</select>";
+  };
+  return fmt::format(
+      "<div class=\"slider\"><div class=\"shown\"><img alt=\"left picture\"><img class=\"over\" alt=\"right "
+      "picture\"></div><input type=\"range\" min=\"0\" max=\"100\" step=\"0.1\" value=\"50\" aria-label=\"how much of "
+      "the left picture is seen\"><div class=\"ends\"><span>left of the knob {}</span><span>right of it "
+      "{}</span></div></div>\n",
+      side(0), side(1));
+}
+
 std::string htmlPng(std::string_view bytes) {
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text = "data:image/png;base64,";

@@ -38,6 +38,23 @@ std::string htmlFoot(const std::string& footer);
 /// Returns a row of an HTML table with a name and its value. The function escapes both texts.
 std::string htmlFact(const std::string& name, const std::string& value);
 
+/// CSS and JavaScript of pages with rows of pictures. The script belongs behind the last row.
+extern const std::string_view kPictureRowStyle, kPictureRowScript;
+
+/// A picture that a page contains.
+struct PagePicture {
+  std::string title;
+  std::string png;  ///< bytes of a PNG file
+};
+
+/// Returns pictures of equal size side by side. A click makes a picture as wide as the page.
+std::string pictureRow(const std::vector<PagePicture>& pictures);
+
+/// Returns a slider that shows one picture left of its knob and another one right of it. It belongs directly behind the
+/// `pictureRow` whose pictures it shows, first the first two of `names`. If there are more names, the reader chooses
+/// two of them.
+std::string pictureSlider(const std::vector<std::string>& names);
+
 /// Encodes the bytes of a PNG file as the source of an <img> element, so that the HTML page contains the
 /// picture.
 std::string htmlPng(std::string_view bytes);

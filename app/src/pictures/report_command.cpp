@@ -29,18 +29,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string buildCommandLine(const std::string& surface, const std::string& file, const Arguments& arguments) {
-  std::string line = fmt::format("hpsdf build {} -o {}", shellWord(surface), file);
-  for (const Parameter& parameter : buildParameters()) {
-    if (!arguments.given(parameter.name)) continue;
-    const std::string text = arguments.text(parameter.name);
-    line += parameter.type == ParameterType::flag && arguments.flag(parameter.name)
-                ? fmt::format(" --{}", parameter.name)
-                : fmt::format(" --{}={}", parameter.name, text);
-  }
-  return line;
-}
-
 /// Returns the renderer's mean time for one frame of the surface, in seconds. The mean is over eight frames, or over as
 /// many as fit into two seconds. A first frame is drawn to warm up and is not measured.
 double frameSeconds(render::Renderer& renderer, const Field& field, const render::SurfacePicture& picture) {

@@ -6,6 +6,10 @@
 
 namespace hpsdf::app {
 
+std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend) {
+  return backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
+}
+
 std::vector<Parameter> backendParameters() {
   return {{"cpu", flag().under(kPicture),
            "Draws in double precision on the CPU, without OpenGL. It is slow; use it as the reference, or where there "

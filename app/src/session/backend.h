@@ -1,6 +1,7 @@
 #pragma once
 // The choice of a renderer, and the command options for this choice.
 
+#include <memory>
 #include <vector>
 
 #include "hpsdf/render/renderer.h"
@@ -14,6 +15,9 @@ struct Backend {
   render::GlChoice gl = render::GlChoice::automatic;
   bool operator==(const Backend&) const = default;
 };
+
+/// Makes a renderer of the field, which must outlive it.
+std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend);
 
 /// Returns the parameters `cpu` and `gl`, which choose the renderer.
 std::vector<Parameter> backendParameters();

@@ -12,10 +12,6 @@
 namespace hpsdf::app {
 namespace {
 
-std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend) {
-  return backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
-}
-
 /// Returns the jumps of the field across cell faces. If `known` is empty, measures the jumps and stores them in
 /// `known`.
 const Jumps& jumpsOf(const Field& field, std::optional<Jumps>& known, const Console& console) {

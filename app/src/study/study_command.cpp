@@ -15,7 +15,7 @@ namespace {
 
 /// Returns all kinds of studies. To add a kind to the command `study`, add it to this list.
 const std::vector<Study>& studies() {
-  static const std::vector<Study> list = {convergenceStudy(), tableStudy(), continuityStudy()};
+  static const std::vector<Study> list = {convergenceStudy(), tableStudy(), continuityStudy(), tradeoffStudy()};
   return list;
 }
 
@@ -93,7 +93,8 @@ ExactSamples exactSamples(const Console& console, const Arguments& arguments, co
                       [&](const Progress& progress) { return sampleUniform(exact, domain, near, options, progress); });
 }
 
-Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh) {
+Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh,
+                         const std::vector<std::string>& more) {
   const std::vector<std::string> meshes = arguments.texts("mesh");
   const Command& build = session.registry().command("build");
   std::vector<Word> words = {{.text = meshes[mesh]}};
@@ -109,6 +110,7 @@ Arguments buildArguments(const Session& session, const Arguments& arguments, std
                               parameter.name, values.size(), meshes.size()));
     words.push_back({.text = fmt::format("--{}={}", parameter.name, values[values.size() == 1 ? 0 : mesh])});
   }
+  for (const std::string& option : more) words.push_back({.text = option});
   return parseArguments(build, words, Origin::script);
 }
 
@@ -156,7 +158,8 @@ void addStudyCommand(Registry& registry) {
       .examples = {"hpsdf study convergence builtin:torus -o convergence --at 1.5e-4",
                    "hpsdf study table bunny.obj dragon.obj -o table --target-error 1e-6 --target-error 1e-7 --grid 6 "
                    "--grid 10",
-                   "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5"},
+                   "hpsdf study continuity bunny.obj -o continuity --target-error 1e-5",
+                   "hpsdf study tradeoff bunny.obj -o tradeoff --budget 4e6"},
       .parameters = joined(
           {{{"kind", choice(kinds).positional().required(), "Kind of the study."},
             {"mesh", text("MESH").positional().repeatable().required(), "Mesh files, builtin:SHAPE or analytic:SHAPE."},

@@ -27,6 +27,7 @@ struct Study {
 Study convergenceStudy();
 Study tableStudy();
 Study continuityStudy();
+Study tradeoffStudy();
 
 /// Returns the parameters of the command `build` except those in `names`. Each returned parameter, unless it is
 /// a flag, may be given once for all meshes or once for each mesh.
@@ -41,9 +42,10 @@ ExactSamples exactSamples(const Console& console, const Arguments& arguments, co
                           const Box& domain, int threads, double near = 0);
 
 /// Returns the arguments of `build` for the mesh with this index. A parameter that is given once for each mesh
-/// takes the value with the same index. Throws `Error` for a parameter that is given neither once nor once for
-/// each mesh.
-Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh);
+/// takes the value with the same index. `more` are options of `build` that the study sets itself, such as
+/// "--target-error=1e-6". Throws `Error` for a parameter that is given neither once nor once for each mesh.
+Arguments buildArguments(const Session& session, const Arguments& arguments, std::size_t mesh,
+                         const std::vector<std::string>& more = {});
 
 /// Returns a different file name for each mesh. Throws `Error` if `buildArguments` would throw for any of the meshes,
 /// so that mistakes are reported before any field is built.

@@ -11,12 +11,12 @@
 #include "construction/build_field.h"
 #include "files/html_page.h"
 #include "files/output_folder.h"
-#include "files/text_file.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
 #include "language/script.h"
+#include "pictures/page_pictures.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/field_summary.h"
@@ -30,16 +30,12 @@ namespace {
 
 constexpr int kThumbnail = 200;  // side of a slice's picture, pixels
 constexpr int kBar = 300;        // length in pixels of a bar, which stands for the whole volume
-constexpr int kDegreeBarHeight = 18;
-
-using Shares = std::map<int, double>;
-using Colors = std::map<int, render::Color>;
 
 /// A property of the cells that pictures show by colours: the degree or the depth.
 struct Level {
   render::ColorBy color;
   const char *name, *title;
-  Shares FieldStatistics::*volume;
+  std::map<int, double> FieldStatistics::*volume;
 };
 constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree", &FieldStatistics::degreeVolume},
                                 Level{render::ColorBy::depth, "depth", "Depth", &FieldStatistics::depthVolume}};
@@ -47,9 +43,9 @@ constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree
 /// A picture of a slice through the middle of the domain, coloured by degree or depth, and a bar in the same colours.
 /// The bar shows which share of the domain's volume each degree or depth takes.
 struct LevelPicture {
-  std::string png = {};  ///< bytes of the slice's PNG file
-  std::string svg = {};  ///< the bar as SVG text
-  Colors colors = {};    ///< colours of the degrees or depths that occur in any row
+  std::string png = {};     ///< bytes of the slice's PNG file
+  std::string svg = {};     ///< the bar as SVG text
+  LevelColors colors = {};  ///< colours of the degrees or depths that occur in any row
 };
 
 /// A mesh and its field, which make one row of the table.
@@ -77,38 +73,6 @@ TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, c
   return {surface, name, std::move(built.field), std::move(figures), built.seconds, std::move(error)};
 }
 
-/// Returns an SVG bar with one rectangle for each level (a degree or a depth), in the level's colour and as wide as its
-/// share. A rectangle contains its degree or depth if there is room. Its tooltip shows the degree or depth and, if
-/// `tellsShares` is true, the share.
-std::string sharesSvg(int width, const Shares& shares, const Colors& colors, bool tellsShares) {
-  std::string parts;
-  double from = 0;
-  for (const auto& [level, share] : shares) {
-    const render::Color& color = colors.at(level);
-    parts +=
-        fmt::format("<rect x=\"{:.2f}\" y=\"0\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"><title>{}</title></rect>",
-                    width * from, width * share, kDegreeBarHeight, colorText(color),
-                    tellsShares ? fmt::format("{}: {:.2f} %", levelName(level), 100 * share) : levelName(level));
-    const bool isLight = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2] > 128;
-    if (width * share > (level == kExactDegree ? 34 : 12))
-      parts += fmt::format("<text x=\"{:.2f}\" y=\"13\" fill=\"{}\">{}</text>", width * from + width * share / 2,
-                           isLight ? "#000000" : "#ffffff", levelName(level));
-    from += share;
-  }
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" text-anchor=\"middle\">{2}</svg>",
-      width, kDegreeBarHeight, parts);
-}
-
-/// Returns an SVG legend of the colours of all levels (degrees or depths).
-std::string legendSvg(const Colors& colors) {
-  const int kWidth = colors.contains(kExactDegree) ? 36 : 26;
-  Shares equal;
-  for (const auto& [level, color] : colors) equal[level] = 1 / double(colors.size());
-  return sharesSvg(kWidth * int(colors.size()), equal, colors, false);
-}
-
 LevelPicture pictureOf(render::Renderer& renderer, const TableRow& row, const Level& level,
                        const std::vector<int>& levels) {
   const render::SlicePicture picture{.plane = render::AxisPlane{2, defaultOffset(row.field.domain(), 2)},
@@ -119,10 +83,8 @@ LevelPicture pictureOf(render::Renderer& renderer, const TableRow& row, const Le
                                      .scale = {.levels = levels},
                                      .bare = true};
   const render::Drawn drawn = render::drawSlice(renderer, row.field, picture);
-  const TemporaryFolder folder;
-  savePng(drawn.image, folder.path() / "slice.png");
-  LevelPicture made{.png = readWholeFile((folder.path() / "slice.png").string())};
-  for (const render::Legend::Level& shown : drawn.legend.levels) made.colors[shown.level] = shown.color;
+  LevelPicture made{.png = pngBytes(drawn.image)};
+  made.colors = levelColors(drawn.legend);
   made.svg = sharesSvg(kBar, row.figures.*level.volume, made.colors, true);
   return made;
 }
@@ -226,7 +188,7 @@ std::string htmlOf(const std::vector<TableRow>& rows) {
                fmt::format("{} meshes, as in Table 1 of Koschier, Deul and Bender (2016)", rows.size()), kTableStyle);
   for (std::size_t k = 0; k < kLevels.size(); ++k)
     html +=
-        fmt::format("<p class=\"legend\">{} {}</p>\n", kLevels[k].title, legendSvg(rows.front().pictures[k].colors));
+        fmt::format("<p class=\"legend\">{} {}</p>\n", kLevels[k].title, levelsSvg(rows.front().pictures[k].colors));
   std::string head;
   for (const auto& [name, value] : cellsOf(rows.front()))
     head += fmt::format("<th{}>{}</th>", name == "mesh" ? "" : " class=\"figure\"", htmlEscaped(name));
@@ -273,7 +235,7 @@ void runTable(Session& session, const Arguments& arguments) {
       folder.write(fmt::format("{}-{}.png", row.name, kLevels[k].name), row.pictures[k].png);
       folder.write(fmt::format("{}-{}.svg", row.name, kLevels[k].name), row.pictures[k].svg);
     }
-    folder.write(fmt::format("{}-legend.svg", kLevels[k].name), legendSvg(rows.front().pictures[k].colors));
+    folder.write(fmt::format("{}-legend.svg", kLevels[k].name), levelsSvg(rows.front().pictures[k].colors));
   }
   folder.write("table.md", markdownOf(rows));
   folder.write("table.json", jsonText(json));

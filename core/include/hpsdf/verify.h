@@ -91,6 +91,10 @@ struct MeasureOptions {
 Measurement measure(const Field& field, const DistanceFunction& distance, const MeasureOptions& options = {},
                     const Progress& progress = {});
 
+/// Returns the share of a surface that the field's jumps tear: the share of `sampleSurface`'s random points that lie in
+/// a crack beside a face of their cell. It is 0 for a blended field, which is continuous.
+double tornShare(const Field& field, const TriangleMesh& surface, const SampleOptions& options = {});
+
 /// Returns the field with a measurement of it in its metadata.
 Field withMeasurement(Field field, const Measurement& measurement);
 

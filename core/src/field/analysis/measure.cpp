@@ -70,15 +70,6 @@ bool isTornAt(const Field& field, const Vector3& x) {
   return false;
 }
 
-double tornShareOf(const Field& field, const TriangleMesh& surface, const SampleOptions& options) {
-  if (field.data().blend > 0) return 0;
-  const std::vector<Vector3> points = sampleSurface(surface, field.domain(), options);
-  const auto addChunk = [&](detail::Sums& sums, std::size_t first, std::size_t count) {
-    for (std::size_t n = first; n < first + count; ++n) sums.add(isTornAt(field, points[n]) ? 1 : 0);
-  };
-  return detail::sumOfChunks<detail::Sums>(points.size(), kPointsPerPart, {}, "", addChunk).mean();
-}
-
 /// Returns the triangles to which distances are measured, or std::nullopt if there are none.
 std::optional<TriangleMesh> surfaceOf(const DistanceFunction& distance) {
   const TriangleSearch* search = distance.triangleSearch();
@@ -134,8 +125,19 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
     double greatest = -1;
     for (const ErrorsAtPoints* at : {&near, &uniform}) addPoints(result, greatest, *at, allowed);
     progress.update("measuring", 0.95);
-    if (surface) result.tornShare = tornShareOf(field, *surface, half);
+    if (surface) result.tornShare = tornShare(field, *surface, half);
     return result;
+  });
+}
+
+double tornShare(const Field& field, const TriangleMesh& surface, const SampleOptions& options) {
+  if (field.data().blend > 0) return 0;
+  return withThreads(options.threads, [&] {
+    const std::vector<Vector3> points = sampleSurface(surface, field.domain(), options);
+    const auto addChunk = [&](detail::Sums& sums, std::size_t first, std::size_t count) {
+      for (std::size_t n = first; n < first + count; ++n) sums.add(isTornAt(field, points[n]) ? 1 : 0);
+    };
+    return detail::sumOfChunks<detail::Sums>(points.size(), kPointsPerPart, {}, "", addChunk).mean();
   });
 }
 

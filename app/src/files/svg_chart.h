@@ -1,0 +1,30 @@
+#pragma once
+// Draws curves over two logarithmic axes as SVG, for HTML pages and as a file of its own.
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace hpsdf::app {
+
+struct ChartCurve {
+  std::string name;   ///< name in the legend; curves with equal names share one entry and belong to one colour
+  std::string color;  ///< "#rrggbb"
+  bool dashed = false;
+  std::vector<std::array<double, 2>> points = {};  ///< in ascending order of x; points at or below 0 are left out
+};
+
+struct Chart {
+  std::string xLabel, yLabel;  ///< titles of the axes, with their units
+  std::string solid, dashed;   ///< meanings of solid and of dashed curves; "" if there are none
+  std::vector<ChartCurve> curves = {};
+};
+
+/// Returns the chart as an SVG element. Axes and texts have the colour of the text around the element.
+std::string chartSvg(const Chart& chart);
+
+/// Returns a colour that distinguishes curve number `index` from the seven curves before it, also for readers with
+/// colour-blindness.
+std::string curveColor(std::size_t index);
+
+}  // namespace hpsdf::app

@@ -1,0 +1,328 @@
+// `study tradeoff`: bytes, time and errors of the fields of a mesh for a range of target errors.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <tuple>
+
+#include "console/long_work.h"
+#include "console/version.h"
+#include "construction/build_arguments.h"
+#include "construction/build_field.h"
+#include "construction/surface.h"
+#include "files/html_page.h"
+#include "files/output_folder.h"
+#include "files/svg_chart.h"
+#include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/output_file.h"
+#include "hpsdf/verify.h"
+#include "session/session.h"
+#include "study/study_command.h"
+#include "text/json.h"
+#include "text/text.h"
+
+namespace hpsdf::app {
+namespace {
+
+/// One field of the range.
+struct TradeoffPoint {
+  double target;
+  std::string command;  ///< command line that builds the field
+  FieldStatistics counts;
+  double seconds;  ///< time to set up the exact distance and to build the field
+  Measurement measured;
+  double leastError;  ///< error at which the field equals the surface but for rounding
+};
+
+struct Tradeoff {
+  std::string mesh, name;
+  std::vector<TradeoffPoint> points = {};
+  std::string recommendation = {};              ///< "" if no limit was given
+  std::optional<std::size_t> recommended = {};  ///< index of the recommended point
+
+  const TradeoffPoint* best() const { return recommended ? &points[*recommended] : nullptr; }
+};
+
+/// Returns a number as a user would write it: 1e-6, or with all its digits where three do not suffice.
+std::string exactText(double number) {
+  const std::string text = shortNumber(number);
+  return parseNumber(text) == number ? text : fmt::format("{}", number);
+}
+
+/// Returns the arguments of `build` for one point of the range. To study another range, such as one of tolerances,
+/// replace the option here.
+Arguments pointArguments(const Session& session, const Arguments& arguments, std::size_t mesh, double target) {
+  return buildArguments(session, arguments, mesh, {"--target-error=" + exactText(target)});
+}
+
+TradeoffPoint tradeoffPoint(const Console& console, const BuildInput& input, const Arguments& buildArguments,
+                            const Arguments& arguments, double target) {
+  const auto start = std::chrono::steady_clock::now();
+  const BuildOptions options = buildOptions(buildArguments);
+  return withProgress(console, [&](const Progress& progress) {
+    const Field field = build(*input.exact, input.domain, options, progress);
+    const double seconds = input.setUpSeconds + secondsSince(start);
+    const MeasureOptions measuring{.points = static_cast<std::size_t>(arguments.number("points")),
+                                   .seed = static_cast<std::uint64_t>(arguments.number("seed")),
+                                   .threads = options.threads};
+    return TradeoffPoint{.target = target,
+                         .command = {},
+                         .counts = statistics(field),
+                         .seconds = seconds,
+                         .measured = measure(field, *input.exact, measuring, progress),
+                         .leastError = 1e-6 * field.metadata().referenceLength};
+  });
+}
+
+/// Returns the target errors of the range, the greatest first.
+std::vector<double> targetsOf(const Arguments& arguments) {
+  std::vector<double> targets = arguments.numbers("target-errors");
+  std::ranges::sort(targets, std::greater());
+  targets.erase(std::unique(targets.begin(), targets.end()), targets.end());
+  return targets;
+}
+
+/// Orders fields by exactness: by the RMS error near the surface, and by that over the domain where both fields equal
+/// the surface but for rounding.
+auto inexactness(const TradeoffPoint& point) {
+  return std::tuple(std::max(point.measured.near.rms, point.leastError), point.measured.domain.rms, point.counts.bytes);
+}
+
+/// Chooses the most exact field of the range that keeps the limits of the arguments, and says so in a sentence.
+void recommend(Tradeoff& tradeoff, const Arguments& arguments) {
+  const bool hasBudget = arguments.has("budget"), hasTime = arguments.has("within-seconds");
+  if (!hasBudget && !hasTime) return;
+  const auto keepsLimits = [&](const TradeoffPoint& point) {
+    return (!hasBudget || double(point.counts.bytes) <= arguments.number("budget")) &&
+           (!hasTime || point.seconds <= arguments.number("within-seconds"));
+  };
+  for (std::size_t n = 0; n < tradeoff.points.size(); ++n) {
+    const TradeoffPoint* best = tradeoff.best();
+    if (keepsLimits(tradeoff.points[n]) && (best == nullptr || inexactness(tradeoff.points[n]) < inexactness(*best)))
+      tradeoff.recommended = n;
+  }
+  const std::string limits =
+      fmt::format("{}{}{}", hasBudget ? bytesText(arguments.number("budget")) : "", hasBudget && hasTime ? " and " : "",
+                  hasTime ? fmt::format("{} s", shortNumber(arguments.number("within-seconds"))) : "");
+  if (const TradeoffPoint* best = tradeoff.best()) {
+    tradeoff.recommendation = fmt::format(
+        "Within {}, the most exact field of the range is that of τ = {}: it takes {} and {} s, and its RMS error is {} "
+        "near the surface and {} over the domain.",
+        limits, exactText(best->target), bytesText(double(best->counts.bytes)), shortNumber(best->seconds),
+        shortNumber(best->measured.near.rms), shortNumber(best->measured.domain.rms));
+    return;
+  }
+  const TradeoffPoint& smallest =
+      *std::ranges::min_element(tradeoff.points, {}, [](const TradeoffPoint& point) { return point.counts.bytes; });
+  tradeoff.recommendation = fmt::format(
+      "No field of the range keeps within {}: the smallest, that of τ = {}, takes {} and {} s. Give greater target "
+      "errors or wider limits.",
+      limits, exactText(smallest.target), bytesText(double(smallest.counts.bytes)), shortNumber(smallest.seconds));
+}
+
+Tradeoff tradeoffOf(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
+  Tradeoff tradeoff{arguments.texts("mesh")[mesh], name};
+  Console console = session.console();
+  const std::vector<double> targets = targetsOf(arguments);
+  const BuildInput input =
+      buildInput(console, tradeoff.mesh, pointArguments(session, arguments, mesh, targets.front()));
+  for (const double target : targets) {
+    const Arguments point = pointArguments(session, arguments, mesh, target);
+    console.work = fmt::format("{} of {}, τ = {}: ", tradeoff.points.size() + 1, targets.size(), exactText(target));
+    tradeoff.points.push_back(
+        namingSurface(tradeoff.mesh, [&] { return tradeoffPoint(console, input, point, arguments, target); }));
+    tradeoff.points.back().command = buildCommandLine(tradeoff.mesh, name + ".hpsdf", point);
+  }
+  recommend(tradeoff, arguments);
+  return tradeoff;
+}
+
+Json pointJson(const TradeoffPoint& point) {
+  const Measurement& m = point.measured;
+  return {{"target_error", point.target},  {"bytes", point.counts.bytes},
+          {"leaves", point.counts.leaves}, {"exact_leaves", point.counts.exact.leaves},
+          {"seconds", point.seconds},      {"near_rms", m.near.rms},
+          {"near_max", m.near.max},        {"domain_rms", m.domain.rms},
+          {"domain_max", m.domain.max},    {"wrong_signs", m.wrongSigns},
+          {"torn_share", m.tornShare}};
+}
+
+Json tradeoffJson(const Tradeoff& tradeoff) {
+  Json points = Json::array();
+  for (const TradeoffPoint& point : tradeoff.points) points.push_back(pointJson(point));
+  Json json = {{"mesh", tradeoff.mesh}, {"name", tradeoff.name}, {"points", points}, {"recommended", Json()}};
+  if (const TradeoffPoint* best = tradeoff.best())
+    json["recommended"] = {{"target_error", best->target}, {"command", best->command}};
+  return json;
+}
+
+std::string tradeoffCsv(const std::vector<Tradeoff>& tradeoffs) {
+  std::string text =
+      "mesh,target_error,bytes,leaves,exact_leaves,seconds,near_rms,near_max,domain_rms,domain_max,wrong_signs,"
+      "torn_share\n";
+  for (const Tradeoff& tradeoff : tradeoffs)
+    for (const TradeoffPoint& point : tradeoff.points)
+      text += fmt::format("{},{}\n", tradeoff.name, rowText(pointJson(point)));
+  return text;
+}
+
+/// Returns the figures of a point as text, in the order of `kTradeoffHeads`.
+std::vector<std::string> tradeoffCells(const TradeoffPoint& point) {
+  const Measurement& m = point.measured;
+  return {exactText(point.target),
+          bytesText(double(point.counts.bytes)),
+          grouped(point.counts.leaves),
+          shortNumber(point.seconds) + " s",
+          shortNumber(m.near.rms),
+          shortNumber(m.near.max),
+          shortNumber(m.domain.rms),
+          shortNumber(m.domain.max),
+          shortNumber(100 * m.tornShare) + " %"};
+}
+
+constexpr const char* kTradeoffHeads[] = {"τ",        "memory",     "leaves",     "time", "near RMS",
+                                          "near max", "domain RMS", "domain max", "torn"};
+
+std::string tradeoffText(const Tradeoff& tradeoff) {
+  std::string text = tradeoff.mesh + "\n ";
+  for (const char* head : kTradeoffHeads) text += fmt::format(" {:>11}", head);
+  text += "\n";
+  for (const TradeoffPoint& point : tradeoff.points) {
+    text += " ";
+    for (const std::string& cell : tradeoffCells(point)) text += fmt::format(" {:>11}", cell);
+    text += "\n";
+  }
+  if (tradeoff.recommendation.empty()) return text;
+  text += tradeoff.recommendation + "\n";
+  return tradeoff.recommended ? text + "  " + tradeoff.best()->command + "\n" : text;
+}
+
+/// Returns the chart of the errors over a cost, such as bytes.
+std::string tradeoffChart(const Tradeoff& tradeoff, const std::string& costLabel,
+                          double (*cost)(const TradeoffPoint&)) {
+  using Error = Measurement::Error;
+  const std::pair<const char*, Error Measurement::*> kinds[] = {{"near the surface", &Measurement::near},
+                                                                {"over the domain", &Measurement::domain}};
+  Chart chart{
+      .xLabel = costLabel, .yLabel = "error [units of the field]", .solid = "RMS error", .dashed = "greatest error"};
+  for (std::size_t n = 0; n < std::size(kinds); ++n) {
+    ChartCurve rms{.name = kinds[n].first, .color = curveColor(n)}, greatest = rms;
+    greatest.dashed = true;
+    for (const TradeoffPoint& point : tradeoff.points) {
+      const Error& error = point.measured.*kinds[n].second;
+      rms.points.push_back({cost(point), error.rms});
+      greatest.points.push_back({cost(point), error.max});
+    }
+    for (ChartCurve* curve : {&rms, &greatest}) {
+      std::ranges::sort(curve->points);
+      chart.curves.push_back(std::move(*curve));
+    }
+  }
+  return chartSvg(chart);
+}
+
+constexpr std::string_view kTradeoffStyle = R"(
+table { width: auto; }
+td, th { padding-right: 1.8rem; text-align: right; white-space: nowrap; }
+tr.chosen td { font-weight: 700; }
+svg.chart { display: block; max-width: 100%; height: auto; margin: 1rem 0; }
+)";
+
+constexpr const char* kTradeoffNote =
+    "Errors are measured at random points, half of them within a hundredth of the mesh's longest side of the surface, "
+    "and "
+    "are in the units of the field. Time is that of the construction on this machine.";
+
+std::string tradeoffSection(const Tradeoff& tradeoff) {
+  std::string html = fmt::format("<h2>{}</h2>\n<table>\n<tr>", htmlEscaped(tradeoff.mesh));
+  for (const char* head : kTradeoffHeads) html += fmt::format("<th>{}</th>", head);
+  html += "</tr>\n";
+  for (const TradeoffPoint& point : tradeoff.points) {
+    html += &point == tradeoff.best() ? "<tr class=\"chosen\">" : "<tr>";
+    for (const std::string& cell : tradeoffCells(point)) html += fmt::format("<td>{}</td>", htmlEscaped(cell));
+    html += "</tr>\n";
+  }
+  html += "</table>\n";
+  if (!tradeoff.recommendation.empty()) html += fmt::format("<p>{}</p>\n", htmlEscaped(tradeoff.recommendation));
+  if (tradeoff.recommended) html += fmt::format("<code>{}</code>\n", htmlEscaped(tradeoff.best()->command));
+  html += tradeoffChart(tradeoff, "memory [bytes]", [](const TradeoffPoint& p) { return double(p.counts.bytes); });
+  return html +
+         tradeoffChart(tradeoff, "time of the construction [s]", [](const TradeoffPoint& p) { return p.seconds; });
+}
+
+std::string tradeoffHtml(const std::vector<Tradeoff>& tradeoffs) {
+  std::string html =
+      htmlHead("Size, time and accuracy", "Fields of the same mesh for a range of target errors τ", kTradeoffStyle);
+  for (const Tradeoff& tradeoff : tradeoffs) html += tradeoffSection(tradeoff);
+  return html + fmt::format("<p>{}</p>\n", htmlEscaped(kTradeoffNote)) + htmlFoot(versionText());
+}
+
+void runTradeoff(Session& session, const Arguments& arguments) {
+  OutputFolder folder(arguments.text("output"));
+  checkWritable(folder.path() / "index.html");
+  const std::vector<std::string> names = checkedNames(session, arguments);
+  std::vector<Tradeoff> tradeoffs;
+  tradeoffs.reserve(names.size());
+  for (std::size_t n = 0; n < names.size(); ++n) tradeoffs.push_back(tradeoffOf(session, arguments, n, names[n]));
+
+  Json json = {{"points", static_cast<std::uint64_t>(arguments.number("points"))},
+               {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
+               {"meshes", Json::array()}};
+  for (const Tradeoff& tradeoff : tradeoffs) json["meshes"].push_back(tradeoffJson(tradeoff));
+  const InterruptGuard guard;  // on Ctrl-C, all files are written or none
+  folder.write("tradeoff.csv", tradeoffCsv(tradeoffs));
+  folder.write("tradeoff.json", jsonText(json));
+  folder.write("index.html", tradeoffHtml(tradeoffs));
+  folder.commit();
+  json["page"] = (folder.path() / "index.html").string();
+  if (session.wantsJson(arguments)) return printJson(session.console().out, json);
+  for (const Tradeoff& tradeoff : tradeoffs) session.console().out << tradeoffText(tradeoff);
+  session.console().out << json["page"].get<std::string>() << "\n";
+}
+
+/// Returns the parameters of `build` except those that the range replaces: whatever else ends a construction.
+std::vector<Parameter> rangeBuildParameters() {
+  using Ending = BuildSetting::Ending;
+  std::vector<std::string> left =
+      endParameters({Ending::target, Ending::byDistance, Ending::otherQuantity, Ending::steps});
+  left.emplace_back("near-distance");
+  return buildParametersWithout(left);
+}
+
+std::vector<std::size_t> countsFrom(std::size_t least, std::size_t most) {
+  std::vector<std::size_t> counts;
+  for (std::size_t count = least; count <= most; ++count) counts.push_back(count);
+  return counts;
+}
+
+}  // namespace
+
+Study tradeoffStudy() {
+  return {
+      .name = "tradeoff",
+      .help = paragraphs(R"(
+bytes, time and measured errors of a mesh's fields for a range of target errors. Use it to choose the target error of
+'hpsdf build' for a mesh. With --budget or --within-seconds it names the most exact field of the range that keeps them, and
+the command that builds it; the field with the least RMS error near the surface is the most exact. Half of the points at
+which errors are measured lie near the surface. Writes index.html with the table and the curves, tradeoff.csv and
+tradeoff.json.)"),
+      .parameters = joined(
+          {{{"target-errors", numbers("τ,τ,…", countsFrom(1, 20)).above(0).byDefault("1e-4,3e-5,1e-5,3e-6,1e-6,3e-7"),
+             "The target errors of the range. Each makes a field of its own, so that the smallest one takes most of "
+             "the "
+             "time."},
+            {"budget", number().above(0).in("bytes"),
+             "Recommends the most exact field that takes at most this memory. To build for a budget without a study, "
+             "use "
+             "'build --max-bytes'."},
+            {"within-seconds", number().above(0).in("seconds"),
+             "Recommends the most exact field whose construction takes at most this time on this machine."}},
+           samplingParameters(),
+           rangeBuildParameters()}),
+      .run = runTradeoff,
+  };
+}
+
+}  // namespace hpsdf::app
