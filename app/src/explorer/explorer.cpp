@@ -127,6 +127,14 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   return settings;
 }
 
+void Explorer::setSetting(const std::string& name, const std::string& value) {
+  for (const BuildSetting& setting : buildSettings()) {
+    if (setting.name == name) settings_.erase(std::string(setting.exclusive));
+    if (setting.exclusive == name) settings_.erase(std::string(setting.name));
+  }
+  settings_[name] = value;
+}
+
 void Explorer::rebuild(std::optional<int> maxSteps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");

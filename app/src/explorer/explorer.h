@@ -44,7 +44,8 @@ class Explorer final : public SessionExtension {
   /// Returns the settings for the next construction of the field: names of `build` parameters and their values as text.
   /// The value of `mesh` is the name of the surface.
   const std::map<std::string, std::string>& settings() const { return settings_; }
-  void setSetting(const std::string& name, const std::string& value) { settings_[name] = value; }
+  /// Sets a setting for the next `rebuild`, in place of those that exclude it.
+  void setSetting(const std::string& name, const std::string& value);
   /// Builds the field again with `settings()`. If `maxSteps` is given, the construction ends after that many
   /// refinement steps. Throws `Error` if neither the settings nor the field name a surface.
   void rebuild(std::optional<int> maxSteps);
