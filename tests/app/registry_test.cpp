@@ -329,6 +329,19 @@ TEST(Arguments, definePictures) {
   EXPECT_EQ(surface.camera.distance, standard.distance);
 }
 
+TEST(Pictures, defaultOffsetsAreShortNumbersNearTheMiddle) {
+  const auto offset = [](double low, double high) {
+    return defaultOffset(Box(Vector3::Constant(low), Vector3::Constant(high)), 2);
+  };
+  EXPECT_EQ(offset(-1, 1), 0);
+  EXPECT_FALSE(std::signbit(offset(-1, 0.99999)));
+  EXPECT_EQ(offset(0, 1), 0.5);
+  EXPECT_EQ(offset(0.0329874, 0.187321), 0.1102);
+  EXPECT_EQ(offset(3e-7, 5.0008e-7), 4e-7);
+  EXPECT_EQ(offset(0, 2.468013e9), 1.234e9);
+  EXPECT_EQ(offset(0.125, 0.125), 0.125) << "a flat surface is met exactly";
+}
+
 TEST(Registry, unknownCommandNamesTheNearest) {
   const Registry registry = makeRegistry();
   try {

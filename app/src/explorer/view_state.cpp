@@ -58,7 +58,7 @@ std::string panelLine(const ViewState& view) {
 
 render::Plane planeOf(const ViewState& view, const Field& field) {
   if (view.plane) return *view.plane;
-  return render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(field.domain(), view.axis))};
+  return render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(shownBox(field), view.axis))};
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ struct ViewState {
   bool slice = false;  ///< true shows a slice of the field, false the surface in space
 
   int axis = 2;                            ///< index of the axis perpendicular to the plane
-  std::optional<double> planeOffset;       ///< position on the axis, world units; by default 0 or the domain's middle
+  std::optional<double> planeOffset;       ///< position on the axis, world units; by default `defaultOffset`
   std::optional<render::FreePlane> plane;  ///< if set, used instead of `axis` and `planeOffset`
   bool planeInSpace = false;               ///< also draws the plane in the picture of the surface
   double zoom = 1;                         ///< magnification of the slice; 1 shows the whole section

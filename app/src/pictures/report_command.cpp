@@ -85,11 +85,9 @@ ReportPicture drawInto(const fs::path& folder, Session& session, render::Rendere
   command += " -o " + file;
   render::Image image;
   if (drawing.slice) {
-    const double offset = defaultOffset(field.domain(), 2);
-    if (offset != 0) command += fmt::format(" --offset={}", offset);
-    image = render::draw(
-        renderer, field,
-        render::SlicePicture{.plane = render::AxisPlane{2, offset}, .color = drawing.color, .samples = samples});
+    const render::AxisPlane plane{2, defaultOffset(shownBox(field), 2)};  // the one that `slice` takes by default
+    image =
+        render::draw(renderer, field, render::SlicePicture{.plane = plane, .color = drawing.color, .samples = samples});
   } else {
     render::SurfacePicture picture;
     picture.color = drawing.color;
