@@ -280,6 +280,24 @@ TEST_F(Accuracy, convergenceOfATorusFallsAndHpIsAhead) {
   EXPECT_EQ(readTextFile(at("again/convergence.csv")), readTextFile(at("out/convergence.csv")));
 }
 
+/// The curves are the same for a torus of any size.
+TEST_F(Accuracy, convergenceOfASmallTorusIsThatOfALargeOne) {
+  const auto curves = [&](const std::string& torus) {
+    const Outcome outcome = runHere({"study", "convergence", torus, "-o", at("out"), "--no-plot", "--max-coefficients",
+                                     "10000", "--points", "1000", "--json"});
+    if (outcome.status != kExitDone) throw std::runtime_error(outcome.err);
+    return Json::parse(outcome.out)["meshes"][0]["curves"];
+  };
+  const Json small = curves("analytic:torus,major=0.125,minor=0.03125");
+  const Json large = curves("analytic:torus,major=4,minor=1");
+  ASSERT_EQ(small["hp"].size(), large["hp"].size());
+  for (std::size_t n = 0; n < small["hp"].size(); ++n) {
+    const double rms = large["hp"][n]["measured_rms"];
+    EXPECT_EQ(small["hp"][n]["coefficients"], large["hp"][n]["coefficients"]);
+    EXPECT_NEAR(small["hp"][n]["measured_rms"], rms, 1e-6 * rms);
+  }
+}
+
 TEST_F(Accuracy, convergenceComparesAtTheErrorThatIsAskedFor) {
   const auto comparison = [&](const std::string& at) {
     const Outcome outcome = runHere({"study", "convergence", "analytic:torus", "-o", this->at("out"), "--no-plot",

@@ -251,7 +251,8 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   // `hpsdf study` refuses options that would have no effect or another meaning than in `hpsdf build`.
   for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
     expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");
-  for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds"})
+  for (const char* option :
+       {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--criterion=optimal"})
     expectRefused({{"study", "convergence", "builtin:torus", "-o", at("study"), option}},
                   "not for 'study convergence'");
 }
