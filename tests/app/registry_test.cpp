@@ -191,6 +191,25 @@ TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
   EXPECT_EQ(limit(" --memory-limit 3e9 --target-error 1e-6"), 3'000'000'000u);
 }
 
+TEST(BuildArguments, errorsOfMemoryNameTheOption) {
+  const auto text = [](const std::string& more, std::uint64_t enough) {
+    const Arguments arguments = parse("build", "m.obj -o f" + more);
+    try {
+      withinMemory(arguments, [&] { throw MemoryLimitError("much is needed: take less", enough); });
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::limit);
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  EXPECT_EQ(text(" --grid 9", 210'000'000),
+            "much is needed: take less, or allow more memory: --memory-limit 2.1e8 is likely to suffice");
+  EXPECT_EQ(text("", 210'000'000),
+            "much is needed: take less, or allow more memory: --memory-limit 2.1e8 is likely to suffice (where no "
+            "target is given either, 0.1 GB are allowed besides the mesh's distance)");
+  EXPECT_EQ(text(" --memory-limit 3e9", 0), "much is needed: take less; this machine has not enough memory");
+}
+
 TEST(BuildArguments, readContinuity) {
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity none")).continuityWeight, std::nullopt);
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity weak")).continuityWeight, WeakContinuity{}.weight);

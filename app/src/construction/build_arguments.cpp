@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "hpsdf/build.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -74,6 +75,13 @@ void insertBefore(std::vector<Parameter>& parameters, const char* name, const st
 
 bool isAnyGiven(const Arguments& arguments, std::initializer_list<BuildSetting::Ending> endings) {
   return std::ranges::any_of(endParameters(endings), [&](const std::string& name) { return arguments.given(name); });
+}
+
+/// Returns true if nothing given limits the size of the field, so that a default limits the memory.
+bool hasDefaultMemoryLimit(const Arguments& arguments) {
+  using enum BuildSetting::Ending;
+  const bool isSizeGiven = isAnyGiven(arguments, {byDistance, otherQuantity, target, steps});
+  return !isSizeGiven && !arguments.given("grid") && !arguments.given("memory-limit") && arguments.has("target-error");
 }
 
 InsideTest insideTestOf(const std::string& name) {
@@ -152,9 +160,7 @@ BuildOptions buildOptions(const Arguments& arguments) {
       requireOwner(arguments, setting.name.data(), setting.owner.data(), setting.hasOwner(options));
     setting.set(options, valueOf(arguments, setting));
   }
-  const bool isSizeGiven =
-      endsOtherwise || isAnyGiven(arguments, {Ending::target, Ending::steps}) || arguments.given("grid");
-  if (!options.memoryLimit && !isSizeGiven && arguments.has("target-error")) options.memoryLimit = kDefaultMemory;
+  if (hasDefaultMemoryLimit(arguments)) options.memoryLimit = kDefaultMemory;
   return options;
 }
 
@@ -197,7 +203,18 @@ Box domainFrom(const Arguments& arguments, const Box& surface) {
 void requireConsistent(const Arguments& arguments) {
   const Box any(Vector3::Constant(-1), Vector3::Constant(1));
   distanceOptions(arguments);
-  checkBuild(domainFrom(arguments, any), buildOptions(arguments));
+  withinMemory(arguments, [&] { checkBuild(domainFrom(arguments, any), buildOptions(arguments)); });
+}
+
+Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& arguments) {
+  std::string text = error.shortage();
+  text += error.enough() > 0 ? fmt::format(", or allow more memory: --memory-limit {} is likely to suffice",
+                                           shortNumber(double(error.enough())))
+                             : "; this machine has not enough memory";
+  if (hasDefaultMemoryLimit(arguments))
+    text += fmt::format(" (where no target is given either, {} GB are allowed besides the mesh's distance)",
+                        double(kDefaultMemory) / 1e9);
+  return Error(error.kind(), error.subject(), text);
 }
 
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven) {

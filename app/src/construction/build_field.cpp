@@ -70,7 +70,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     // Load the surface, check its domain, and warn if the domain cuts the surface off.
     const PreparedSurface prepared = prepareSurface(console, surface, wantsNormalized(arguments));
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
-    checkBuild(domain, options);
+    withinMemory(arguments, [&] { checkBuild(domain, options); });
     warnOfCutSurface(console, box, domain);
 
     // Set up the exact distance function and measure how long this takes. The default memory limit is meant for the
@@ -97,7 +97,8 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     if (input.options.bounds) warnOfBounds(console, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   };
-  return namingSurface(surface, construct, checkpoint.string());
+  return namingSurface(
+      surface, [&] { return withinMemory(arguments, construct); }, checkpoint.string());
 }
 
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh) {
