@@ -7,6 +7,8 @@
 #include <set>
 #include <sstream>
 
+#include "explorer/exact_outline.h"
+#include "explorer/worst_places.h"
 #include "hpsdf/detail/build_settings.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
@@ -159,6 +161,7 @@ void Explorer::fieldChanged() {
   picture_.reset();
   figures_.reset();
   worst_.clear();
+  worstAsked_ = 0;
   const auto steps = session_.current().field.metadata().steps;
   if (rebuilding_ != Rebuilding::steps || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
   if (rebuilding_ == Rebuilding::no) settings_.clear();  // the settings belong to the previous field
@@ -353,6 +356,15 @@ void Explorer::drawPicture(int shrink) {
   render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
   std::optional<render::Drawn> beside;
   if (other != nullptr) beside = drawBeside(*other, std::move(reference), picture.scale, shrink);
+  if (view_.slice && view_.mark && session_.knowsExact()) {
+    const auto outline = [&](render::Drawn& drawn) {
+      const int width = drawn.image.width, height = drawn.image.height;
+      drawExactOutline(drawn.image, render::sliceView(field, slicePicture(view_, field), width, height),
+                       session_.exact(""));
+    };
+    outline(picture);
+    if (beside) outline(*beside);
+  }
   // The pictures of both fields are replaced together. After an error in the code above, both are unchanged, and
   // drawnFor_ still describes them.
   picture_ = std::move(picture);
@@ -387,9 +399,13 @@ const FieldStatistics& Explorer::figures() {
 }
 
 const std::vector<std::size_t>& Explorer::worst(std::size_t count) {
-  if (worstBy_ != view_.worstBy || worst_.size() < count)
-    worst_ = worstInterfaces(session_.jumps(), view_.worstBy, std::max<std::size_t>(count, 100));
+  // The list ends where there are no more interfaces: it is as long as it was asked for, unless there are fewer.
+  if (worstBy_ != view_.worstBy || worstOnSurface_ != view_.worstOnSurface || worstAsked_ < count) {
+    worstAsked_ = std::max<std::size_t>(count, 100);
+    worst_ = worstPlaces(session_.current().field, session_.jumps(), view_.worstBy, view_.worstOnSurface, worstAsked_);
+  }
   worstBy_ = view_.worstBy;
+  worstOnSurface_ = view_.worstOnSurface;
   return worst_;
 }
 

@@ -101,8 +101,9 @@ class Explorer final : public SessionExtension {
   const std::optional<render::Drawn>& picture() const { return picture_; }
   /// Returns statistics of the current field. They are computed at the first call for this field.
   const FieldStatistics& figures();
-  /// Returns the indices of the cell interfaces with the greatest jumps of the field, in descending order of the jump.
-  /// Returns `count` indices or more, unless the field has fewer interfaces.
+  /// Returns the indices of the cell interfaces with the greatest jumps of the field, in descending order of the jump:
+  /// of all interfaces, or of those at the surface, as `view` has it. Returns `count` indices or more, unless there are
+  /// fewer interfaces.
   const std::vector<std::size_t>& worst(std::size_t count);
   /// Returns the field's values at the mouse pointer, or std::nullopt if the pointer is not over the field.
   std::optional<Readout> readout();
@@ -149,7 +150,9 @@ class Explorer final : public SessionExtension {
 
   std::optional<FieldStatistics> figures_;
   std::vector<std::size_t> worst_;
+  std::size_t worstAsked_ = 0;       ///< number of interfaces that were asked for when `worst_` was made
   std::optional<JumpKind> worstBy_;  ///< kind of jump by which `worst_` is sorted
+  bool worstOnSurface_ = false;      ///< `worst_` has only interfaces at the surface
 
   std::optional<render::Drawn> picture_;
   std::optional<render::Drawn> beside_;  ///< picture of the second field, beside the current one

@@ -1,6 +1,7 @@
 // The panels of the explorer's right column.
 
 #include "explorer/panels.h"
+#include "explorer/worst_places.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/field.h"
 #include "text/text.h"
@@ -153,21 +154,24 @@ void drawWorst(const Controls& controls, Explorer& explorer) {
   const Jumps& jumps = explorer.session().jumps();
   controls.choice("worst/by", "jump of", {"value", "gradient"}, view.worstBy == JumpKind::value ? "value" : "gradient",
                   "worst by=");
+  controls.choice("worst/on", "where", {"all", "surface"}, view.worstOnSurface ? "surface" : "all", "worst on=");
   const std::size_t first = std::size_t(view.worstPage) * kWorstRows;
-  const auto& worst = explorer.worst(first + kWorstRows);
+  const auto& worst = explorer.worst(first + kWorstRows + 1);  // one more tells whether there is a next page
   const std::size_t last = std::min(worst.size(), first + kWorstRows);
   for (std::size_t rank = first; rank < last; ++rank) {
     const Interface& face = jumps.interfaces[worst[rank]];
     const Vector3& x = face.worst;
     const std::array cells = {fmt::format("{}. {}", rank + 1, shortNumber(jumpOf(face, view.worstBy).max)),
-                              fmt::format("({:.2f}, {:.2f}, {:.2f})", x.x(), x.y(), x.z())};
+                              std::string(isTorn(explorer.session().current().field, face) ? "torn" : "")};
     if (controls.ui.row(fmt::format("worst/{}", rank - first + 1), cells, 90))
       controls.commands.push_back(fmt::format("fly {}", rank + 1));
+    // The shortest numbers that are read back as the same floats: they can be typed after 'fly to='.
+    controls.ui.text(fmt::format("{},{},{}", float(x.x()), float(x.y()), float(x.z())), true);
   }
   const auto page = [](int number) { return fmt::format("worst page={}", number); };
   controls.button("worst/previous", "previous", page(view.worstPage).c_str(), view.worstPage > 0);
   ImGui::SameLine();
-  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < jumps.interfaces.size());
+  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < worst.size());
 }
 
 }  // namespace hpsdf::app

@@ -49,7 +49,9 @@ struct ViewState {
   Coloring surfaceColors{.by = render::ColorBy::normal};
   Coloring sliceColors{.by = render::ColorBy::degree};
   JumpKind worstBy = JumpKind::value;  ///< kind of jump by which the list of interfaces is sorted
+  bool worstOnSurface = false;         ///< the list has only interfaces at the surface
   int worstPage = 0;                   ///< page of the list of interfaces, from 0
+  std::optional<Vector3> mark;         ///< point that is marked in the picture, world units
 
   std::array<bool, kPanels> open = {true, true, true, true, true, true, true, true};
   std::array<double, 2> scroll = {0, 0};  ///< scroll positions of the left and the right column, pixels
