@@ -473,6 +473,46 @@ TEST(Explorer, aFieldBesideHasTheSameView) {
   EXPECT_GT(halves(), 1000u) << "one picture over the whole width";
 }
 
+TEST(Explorer, fieldsBesideEachOtherHaveOneColourScaleAndFiguresOfTheirOwn) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string coarse = folder / "coarse.hpsdf", fine = folder / "fine.hpsdf";
+  bench.run("build analytic:torus target-error=1e-2 estimator=embedded output=" + coarse);
+  bench.run(std::string(kTorus) + "save output=" + fine + "; panel all=false; show size=800x300");
+  const auto halves = [&] {
+    bench.explorer().frame();
+    return std::array{bench.explorer().picture()->image, bench.explorer().pictureBeside()->image};
+  };
+  for (const char* view : {"show slice; color degree", "color depth", "color error", "color value-jump", "color slope",
+                           "show surface; color degree", "color error"}) {
+    bench.run("load " + fine + "; color error mesh=analytic:torus; " + std::string(view) + "; beside " + coarse);
+    const auto fineFirst = halves();
+    bench.run("load " + coarse + "; beside " + fine);
+    const auto coarseFirst = halves();
+    EXPECT_TRUE(same(fineFirst[0], coarseFirst[1])) << view << ": the fine field has the same colours on either side";
+    EXPECT_TRUE(same(fineFirst[1], coarseFirst[0])) << view;
+    EXPECT_FALSE(same(fineFirst[0], fineFirst[1])) << view;
+  }
+
+  const auto column = [&] {
+    const render::Image frame = bench.explorer().frame();
+    std::vector<render::Color> pixels;
+    for (int y = 40; y < 540; ++y)
+      for (int x = 635; x < 900; ++x) pixels.push_back(frame.at(x, y));
+    return pixels;
+  };
+  for (const char* panel : {"statistics", "histograms"}) {
+    bench.run("show surface size=900x600; color normal; panel all=false " + std::string(panel) + "=true bar=true");
+    bench.run("load " + fine + "; beside none");
+    const auto alone = column();
+    bench.run("beside " + fine);
+    const auto twins = column();
+    bench.run("beside " + coarse);
+    EXPECT_NE(alone, twins) << panel;
+    EXPECT_NE(column(), twins) << panel << ": the figures of the other field";
+  }
+}
+
 TEST(Explorer, theFieldBesideMayDifferFromTheFieldOfColorDifference) {
   Bench bench;
   const support::TemporaryDirectory folder;

@@ -191,7 +191,8 @@ void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands
   // too, so it must not start while they are being drawn.
   const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
   if (!work && showsJumps) session_.jumps();
-  if (!work && view_.isOpen(Panel::readout) && beside_ && !isStale()) session_.otherJumps(view_.beside);
+  const bool showsOtherJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::readout);
+  if (!work && showsOtherJumps && beside_ && !isStale()) session_.otherJumps(view_.beside);
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
@@ -339,23 +340,36 @@ render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData ref
   }
 }
 
-void Explorer::drawPicture(int shrink) {
+std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const Field* other, int shrink) {
   const Coloring& colors = view_.colors();
   const Field& field = session_.current().field;
   render::ScaleOptions scale = colors.scale;
   render::ReferenceData reference = session_.reference(colors.by, colors.mesh, colors.other);
   if (!view_.slice && !view_.defects.empty()) reference.defects = &session_.defects(view_.defects);
-  const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
   if (other != nullptr && (colors.by == render::ColorBy::degree || colors.by == render::ColorBy::depth)) {
     std::set<int> levels;
-    for (const FieldStatistics& all : {figures(), statistics(*other)})
+    for (const FieldStatistics& all : {figures(), session_.otherFigures(view_.beside)})
       for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)
         levels.insert(level);
     scale.levels.assign(levels.begin(), levels.end());
   }
-  render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
-  std::optional<render::Drawn> beside;
-  if (other != nullptr) beside = drawBeside(*other, std::move(reference), picture.scale, shrink);
+  const auto draw = [&] { return drawn(session_.renderer(view_.backend), field, reference, scale, shrink); };
+  const auto drawOther = [&] { return drawBeside(*other, reference, scale, shrink); };
+  render::Drawn picture = draw();
+  if (other == nullptr) return {std::move(picture), std::nullopt};
+  render::Drawn beside = drawOther();
+  if (!scale.limits && picture.scale.limits && beside.scale.limits && picture.scale.limits != beside.scale.limits) {
+    const std::array<double, 2> left = *picture.scale.limits, right = *beside.scale.limits;
+    scale.limits = std::array{std::min(left[0], right[0]), std::max(left[1], right[1])};
+    picture = draw();
+    beside = drawOther();
+  }
+  return {std::move(picture), std::move(beside)};
+}
+
+void Explorer::drawPicture(int shrink) {
+  const Field& field = session_.current().field;
+  auto [picture, beside] = drawBoth(view_.beside.empty() ? nullptr : &session_.other(view_.beside).field, shrink);
   if (view_.slice && view_.mark && session_.knowsExact()) {
     const auto outline = [&](render::Drawn& drawn) {
       const int width = drawn.image.width, height = drawn.image.height;

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "explorer/ui.h"
@@ -99,6 +100,8 @@ class Explorer final : public SessionExtension {
   Session& session() const { return session_; }
   /// The last picture of the field, without the panels.
   const std::optional<render::Drawn>& picture() const { return picture_; }
+  /// The last picture of the second field, which is shown beside the current one.
+  const std::optional<render::Drawn>& pictureBeside() const { return beside_; }
   /// Returns statistics of the current field. They are computed at the first call for this field.
   const FieldStatistics& figures();
   /// Returns the indices of the cell interfaces with the greatest jumps of the field, in descending order of the jump:
@@ -126,6 +129,8 @@ class Explorer final : public SessionExtension {
   std::string dragCommand(double dx, double dy) const;
   render::Drawn drawBeside(const Field& other, render::ReferenceData reference, const render::ScaleOptions& scale,
                            int shrink);
+  /// Draws the pictures of the current field and of the second field, if there is one, in a common colour scale.
+  std::pair<render::Drawn, std::optional<render::Drawn>> drawBoth(const Field* other, int shrink);
 
   Session& session_;
   Ui ui_;

@@ -111,18 +111,27 @@ void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
 }
 
 void drawHistograms(Ui& ui, Explorer& explorer) {
-  const FieldStatistics& figures = explorer.figures();
   const auto& picture = explorer.picture();
   const auto legendOf = [&](render::ColorBy color) {
     return picture && explorer.view().colors().by == color ? &picture->legend : nullptr;
   };
-  drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
-  drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
+  const auto draw = [&](const FieldStatistics& figures) {
+    drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
+    drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
+  };
+  const std::string& beside = explorer.view().beside;
+  if (beside.empty()) return draw(explorer.figures());
+  ui.text("left: " + fileName(explorer.session().current().name));
+  draw(explorer.figures());
+  if (!explorer.pictureBeside()) return;  // the other field has not been read yet
+  ui.text("right: " + fileName(beside));
+  draw(explorer.session().otherFigures(beside));
 }
 
-void drawStatistics(Ui& ui, Explorer& explorer) {
-  const FieldStatistics& figures = explorer.figures();
-  const Field& field = explorer.session().current().field;
+namespace {
+
+/// Draws a table of statistics of a field. `jumps` is null while the jumps of the field are unknown.
+void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures, const Jumps* jumps) {
   std::vector<std::pair<std::string, std::string>> rows = {
       {"cells", grouped(figures.leaves)},
       {"coefficients", grouped(figures.coefficients)},
@@ -140,12 +149,24 @@ void drawStatistics(Ui& ui, Explorer& explorer) {
     rows.emplace_back("exact cells", grouped(figures.exact.leaves));
     rows.emplace_back("exact triangles", grouped(figures.exact.triangles));
   }
-  if (explorer.session().knowsJumps()) {
-    const Jumps& jumps = explorer.session().jumps();
-    rows.emplace_back("jump of f, RMS", shortNumber(jumps.value.rms));
-    rows.emplace_back("jump of gradient, RMS", shortNumber(jumps.gradient.rms));
+  if (jumps != nullptr) {
+    rows.emplace_back("jump of f, RMS", shortNumber(jumps->value.rms));
+    rows.emplace_back("jump of gradient, RMS", shortNumber(jumps->gradient.rms));
   }
   ui.facts(rows);
+}
+
+}  // namespace
+
+void drawStatistics(Ui& ui, Explorer& explorer) {
+  Session& session = explorer.session();
+  const std::string& beside = explorer.view().beside;
+  if (!beside.empty()) ui.text("left: " + fileName(session.current().name));
+  drawStatisticsOf(ui, session.current().field, explorer.figures(), session.knowsJumps() ? &session.jumps() : nullptr);
+  if (beside.empty() || !explorer.pictureBeside()) return;
+  ui.text("right: " + fileName(beside));
+  const Session::Other& other = session.other(beside);
+  drawStatisticsOf(ui, other.field, session.otherFigures(beside), other.jumps ? &*other.jumps : nullptr);
 }
 
 void drawWorst(const Controls& controls, Explorer& explorer) {

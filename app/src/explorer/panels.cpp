@@ -127,10 +127,16 @@ void drawReadout(Ui& ui, Explorer& explorer) {
     return;
   }
   if (!explorer.picture()) return;
-  std::string line;
-  for (const std::string& detail : explorer.picture()->details) line += (line.empty() ? "" : "   ") + detail;
-  ui.text(fileName(explorer.session().current().name) + "   " + line);
-  ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there", true);
+  const auto describe = [&](const std::string& name, const render::Drawn& drawn) {
+    std::string line = fileName(name);
+    for (const std::string& detail : drawn.details) line += "   " + detail;
+    ui.text(line);
+  };
+  describe(explorer.session().current().name, *explorer.picture());
+  if (explorer.pictureBeside())
+    describe(explorer.view().beside, *explorer.pictureBeside());
+  else
+    ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there", true);
 }
 
 }  // namespace
