@@ -7,6 +7,7 @@
 #include "console/version.h"
 #include "construction/build_arguments.h"
 #include "construction/build_field.h"
+#include "construction/file_kind.h"
 #include "construction/mesh_summary.h"
 #include "files/html_page.h"
 #include "files/output_folder.h"
@@ -135,15 +136,13 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   return rows;
 }
 
-bool isFieldFile(const std::string& source) { return fs::path(source).extension() == ".hpsdf"; }
-
 void runReport(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
   const Backend chosen = backend(arguments);
   OutputFolder folder(arguments.text("output"));
   checkWritable(folder.path() / "index.html");
   std::optional<BuiltField> built;
-  if (arguments.has("source") && !isFieldFile(arguments.text("source"))) {
+  if (arguments.has("source") && kindOfFile(arguments.text("source")) != FileKind::field) {
     built = buildField(console, arguments.text("source"), arguments);
     session.setField({std::move(built->field), arguments.text("source")});
   } else if (arguments.has("source")) {

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "construction/surface.h"
+#include "construction/file_kind.h"
 #include "explorer/view_state.h"
 #include "hpsdf/detail/output_file.h"
 #include "pictures/picture_arguments.h"
@@ -15,7 +15,7 @@ namespace {
 void runView(Session& session, const Arguments& arguments) {
   const std::string field = arguments.text("field");
   WindowOptions options;
-  const bool made = !isShape(field) && lowerExtension(field) == ".hpsdf";
+  const bool made = kindOfFile(field) == FileKind::field;
   options.opening = (made ? "load " : "build ") + scriptWord(field);
   options.backend = backend(arguments);
   options.width = arguments.size("size")[0];
