@@ -29,6 +29,7 @@ namespace hpsdf::app {
 namespace window_test {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using Clock = std::chrono::steady_clock;
@@ -343,6 +344,14 @@ TEST_F(WindowTest, anInterruptionWritesTheFiles) {
 TEST_F(WindowTest, aMissingDisplayIsAnError) {
   EXPECT_EQ(program({"view", "analytic:torus", "--record", "session.hps"}), 2);
   EXPECT_THAT(said_, HasSubstr("no window can be opened here"));
+  // A mesh or a field in place of a command is opened in a window too.
+  std::ofstream(file("corner.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  ASSERT_EQ(program({"build", "corner.obj", "-o", "corner.hpsdf", "--target-error", "1e-2"}), 0) << said_;
+  for (const char* name : {"corner.obj", "corner.hpsdf"}) {
+    EXPECT_EQ(program({name, "--size", "300x200"}), 2);
+    EXPECT_THAT(said_, AllOf(HasSubstr("no window can be opened here"), HasSubstr("'hpsdf render'")));
+    EXPECT_EQ(std::ranges::count(said_, '\n'), 1) << said_;
+  }
   EXPECT_EQ(std::ranges::count(said_, '\n'), 1) << said_;
   EXPECT_FALSE(fs::exists(file("session.hps")));
 }

@@ -44,8 +44,8 @@ class Desktop {
   Desktop() {
     if (!glfwInit())
       throw Error(
-          fmt::format("no window can be opened here ({}): set DISPLAY, or write frames without one, by 'shot' in a "
-                      "script",
+          fmt::format("no window can be opened here ({}): set DISPLAY, or draw without a window, by 'hpsdf render' or "
+                      "by 'shot' in a script",
                       glfwProblem()));
   }
   ~Desktop() { glfwTerminate(); }
