@@ -413,8 +413,9 @@ TEST_F(Accuracy, theTableIsWrittenThreeWays) {
   const std::string page = readTextFile(at("out/index.html")), table = readTextFile(at("out/table.md"));
   EXPECT_THAT(page, AllOf(HasSubstr("<td>torus-2</td>"), HasSubstr("data:image/png;base64,"), HasSubstr("<svg"),
                           testing::Not(HasSubstr("src=\"http")), testing::Not(HasSubstr("src=\"torus"))));
-  EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("![degrees](torus-2-degree.svg)"),
-                           HasSubstr("Degree ![](degree-legend.svg)"), HasSubstr("Depth ![](depth-legend.svg)")));
+  EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("| weighted estimate (τ) |"),
+                           HasSubstr("![degrees](torus-2-degree.svg)"), HasSubstr("Degree ![](degree-legend.svg)"),
+                           HasSubstr("Depth ![](depth-legend.svg)")));
   // Every row of the table has as many cells as the header row.
   const auto count = [](const std::string& text, const std::string& what) {
     std::size_t found = 0;

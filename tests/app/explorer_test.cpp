@@ -16,6 +16,7 @@
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
 #include "language/script.h"
+#include "session/field_summary.h"
 #include "support/made_meshes.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
@@ -81,6 +82,17 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
       "camera target=center ; plane axis=x offset=0.2 target=center ; surface clip=none ; color degree range=auto");
   other.run(script);
   EXPECT_TRUE(other.view() == wanted);
+}
+
+TEST(Explorer, theEstimateStandsBesideTheMeasuredErrors) {
+  Bench bench;
+  bench.run(kTorus);
+  const Field& measured = bench.session.current().field;
+  EXPECT_THAT(estimateLine(measured),
+              testing::MatchesRegex("weighted estimate .τ. [0-9.e-]+, measured near the surface "
+                                    "RMS [0-9.e-]+, greatest [0-9.e-]+"));
+  bench.run("smooth");
+  EXPECT_THAT(estimateLine(bench.session.current().field), testing::EndsWith(", not measured"));
 }
 
 TEST(Explorer, defectsOfTheMeshAreMarked) {

@@ -136,7 +136,8 @@ void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures
       {"cells", grouped(figures.leaves)},
       {"coefficients", grouped(figures.coefficients)},
       {"memory", bytesText(double(figures.bytes))},
-      {"target error", shortNumber(field.metadata().settings.targetError.weighted())},
+      {"target error τ", shortNumber(field.metadata().settings.targetError.weighted())},
+      {"weighted estimate (τ)", shortNumber(field.metadata().totalError)},
   };
   if (const std::optional<Measurement>& m = field.metadata().measurement) {
     rows.emplace_back("RMS error near surface", shortNumber(m->near.rms));

@@ -121,15 +121,15 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   rows.emplace_back("Total error ε",
                     fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));
   if (const std::optional<Measurement>& m = metadata.measurement) {
-    const auto errorText = [&](const Measurement::Error& error) {
-      return fmt::format("RMS {}, greatest {}; over the longest side {}, {}", shortNumber(error.rms),
-                         shortNumber(error.max), shortNumber(error.rms / metadata.referenceLength),
-                         shortNumber(error.max / metadata.referenceLength));
+    const auto row = [&](const char* label, const Measurement::Error& error) {
+      const double side = metadata.referenceLength;
+      rows.emplace_back(label, fmt::format("{}; over the longest side: {}", errorText(error),
+                                           errorText({.rms = error.rms / side, .max = error.max / side})));
     };
-    rows.emplace_back("Error near the surface", errorText(m->near));
-    rows.emplace_back("Error over the domain", errorText(m->domain));
-    rows.emplace_back("Wrong signs", fmt::format("{} of {} points", grouped(m->wrongSigns), grouped(m->points)));
-    rows.emplace_back("Torn", fmt::format("{} % of the surface", shortNumber(100 * m->tornShare)));
+    row("Error near the surface", m->near);
+    row("Error over the domain", m->domain);
+    rows.emplace_back("Wrong signs", wrongSignsText(*m));
+    rows.emplace_back("Torn", tornText(*m));
   }
   rows.emplace_back("Exact distances taken", grouped(metadata.exactEvaluations));
   if (built != nullptr) rows.emplace_back("Construction", fmt::format("{:.1f} s", built->seconds));

@@ -158,7 +158,7 @@ std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
           {"cells", grouped(row.figures.leaves) + exactCountText(row.figures)},
           {"τ", shortNumber(metadata.settings.targetError.weighted())},
           {"memory", bytesText(double(row.figures.bytes))},
-          {"estimated RMS", shortNumber(row.estimatedRms())},
+          {"weighted estimate (τ)", shortNumber(row.estimatedRms())},
           {"measured RMS", shortNumber(row.error.rms / row.scale())},
           {"measured max", shortNumber(row.error.max / row.scale())}};
 }

@@ -16,6 +16,7 @@
 #include "explorer/explorer.h"
 #include "files/text_file.h"
 #include "language/script.h"
+#include "session/field_summary.h"
 #include "window/live_work.h"
 #include "window/recording.h"
 
@@ -312,8 +313,17 @@ class Window {
     }
   }
 
+  /// Shows in the window's title what the field is and how wrong it is.
+  void showTitle() {
+    const CurrentField& current = explorer_.session().current();
+    const std::string title = fmt::format("{} - {} - hpsdf", current.name, estimateLine(current.field));
+    if (title != title_) glfwSetWindowTitle(screen_.window(), title.c_str());
+    title_ = title;
+  }
+
   /// Draws and shows a frame. If `roughly` is true and the picture takes too long, it is drawn with fewer pixels.
   void draw(bool roughly) {
+    showTitle();
     const bool slow = roughly && fullSeconds_ > kSmoothSeconds;
     const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kSmoothSeconds))), 2, 4) : 1;
     const bool measures = explorer_.isStale() && shrink == 1;
@@ -365,6 +375,7 @@ class Window {
   LiveWork work_;
   std::deque<std::optional<Input>> events_;  ///< waiting events; std::nullopt asks for a screenshot
   bool damaged_ = false;                     ///< true if the desktop has lost the window's content
+  std::string title_ = {};                   ///< title of the window; empty before the first frame
   double fullSeconds_ = 0;                   ///< time that the last picture in full resolution took
 };
 
