@@ -151,6 +151,10 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
     const double now = ui.column(name, rect, scroll, content);
     if (std::abs(now - scroll) > 0.5) commands.push_back(fmt::format("panel {}-scroll={}", name, now));
   };
+  if (explorer.work && !explorer.session().hasField()) {  // the first field is on its way: there is only its progress
+    if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
+    return;
+  }
   if (layout.bar.width() > 0) ui.column("bar", layout.bar, {}, [&] { drawBar(controls, explorer); });
   scrolling("left", layout.left, view.scroll[0], [&] {
     section(controls, view, Panel::view, view.slice ? "Slice" : "Surface", [&] { drawViewPanel(controls, explorer); });
