@@ -4,12 +4,17 @@
 
 #include <algorithm>
 #include <exception>
+#include <filesystem>
 #include <ostream>
+#include <string>
+#include <vector>
 
 #include "commands/commands.h"
 #include "console/console.h"
 #include "console/error_text.h"
 #include "console/version.h"
+#include "construction/file_kind.h"
+#include "construction/surface.h"
 #include "hpsdf/error.h"
 #include "language/help.h"
 #include "text/text.h"
@@ -20,16 +25,29 @@ namespace {
 bool asksForAllHelp(const std::string& word) { return word == "--help-all"; }
 bool asksForHelp(const std::string& word) { return word == "--help" || word == "-h" || asksForAllHelp(word); }
 
-void execute(std::span<const std::string> words, const Registry& registry, const Console& console) {
-  if (words.empty()) throw Error("expected a command; 'hpsdf --help' lists them");
-  if (words[0] == "--version") {
+/// Returns the words of the command line, with the command `view` before the name of a field or a mesh that stands in
+/// place of a command. Throws `Error` if there is no file of this name.
+std::vector<std::string> withCommand(std::span<const std::string> words, const Registry& registry) {
+  std::vector<std::string> all(words.begin(), words.end());
+  const bool isCommand = std::ranges::find(registry.commands(), words[0], &Command::name) != registry.commands().end();
+  if (isCommand || kindOfFile(words[0]) == FileKind::unknown) return all;
+  if (!isShape(words[0]) && !std::filesystem::exists(words[0]))
+    throw Error(fmt::format("{}: no such file, and no command either; check the path", words[0]));
+  all.insert(all.begin(), "view");
+  return all;
+}
+
+void execute(std::span<const std::string> given, const Registry& registry, const Console& console) {
+  if (given.empty()) throw Error("expected a command; 'hpsdf --help' lists them");
+  if (given[0] == "--version") {
     console.out << versionText() << "\n";
     return;
   }
-  if (asksForHelp(words[0])) {
+  if (asksForHelp(given[0])) {
     console.out << overviewHelp(registry);
     return;
   }
+  const std::vector<std::string> words = withCommand(given, registry);
   const Command& command = registry.command(words[0]);
   if (std::ranges::any_of(words, asksForHelp)) {
     console.out << commandHelp(command,
@@ -39,7 +57,7 @@ void execute(std::span<const std::string> words, const Registry& registry, const
   if (command.scriptOnly)
     throw Error(fmt::format("'{}' is a command of scripts: hpsdf run -e '{} …'", command.name, command.name));
   std::vector<Word> arguments;
-  for (const std::string& word : words.subspan(1)) arguments.push_back({.text = word});
+  for (const std::string& word : std::span(words).subspan(1)) arguments.push_back({.text = word});
   Session session(registry, console);
   perform(command, session, parseArguments(command, arguments, Origin::commandLine));
 }

@@ -280,6 +280,24 @@ TEST_F(Accuracy, convergenceOfATorusFallsAndHpIsAhead) {
   EXPECT_EQ(readTextFile(at("again/convergence.csv")), readTextFile(at("out/convergence.csv")));
 }
 
+/// The curves are the same for a torus of any size.
+TEST_F(Accuracy, convergenceOfASmallTorusIsThatOfALargeOne) {
+  const auto curves = [&](const std::string& torus) {
+    const Outcome outcome = runHere({"study", "convergence", torus, "-o", at("out"), "--no-plot", "--max-coefficients",
+                                     "10000", "--points", "1000", "--json"});
+    if (outcome.status != kExitDone) throw std::runtime_error(outcome.err);
+    return Json::parse(outcome.out)["meshes"][0]["curves"];
+  };
+  const Json small = curves("analytic:torus,major=0.125,minor=0.03125");
+  const Json large = curves("analytic:torus,major=4,minor=1");
+  ASSERT_EQ(small["hp"].size(), large["hp"].size());
+  for (std::size_t n = 0; n < small["hp"].size(); ++n) {
+    const double rms = large["hp"][n]["measured_rms"];
+    EXPECT_EQ(small["hp"][n]["coefficients"], large["hp"][n]["coefficients"]);
+    EXPECT_NEAR(small["hp"][n]["measured_rms"], rms, 1e-6 * rms);
+  }
+}
+
 TEST_F(Accuracy, convergenceComparesAtTheErrorThatIsAskedFor) {
   const auto comparison = [&](const std::string& at) {
     const Outcome outcome = runHere({"study", "convergence", "analytic:torus", "-o", this->at("out"), "--no-plot",
@@ -395,8 +413,9 @@ TEST_F(Accuracy, theTableIsWrittenThreeWays) {
   const std::string page = readTextFile(at("out/index.html")), table = readTextFile(at("out/table.md"));
   EXPECT_THAT(page, AllOf(HasSubstr("<td>torus-2</td>"), HasSubstr("data:image/png;base64,"), HasSubstr("<svg"),
                           testing::Not(HasSubstr("src=\"http")), testing::Not(HasSubstr("src=\"torus"))));
-  EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("![degrees](torus-2-degree.svg)"),
-                           HasSubstr("Degree ![](degree-legend.svg)"), HasSubstr("Depth ![](depth-legend.svg)")));
+  EXPECT_THAT(table, AllOf(HasSubstr("| torus | 1,152 | 2,304 | 4³ |"), HasSubstr("| weighted estimate (τ) |"),
+                           HasSubstr("![degrees](torus-2-degree.svg)"), HasSubstr("Degree ![](degree-legend.svg)"),
+                           HasSubstr("Depth ![](depth-legend.svg)")));
   // Every row of the table has as many cells as the header row.
   const auto count = [](const std::string& text, const std::string& what) {
     std::size_t found = 0;

@@ -68,7 +68,7 @@ TEST_F(BuildCommand, tellsTheErrorsOfTheFinishedField) {
               AllOf(HasSubstr("error near surface"), HasSubstr("worst point"), HasSubstr("weighted estimate")));
   ASSERT_EQ(run({{"smooth", at("t.hpsdf"), "-o", at("s.hpsdf")}}).status, 0);
   EXPECT_TRUE(Json::parse(run({{"info", at("s.hpsdf"), "--json"}}).out).at("measured").is_null());
-  EXPECT_THAT(run({{"info", at("s.hpsdf")}}).out, HasSubstr("not since the field was changed"));
+  EXPECT_THAT(run({{"info", at("s.hpsdf")}}).out, HasSubstr("no, or not since the field was changed"));
 }
 
 /// The construction compares estimates with the errors that are asked for; what counts is what is measured.
@@ -158,12 +158,40 @@ TEST_F(BuildCommand, memoryIsLimitedWithoutATarget) {
   const Outcome limited = built({"--memory-limit", "1e6"});
   EXPECT_EQ(limited.status, 2);
   EXPECT_THAT(limited.err, HasSubstr("of memory are needed, more than the 1.00 MB allowed"));
+  EXPECT_THAT(limited.err, Not(HasSubstr("besides the mesh's distance"))) << "this limit was asked for";
+  const Outcome byDefault = built({});
+  EXPECT_EQ(byDefault.status, 2);
+  EXPECT_THAT(byDefault.err, HasSubstr("(where no target is given either, 0.1 GB are allowed besides the mesh's"));
   EXPECT_FALSE(std::filesystem::exists(at("soup.hpsdf")));
   EXPECT_EQ(built({"--memory-limit", "1e8", "--target-error", "1"}).status, 0);
   const Outcome small = run({{"build", "analytic:sphere", "-o", at("s.hpsdf"), "--grid", "1", "--target-error", "1e-14",
                               "--memory-limit", "1e5"}});
   EXPECT_EQ(small.status, 2);
   EXPECT_THAT(small.err, ContainsRegex("about [0-9]+ cells and [0-9.]+ kB of memory are needed")) << "not 0.00 million";
+}
+
+TEST_F(BuildCommand, memoryLimitsThatMessagesNameSuffice) {
+  for (const std::vector<std::string>& options :
+       std::vector<std::vector<std::string>>{{"analytic:torus", "--target-error", "1e-7", "--memory-limit", "1e6"},
+                                             {"analytic:torus", "--grid", "40", "--memory-limit", "1e6"},
+                                             {"builtin:torus", "--target-error", "1e-5", "--memory-limit", "1e5"},
+                                             {"builtin:gear", "--strategy", "hpx", "--memory-limit", "2e6"}}) {
+    std::vector<std::string> words = {"build", "-o", at("f.hpsdf")};
+    words.insert(words.end(), options.begin(), options.end());
+    const Outcome refused = run({words});
+    EXPECT_EQ(refused.status, 2);
+    const std::string name = "--memory-limit ";
+    const std::size_t found = refused.err.find(name);
+    ASSERT_NE(found, std::string::npos) << refused.err;
+    words.back() =
+        refused.err.substr(found + name.size(), refused.err.find(' ', found + name.size()) - found - name.size());
+    const Outcome built = run({words});
+    EXPECT_EQ(built.status, 0) << built.err;
+  }
+  const Outcome huge =
+      run({{"build", "analytic:torus", "-o", at("f.hpsdf"), "--grid", "1000", "--memory-limit", "1e6"}});
+  EXPECT_EQ(huge.status, 2);
+  EXPECT_THAT(huge.err, HasSubstr("take at most 14 an axis; this machine has not enough memory"));
 }
 
 TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
@@ -280,7 +308,8 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   refused({"--tolerance", "0.1x"}, "expected a number above 0, or a percentage, found '0.1x'");
   for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--tolerance=1%"})
     expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");
-  for (const char* option : {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--tolerance=1%"})
+  for (const char* option :
+       {"--near-error=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--criterion=optimal", "--tolerance=1%"})
     expectRefused({{"study", "convergence", "builtin:torus", "-o", at("study"), option}},
                   "not for 'study convergence'");
 }

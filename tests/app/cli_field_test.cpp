@@ -190,6 +190,38 @@ TEST(PointQuery, answersManyBatchesInOrder) {
   }
 }
 
+/// In a script, the only word may be the mesh; files are told apart by their first bytes and their names.
+TEST_F(FieldFile, aMeshAloneIsNotTakenForAField) {
+  writeFile(at("t.obj"), kTetrahedron);
+  writeFile(at("notes.txt"), "no field, no mesh");
+  const std::string build = "build " + at("t.obj") + " target-error=1e-3 output=" + at("t.hpsdf");
+  const auto script = [&](const std::string& line) { return run({{"run", "-e", build, "-e", line}}); };
+  for (const std::string command : {"verify", "bounds"}) {
+    const std::string points = command == "verify" ? " points=1000" : " output=" + at("b.hpsdf");
+    for (const std::string& words :
+         {at("t.obj"), at("t.hpsdf"), at("t.hpsdf") + " " + at("t.obj"), "mesh=" + at("t.obj"), std::string()}) {
+      const Outcome outcome = script(command + " " + words + points);
+      // A field that was read from a file does not know where its mesh is.
+      const bool isKnown = words != at("t.hpsdf");
+      EXPECT_EQ(outcome.status, isKnown ? 0 : 2) << command << " " << words << outcome.err;
+      EXPECT_EQ(outcome.err.find("give MESH, t.obj") == std::string::npos, isKnown) << outcome.err;
+    }
+    const Outcome neither = script(command + " " + at("notes.txt") + points);
+    EXPECT_EQ(neither.status, 2);
+    EXPECT_THAT(neither.err, HasSubstr("notes.txt: this is neither a field nor a mesh"));
+    const Outcome swapped = script(command + " " + at("t.obj") + " " + at("t.hpsdf") + points);
+    EXPECT_EQ(swapped.status, 2);
+    EXPECT_THAT(swapped.err, HasSubstr("t.obj: this is a mesh or a shape; give the file of a field (*.hpsdf) first"));
+  }
+  const Outcome alone = run({{"verify", at("t.obj")}});
+  EXPECT_EQ(alone.status, 2);
+  EXPECT_THAT(alone.err, HasSubstr("t.obj: this is a mesh or a shape; give the file of a field (*.hpsdf) first"));
+  // The first bytes decide, not the name.
+  std::filesystem::copy_file(at("t.hpsdf"), at("field.obj"));
+  const Outcome misnamed = run({{"verify", at("field.obj"), at("t.obj"), "--points", "1000"}});
+  EXPECT_EQ(misnamed.status, 0) << misnamed.err;
+}
+
 TEST_F(FieldFile, badFieldFilesAreRefused) {
   const std::string good = readFile(field());
   const auto variant = [&](const std::string& name, const std::string& bytes) { writeFile(at(name), bytes); };

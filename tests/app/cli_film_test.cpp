@@ -146,6 +146,8 @@ TEST_F(Films, reportIsOnePageWithItsPictures) {
     EXPECT_EQ(render::loadPng(at("new/report/") + picture).width, 1280);
   }
   EXPECT_THAT(page, HasSubstr("hpsdf build builtin:torus -o torus.hpsdf --target-error=1e-3"));
+  EXPECT_THAT(page, AllOf(HasSubstr("% of the surface torn"), HasSubstr("on the wrong side"),
+                          ContainsRegex("RMS [0-9.e-]+, greatest [0-9.e-]+; over the longest side: RMS ")));
   EXPECT_THAT(page, Not(HasSubstr("http")));
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_NO_THROW(load(at("new/report/torus.hpsdf")));

@@ -41,6 +41,8 @@ TEST_F(HelpCommand, referencePageIsWrittenCompletelyOrNotAtAll) {
 TEST_F(HelpCommand, usageMistakesAreRefused) {
   expectRefused({{}}, "expected a command");
   expectRefused({{"bild"}}, "unknown command 'bild'; did you mean 'build'?");
+  expectRefused({{"part.stl"}}, "part.stl: no such file, and no command either");
+  expectRefused({{"part.hpsdf"}}, "part.hpsdf: no such file, and no command either");
   expectRefused({{"--halp"}}, "unknown command '--halp'");
   expectRefused({{"help", "slcie"}}, "did you mean 'slice'?");
   expectRefused({{"save", "-o", at("x.hpsdf")}}, "'save' is a command of scripts");

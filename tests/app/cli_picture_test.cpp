@@ -139,6 +139,46 @@ TEST_F(Pictures, twoFieldsAreCompared) {
                 "none: no such file");
 }
 
+TEST_F(Pictures, planesGoThroughTheMiddleOfTheSurfaceUnlessToldOtherwise) {
+  writeFile(at("floor.obj"), kTetrahedron);  // from 0 to 1 along each axis, within a domain that reaches further down
+  ASSERT_EQ(run({{"build", at("floor.obj"), "-o", at("f.hpsdf"), "--target-error", "1e-3", "--domain",
+                  "-3,-3,-3,1.5,1.5,1.5"}})
+                .status,
+            0);
+  for (const std::string axis : {"x", "y", "z"}) {
+    const auto slice = [&](const std::vector<std::string>& words) {
+      std::vector<std::string> all = {"slice", at("f.hpsdf"), "-o",     at("s.csv"), "--axis",
+                                      axis,    "--cpu",       "--size", "40x20"};
+      all.insert(all.end(), words.begin(), words.end());
+      EXPECT_EQ(run({all}).status, 0);
+      return readFile(at("s.csv"));
+    };
+    EXPECT_EQ(slice({}), slice({"--offset", "0.5"}));
+    EXPECT_NE(slice({}), slice({"--offset", "0"}));
+    const auto surface = [&](const std::vector<std::string>& words) {
+      std::vector<std::string> all = {"render", at("f.hpsdf"), "-o", at("v.png"), "--cpu", "--size", "120x90"};
+      all.insert(all.end(), words.begin(), words.end());
+      EXPECT_EQ(run({all}).status, 0);
+      return readFile(at("v.png"));
+    };
+    for (const std::string what : {"plane", "clip"}) {
+      const std::string offset = "--" + what + "-offset";
+      EXPECT_EQ(surface({"--" + what, axis}), surface({"--" + what, axis, offset, "0.5"}));
+      EXPECT_NE(surface({"--" + what, axis}), surface({"--" + what, axis, offset, "0.25"}));
+    }
+  }
+  const Outcome script =
+      run({{"run", "-e", "load " + at("f.hpsdf") + " ; show slice size=400x300 cpu=true", "-e",
+            "panel all=false ; shot output=" + at("a.png"), "-e", "plane offset=0.5 ; shot output=" + at("b.png"), "-e",
+            "plane offset=0 ; shot output=" + at("c.png"), "-e",
+            "show surface ; surface clip=y ; shot output=" + at("d.png"), "-e",
+            "surface clip-offset=0.5 ; shot output=" + at("e.png")}});
+  ASSERT_EQ(script.status, 0) << script.err;
+  EXPECT_EQ(readFile(at("a.png")), readFile(at("b.png")));
+  EXPECT_NE(readFile(at("a.png")), readFile(at("c.png")));
+  EXPECT_EQ(readFile(at("d.png")), readFile(at("e.png")));
+}
+
 TEST_F(Pictures, viewsAreNamedOrAimed) {
   const auto surface = [&](const std::vector<std::string>& words) {
     std::vector<std::string> all = {"render", field(), "-o", at("v.png"), "--cpu", "--size", "120x90"};

@@ -11,10 +11,12 @@
 #include <sstream>
 
 #include "commands/commands.h"
+#include "explorer/exact_outline.h"
 #include "explorer/raster.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
 #include "language/script.h"
+#include "session/field_summary.h"
 #include "support/made_meshes.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
@@ -59,7 +61,7 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
             "cells boxes degrees=2,4-6 depths=0-2 ; arrows 31 ; plane in-space=true\n"
             "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
             "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
-            "worst by=gradient page=2 ; panel build=false bar=false left-scroll=3\n"
+            "worst by=gradient on=surface page=2 mark=0.1,0.25,-0.5 ; panel build=false bar=false left-scroll=3\n"
             "show slice samples=2 size=640x400");
   const ViewState wanted = bench.view();
   bench.out.str("");
@@ -80,6 +82,17 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
       "camera target=center ; plane axis=x offset=0.2 target=center ; surface clip=none ; color degree range=auto");
   other.run(script);
   EXPECT_TRUE(other.view() == wanted);
+}
+
+TEST(Explorer, theEstimateStandsBesideTheMeasuredErrors) {
+  Bench bench;
+  bench.run(kTorus);
+  const Field& measured = bench.session.current().field;
+  EXPECT_THAT(estimateLine(measured),
+              testing::MatchesRegex("weighted estimate .τ. [0-9.e-]+, measured near the surface "
+                                    "RMS [0-9.e-]+, greatest [0-9.e-]+"));
+  bench.run("smooth");
+  EXPECT_THAT(estimateLine(bench.session.current().field), testing::EndsWith(", not measured"));
 }
 
 TEST(Explorer, defectsOfTheMeshAreMarked) {
@@ -191,7 +204,7 @@ TEST(Explorer, eachKindOfWidgetRunsItsCommand) {
   EXPECT_FALSE(bench.view().isOpen(Panel::statistics));
   bench.run("ui click bar/statistics");
   EXPECT_TRUE(bench.view().isOpen(Panel::statistics));
-  bench.run("panel histograms=false; ui click worst/next; ui click worst/2");
+  bench.run("panel histograms=false statistics=false; ui click worst/next; ui click worst/2");
   EXPECT_EQ(bench.view().worstPage, 1);
   EXPECT_EQ(*bench.view().sliceTarget, bench.session.jumps().interfaces[bench.explorer().worst(10)[9]].worst);
   bench.run("ui key z control=true");
@@ -269,6 +282,56 @@ TEST(Explorer, picksOfAShotAgreeWithTheField) {
   bench.run("expect pick(450,200).jump.value < 1");
 }
 
+/// The list of places at the surface has fewer interfaces than the list of all, and all of them at the surface.
+TEST(Explorer, worstPlacesCanBeThoseAtTheSurface) {
+  Bench bench;
+  bench.run(kTorus);
+  const Field& field = bench.session.current().field;
+  const auto farthest = [&] {
+    double far = 0;
+    for (const std::size_t index : bench.explorer().worst(8))
+      far = std::max(far, std::abs(field.value(bench.session.jumps().interfaces[index].worst)));
+    return far;
+  };
+  EXPECT_GT(farthest(), 0.2);
+  bench.run("worst on=surface");
+  EXPECT_LT(farthest(), 0.2);
+  EXPECT_TRUE(bench.view().worstOnSurface);
+  EXPECT_THAT(bench.failure("fly 7999"), HasSubstr("interfaces at the surface; give one of them"));
+  const std::size_t worst = bench.explorer().worst(1)[0];
+  bench.run("ui click worst/on ; ui click worst/on/all");
+  EXPECT_FALSE(bench.view().worstOnSurface);
+  EXPECT_NE(bench.explorer().worst(1)[0], worst);
+}
+
+TEST(Explorer, aMarkShowsTheSpotAScaleAndTheExactOutline) {
+  Bench bench;
+  bench.run(std::string(kTorus) + "panel all=false; show slice size=300x300");
+  const render::Image plain = bench.explorer().frame();
+  bench.run("worst mark=0.6,0.1,0");
+  const render::Image marked = bench.explorer().frame();
+  const render::SliceView view = render::sliceView(bench.session.current().field,
+                                                   slicePicture(bench.view(), bench.session.current().field), 300, 300);
+  int outline = 0, ring = 0;
+  for (int y = 0; y < 300; ++y)
+    for (int x = 0; x < 300; ++x) {
+      const Vector3 p = render::pixelPoint(view, x, y, 300, 300);
+      const double pixel = view.right.norm() / 300, toMark = (p - Vector3(0.6, 0.1, 0)).norm() / pixel;
+      if (marked.at(x, y) == kExactOutline && toMark > 14) {
+        ++outline;
+        EXPECT_LT(std::abs(std::abs(std::hypot(p.x(), p.y()) - 0.7) - 0.3), 1.5 * pixel);
+      }
+      if (toMark > 7 && toMark < 13 && !(marked.at(x, y) == plain.at(x, y))) ++ring;
+    }
+  EXPECT_GT(outline, 300);
+  EXPECT_GT(ring, 100);
+  bench.run("worst mark=0.6,0.1,0.2");  // not in the plane
+  const render::Image elsewhere = bench.explorer().frame();
+  EXPECT_FALSE(same(elsewhere, marked));
+  bench.run("worst mark=none");
+  EXPECT_TRUE(same(bench.explorer().frame(), plain));
+}
+
 /// Runs a script and returns the point in the middle of the explorer's picture.
 std::optional<render::Pick> middleAfter(Bench& bench, const std::string& kind, const std::string& script) {
   bench.run(kTorus + ("show " + kind + "; " + script));
@@ -280,10 +343,14 @@ std::optional<render::Pick> middleAfter(Bench& bench, const std::string& kind, c
 TEST(Explorer, flyingLooksAtTheInterface) {
   Bench bench;
   for (const char* kind : {"slice", "surface"}) {
-    const auto pick = middleAfter(bench, kind, "fly 3");
+    const bool slice =
+        kind == std::string("slice");  // which shows any place; of the surface, only those at the surface
+    const auto pick = middleAfter(bench, kind, slice ? "worst on=all ; fly 3" : "worst on=surface ; fly 3");
     ASSERT_TRUE(pick) << kind;
     const Interface& face = bench.session.jumps().interfaces[bench.explorer().worst(3)[2]];
-    EXPECT_LT((pick->position - face.worst).norm(), 0.05) << kind;
+    EXPECT_LT((pick->position - face.worst).norm(),
+              slice ? 0.05 : std::abs(bench.session.current().field.value(face.worst)) + 0.05)
+        << kind;
   }
   EXPECT_THAT(bench.failure("fly 7999"), HasSubstr("rank: the field has"));
 }
@@ -291,9 +358,12 @@ TEST(Explorer, flyingLooksAtTheInterface) {
 TEST(Explorer, flyingToAPointPutsItInTheMiddle) {
   Bench bench;
   for (const char* kind : {"slice", "surface"}) {
-    const auto pick = middleAfter(bench, kind, "fly to=0.71,-0.2,0.3");
+    bench.run("surface clip=none");
+    const auto pick = middleAfter(bench, kind, "surface clip=x ; fly to=0.71,-0.2,0.25");
     ASSERT_TRUE(pick) << kind;
-    EXPECT_LT((pick->position - Vector3(0.71, -0.2, 0.3)).norm(), 0.05) << kind;
+    EXPECT_LT((pick->position - Vector3(0.71, -0.2, 0.25)).norm(), 0.06) << kind;
+    EXPECT_EQ(bench.view().mark, Vector3(0.71, -0.2, 0.25));
+    EXPECT_EQ(bench.view().clip.has_value(), bench.view().slice) << "no cut hides what is behind it";
   }
   EXPECT_THAT(bench.failure("fly to=5,0,0"), HasSubstr("to: the point lies outside the field's domain"));
   EXPECT_THAT(bench.failure("fly 1 to=0,0,0"), HasSubstr("either the rank of an interface or to=X,Y,Z"));
@@ -432,6 +502,46 @@ TEST(Explorer, aFieldBesideHasTheSameView) {
   EXPECT_THAT(bench.failure("beside " + (folder / "none.hpsdf").string()), HasSubstr("no such file"));
   bench.run("beside none");
   EXPECT_GT(halves(), 1000u) << "one picture over the whole width";
+}
+
+TEST(Explorer, fieldsBesideEachOtherHaveOneColourScaleAndFiguresOfTheirOwn) {
+  Bench bench;
+  const support::TemporaryDirectory folder;
+  const std::string coarse = folder / "coarse.hpsdf", fine = folder / "fine.hpsdf";
+  bench.run("build analytic:torus target-error=1e-2 estimator=embedded output=" + coarse);
+  bench.run(std::string(kTorus) + "save output=" + fine + "; panel all=false; show size=800x300");
+  const auto halves = [&] {
+    bench.explorer().frame();
+    return std::array{bench.explorer().picture()->image, bench.explorer().pictureBeside()->image};
+  };
+  for (const char* view : {"show slice; color degree", "color depth", "color error", "color value-jump", "color slope",
+                           "show surface; color degree", "color error"}) {
+    bench.run("load " + fine + "; color error mesh=analytic:torus; " + std::string(view) + "; beside " + coarse);
+    const auto fineFirst = halves();
+    bench.run("load " + coarse + "; beside " + fine);
+    const auto coarseFirst = halves();
+    EXPECT_TRUE(same(fineFirst[0], coarseFirst[1])) << view << ": the fine field has the same colours on either side";
+    EXPECT_TRUE(same(fineFirst[1], coarseFirst[0])) << view;
+    EXPECT_FALSE(same(fineFirst[0], fineFirst[1])) << view;
+  }
+
+  const auto column = [&] {
+    const render::Image frame = bench.explorer().frame();
+    std::vector<render::Color> pixels;
+    for (int y = 40; y < 540; ++y)
+      for (int x = 635; x < 900; ++x) pixels.push_back(frame.at(x, y));
+    return pixels;
+  };
+  for (const char* panel : {"statistics", "histograms"}) {
+    bench.run("show surface size=900x600; color normal; panel all=false " + std::string(panel) + "=true bar=true");
+    bench.run("load " + fine + "; beside none");
+    const auto alone = column();
+    bench.run("beside " + fine);
+    const auto twins = column();
+    bench.run("beside " + coarse);
+    EXPECT_NE(alone, twins) << panel;
+    EXPECT_NE(column(), twins) << panel << ": the figures of the other field";
+  }
 }
 
 TEST(Explorer, theFieldBesideMayDifferFromTheFieldOfColorDifference) {

@@ -193,6 +193,25 @@ TEST(BuildArguments, memoryIsLimitedUnlessAnEndIsGiven) {
   EXPECT_EQ(limit(" --memory-limit 3e9 --target-error 1e-6"), 3'000'000'000u);
 }
 
+TEST(BuildArguments, errorsOfMemoryNameTheOption) {
+  const auto text = [](const std::string& more, std::uint64_t enough) {
+    const Arguments arguments = parse("build", "m.obj -o f" + more);
+    try {
+      withinMemory(arguments, [&] { throw MemoryLimitError("much is needed: take less", enough); });
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::limit);
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  EXPECT_EQ(text(" --grid 9", 210'000'000),
+            "much is needed: take less, or allow more memory: --memory-limit 2.1e8 is likely to suffice");
+  EXPECT_EQ(text("", 210'000'000),
+            "much is needed: take less, or allow more memory: --memory-limit 2.1e8 is likely to suffice (where no "
+            "target is given either, 0.1 GB are allowed besides the mesh's distance)");
+  EXPECT_EQ(text(" --memory-limit 3e9", 0), "much is needed: take less; this machine has not enough memory");
+}
+
 TEST(BuildArguments, readContinuity) {
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity none"), 2).continuityWeight, std::nullopt);
   EXPECT_EQ(buildOptions(parse("build", "m.obj -o f --continuity weak"), 2).continuityWeight, WeakContinuity{}.weight);
@@ -329,6 +348,19 @@ TEST(Arguments, definePictures) {
   EXPECT_EQ(surface.camera.azimuthDegrees, standard.azimuthDegrees);
   EXPECT_EQ(surface.camera.elevationDegrees, standard.elevationDegrees);
   EXPECT_EQ(surface.camera.distance, standard.distance);
+}
+
+TEST(Pictures, defaultOffsetsAreShortNumbersNearTheMiddle) {
+  const auto offset = [](double low, double high) {
+    return defaultOffset(Box(Vector3::Constant(low), Vector3::Constant(high)), 2);
+  };
+  EXPECT_EQ(offset(-1, 1), 0);
+  EXPECT_FALSE(std::signbit(offset(-1, 0.99999)));
+  EXPECT_EQ(offset(0, 1), 0.5);
+  EXPECT_EQ(offset(0.0329874, 0.187321), 0.1102);
+  EXPECT_EQ(offset(3e-7, 5.0008e-7), 4e-7);
+  EXPECT_EQ(offset(0, 2.468013e9), 1.234e9);
+  EXPECT_EQ(offset(0.125, 0.125), 0.125) << "a flat surface is met exactly";
 }
 
 TEST(Registry, unknownCommandNamesTheNearest) {

@@ -29,6 +29,7 @@ namespace hpsdf::app {
 namespace window_test {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using Clock = std::chrono::steady_clock;
@@ -175,7 +176,7 @@ class WindowTest : public testing::Test {
     return status;
   }
 
-  void open(const std::string& field) {
+  void open(const std::string& field, bool waits = true) {
     const std::string size = std::to_string(kWidth) + "x" + std::to_string(kHeight);
     window_.emplace(std::vector<std::string>{HPSDF_PROGRAM, "view", field, "--size", size, "--gl", "software",
                                              "--record", "session.hps", "--shot", "last.png"},
@@ -183,6 +184,8 @@ class WindowTest : public testing::Test {
     id_ = desktop({"search", "--sync", "--onlyvisible", "--name", "hpsdf$"});
     ASSERT_FALSE(id_.empty()) << window_->err();
     id_.pop_back();
+    // The title tells the field's error once there is a field; until then the window takes no other input than Escape.
+    if (waits) desktop({"search", "--sync", "--onlyvisible", "--name", "weighted estimate.*hpsdf$"});
     desktop({"windowfocus", "--sync", id_});
   }
 
@@ -318,6 +321,28 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
   EXPECT_TRUE(contents(file("replay.png")) == contents(file("last.png")));
 }
 
+/// The window is there before the field is, shows the progress, and cancels the construction when it is closed.
+TEST_F(WindowTest, itShowsTheProgressOfTheFirstConstructionAndClosingCancelsIt) {
+  for (const char* key : {"ctrl+q", "Escape"}) {
+    ASSERT_NO_FATAL_FAILURE(open("builtin:helix-bowl,turns=4", false));
+    EXPECT_TRUE(comesTrue([&] {
+      const std::string screen = contents(folder_ / "x" / "Xvfb_screen0");
+      return std::ranges::count(screen, char(0xf8)) > 1000;  // the frame's background has the blue 248
+    }));
+    EXPECT_EQ(desktop({"getwindowname", id_}).find("weighted estimate"), std::string::npos);
+    desktop({"key", key});
+    EXPECT_EQ(window_->wait(), 0) << window_->err();
+    EXPECT_FALSE(fs::exists(file("last.png"))) << "there was no field to show";
+    EXPECT_FALSE(fs::exists(file("session.hps")));
+  }
+}
+
+TEST_F(WindowTest, aSurfaceThatCannotBeOpenedIsAnError) {
+  EXPECT_EQ(program({"view", "nowhere.obj"}, display_), 2);
+  EXPECT_THAT(said_, HasSubstr("hpsdf: error: nowhere.obj"));
+  EXPECT_EQ(std::ranges::count(said_, '\n'), 1) << said_;
+}
+
 TEST_F(WindowTest, anotherSizeIsRecorded) {
   ASSERT_NO_FATAL_FAILURE(open("analytic:torus"));
   desktop({"windowsize", id_, "700", "500"});
@@ -343,6 +368,14 @@ TEST_F(WindowTest, anInterruptionWritesTheFiles) {
 TEST_F(WindowTest, aMissingDisplayIsAnError) {
   EXPECT_EQ(program({"view", "analytic:torus", "--record", "session.hps"}), 2);
   EXPECT_THAT(said_, HasSubstr("no window can be opened here"));
+  // A mesh or a field in place of a command is opened in a window too.
+  std::ofstream(file("corner.obj")) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  ASSERT_EQ(program({"build", "corner.obj", "-o", "corner.hpsdf", "--target-error", "1e-2"}), 0) << said_;
+  for (const char* name : {"corner.obj", "corner.hpsdf"}) {
+    EXPECT_EQ(program({name, "--size", "300x200"}), 2);
+    EXPECT_THAT(said_, AllOf(HasSubstr("no window can be opened here"), HasSubstr("'hpsdf render'")));
+    EXPECT_EQ(std::ranges::count(said_, '\n'), 1) << said_;
+  }
   EXPECT_EQ(std::ranges::count(said_, '\n'), 1) << said_;
   EXPECT_FALSE(fs::exists(file("session.hps")));
 }

@@ -92,10 +92,15 @@ TEST(AutomaticStrategy, refusesExactLeavesBeforeTheyFillTheMemory) {
 TEST(AutomaticStrategy, allowsForTheErrorOfEstimatesFromSamples) {
   const BuildOptions options{.strategy = Strategy::hpx, .memoryLimit = 25'000'000};  // 100,000 nodes
   const auto require = [&](double nodes, double overestimate) {
-    detail::requireMemoryForExact({.nodes = nodes, .overestimate = overestimate}, options);
+    detail::requireMemoryForExact({.nodes = nodes, .overestimate = overestimate}, 0, options);
   };
   EXPECT_NO_THROW(require(300'000, detail::kOverestimateBySamples));
   EXPECT_THROW(require(600'000, detail::kOverestimateBySamples), Error);
+  try {
+    require(600'000, detail::kOverestimateBySamples);
+  } catch (const MemoryLimitError& error) {
+    EXPECT_EQ(error.enough(), 180'000'000u) << "a fifth more than the estimate";
+  }
   EXPECT_THROW(require(110'000, 1), Error) << "counted numbers are not allowed for";
 }
 

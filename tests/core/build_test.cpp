@@ -313,9 +313,12 @@ TEST(Build, saysEarlyThatMemoryWillNotDo) {
   try {
     build(counted, cube(), options);
     FAIL() << "it holds no more than a third";
-  } catch (const Error& error) {
+  } catch (const MemoryLimitError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("of memory are needed, more than the"));
     EXPECT_THAT(error.what(), testing::StartsWith("about ")) << "it is read off how the error falls";
+    EXPECT_THAT(error.what(), testing::HasSubstr("a memoryLimit of " + std::to_string(error.enough())));
+    EXPECT_EQ(error.kind(), ErrorKind::limit);
+    EXPECT_GE(double(error.enough()), needed);
   }
   EXPECT_LT(taken.load(), all / 4) << "more than it takes to fill that third";
   options.memoryLimit = 10'000;

@@ -229,11 +229,10 @@ void runBlend(Session& session, const Arguments& arguments) {
 
 void runBounds(Session& session, const Arguments& arguments) {
   checkFieldOutput(arguments);
-  useField(session, arguments);
+  const std::string surface = useFieldWithSurface(session, arguments);
   const CurrentField& from = session.current();
   const Console& console = session.console();
   const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
-  const std::string surface = surfaceFor(session.current(), arguments);
   const ReferenceSurface reference = referenceSurface(console, surface, from.field.metadata().source);
   refuseForeign(from, reference, surface);
   warnOfBounds(console, reference.report);

@@ -276,11 +276,10 @@ VerifyOptions verifyOptions(const Arguments& arguments) {
 void runVerify(Session& session, const Arguments& arguments) {
   const bool writes = arguments.has("script");
   if (writes) checkWritable(arguments.text("script"));
-  useField(session, arguments);
+  const std::string surface = useFieldWithSurface(session, arguments);
   const CurrentField& current = session.current();
   if (arguments.given("max-violations") && current.field.data().bounds.empty())
     throw Error(fmt::format("max-violations: {} keeps no bounds: build it with --bounds", current.name));
-  const std::string surface = surfaceFor(session.current(), arguments);
   const ReferenceSurface reference = referenceSurface(session.console(), surface, current.field.metadata().source);
   if (!arguments.flag("any-mesh")) refuseForeign(current, reference, surface, ", or --any-mesh to compare them anyway");
   const VerifyOptions options = verifyOptions(arguments);

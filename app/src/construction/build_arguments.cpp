@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "hpsdf/build.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -89,6 +90,13 @@ void requireEffect(const Arguments& arguments) {
   if (arguments.flag("paper")) throw Error("paper and tolerance exclude each other: give one of them");
 }
 
+/// Returns true if nothing given limits the size of the field, so that a default limits the memory.
+bool hasDefaultMemoryLimit(const Arguments& arguments) {
+  using enum BuildSetting::Ending;
+  const bool isSizeGiven = isAnyGiven(arguments, {byDistance, tolerance, otherQuantity, target, steps});
+  return !isSizeGiven && !arguments.given("grid") && !arguments.given("memory-limit") && arguments.has("target-error");
+}
+
 InsideTest insideTestOf(const std::string& name) {
   if (name == "pseudonormal") return InsideTest::pseudonormal;
   if (name == "winding") return InsideTest::winding;
@@ -168,9 +176,7 @@ BuildOptions buildOptions(const Arguments& arguments, double longestSide) {
       requireOwner(arguments, setting.name.data(), setting.owner.data(), setting.hasOwner(options));
     setting.set(options, valueOf(arguments, setting, longestSide));
   }
-  const bool isSizeGiven =
-      endsOtherwise || isAnyGiven(arguments, {Ending::target, Ending::steps}) || arguments.given("grid");
-  if (!options.memoryLimit && !isSizeGiven && arguments.has("target-error")) options.memoryLimit = kDefaultMemory;
+  if (hasDefaultMemoryLimit(arguments)) options.memoryLimit = kDefaultMemory;
   return options;
 }
 
@@ -213,7 +219,19 @@ Box domainFrom(const Arguments& arguments, const Box& surface) {
 void requireConsistent(const Arguments& arguments) {
   const Box any(Vector3::Constant(-1), Vector3::Constant(1));
   distanceOptions(arguments);
-  checkBuild(domainFrom(arguments, any), buildOptions(arguments, any.sizes().maxCoeff()));
+  withinMemory(arguments,
+               [&] { checkBuild(domainFrom(arguments, any), buildOptions(arguments, any.sizes().maxCoeff())); });
+}
+
+Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& arguments) {
+  std::string text = error.shortage();
+  text += error.enough() > 0 ? fmt::format(", or allow more memory: --memory-limit {} is likely to suffice",
+                                           shortNumber(double(error.enough())))
+                             : "; this machine has not enough memory";
+  if (hasDefaultMemoryLimit(arguments))
+    text += fmt::format(" (where no target is given either, {} GB are allowed besides the mesh's distance)",
+                        double(kDefaultMemory) / 1e9);
+  return Error(error.kind(), error.subject(), text);
 }
 
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven) {

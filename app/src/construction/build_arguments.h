@@ -7,6 +7,7 @@
 
 #include "hpsdf/build_options.h"
 #include "hpsdf/detail/build_settings.h"
+#include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "language/registry.h"
 
@@ -56,6 +57,20 @@ Box domainFrom(const Arguments& arguments, const Box& surface);
 /// Throws `Error` if the arguments of `buildParameters` are invalid or contradict each other. The check does not depend
 /// on the surface.
 void requireConsistent(const Arguments& arguments);
+
+/// Returns the error of a construction that needs more memory, with the option of the command line that allows more.
+Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& arguments);
+
+/// Calls work() and returns its result. If work() needs more memory than it may take, the error names the option that
+/// allows more.
+template <typename Work>
+auto withinMemory(const Arguments& arguments, const Work& work) {
+  try {
+    return work();
+  } catch (const MemoryLimitError& error) {
+    throw namingMemoryLimit(error, arguments);
+  }
+}
 
 /// Throws `Error` if the option `name` is given but the option `owner` is not. Without `owner`, `name` has no effect.
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven);

@@ -71,7 +71,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     const PreparedSurface prepared = prepareSurface(console, surface, wantsNormalized(arguments));
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
     BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
-    checkBuild(domain, options);
+    withinMemory(arguments, [&] { checkBuild(domain, options); });
     if (options.certified && prepared.report && !prepared.report->closed())
       throw Error("certified: the mesh has holes, beside which nothing is proven: close them, or leave certified out");
     warnOfCutSurface(console, box, domain);
@@ -100,7 +100,8 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     if (input.options.bounds) warnOfBounds(console, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   };
-  return namingSurface(surface, construct, checkpoint.string());
+  return namingSurface(
+      surface, [&] { return withinMemory(arguments, construct); }, checkpoint.string());
 }
 
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh) {

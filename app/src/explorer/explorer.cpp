@@ -7,6 +7,8 @@
 #include <set>
 #include <sstream>
 
+#include "explorer/exact_outline.h"
+#include "explorer/worst_places.h"
 #include "hpsdf/detail/build_settings.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
@@ -174,6 +176,7 @@ void Explorer::fieldChanged() {
   picture_.reset();
   figures_.reset();
   worst_.clear();
+  worstAsked_ = 0;
   const auto steps = session_.current().field.metadata().steps;
   if (rebuilding_ != Rebuilding::steps || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
   if (rebuilding_ == Rebuilding::no) settings_.clear();  // the settings belong to the previous field
@@ -203,7 +206,8 @@ void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands
   // too, so it must not start while they are being drawn.
   const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
   if (!work && showsJumps) session_.jumps();
-  if (!work && view_.isOpen(Panel::readout) && beside_ && !isStale()) session_.otherJumps(view_.beside);
+  const bool showsOtherJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::readout);
+  if (!work && showsOtherJumps && beside_ && !isStale()) session_.otherJumps(view_.beside);
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
@@ -351,23 +355,45 @@ render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData ref
   }
 }
 
-void Explorer::drawPicture(int shrink) {
+std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const Field* other, int shrink) {
   const Coloring& colors = view_.colors();
   const Field& field = session_.current().field;
   render::ScaleOptions scale = colors.scale;
   render::ReferenceData reference = session_.reference(colors.by, colors.mesh, colors.other);
   if (!view_.slice && !view_.defects.empty()) reference.defects = &session_.defects(view_.defects);
-  const Field* other = view_.beside.empty() ? nullptr : &session_.other(view_.beside).field;
   if (other != nullptr && (colors.by == render::ColorBy::degree || colors.by == render::ColorBy::depth)) {
     std::set<int> levels;
-    for (const FieldStatistics& all : {figures(), statistics(*other)})
+    for (const FieldStatistics& all : {figures(), session_.otherFigures(view_.beside)})
       for (const auto& [level, share] : colors.by == render::ColorBy::depth ? all.depthVolume : all.degreeVolume)
         levels.insert(level);
     scale.levels.assign(levels.begin(), levels.end());
   }
-  render::Drawn picture = drawn(session_.renderer(view_.backend), field, reference, scale, shrink);
-  std::optional<render::Drawn> beside;
-  if (other != nullptr) beside = drawBeside(*other, std::move(reference), picture.scale, shrink);
+  const auto draw = [&] { return drawn(session_.renderer(view_.backend), field, reference, scale, shrink); };
+  const auto drawOther = [&] { return drawBeside(*other, reference, scale, shrink); };
+  render::Drawn picture = draw();
+  if (other == nullptr) return {std::move(picture), std::nullopt};
+  render::Drawn beside = drawOther();
+  if (!scale.limits && picture.scale.limits && beside.scale.limits && picture.scale.limits != beside.scale.limits) {
+    const std::array<double, 2> left = *picture.scale.limits, right = *beside.scale.limits;
+    scale.limits = std::array{std::min(left[0], right[0]), std::max(left[1], right[1])};
+    picture = draw();
+    beside = drawOther();
+  }
+  return {std::move(picture), std::move(beside)};
+}
+
+void Explorer::drawPicture(int shrink) {
+  const Field& field = session_.current().field;
+  auto [picture, beside] = drawBoth(view_.beside.empty() ? nullptr : &session_.other(view_.beside).field, shrink);
+  if (view_.slice && view_.mark && session_.knowsExact()) {
+    const auto outline = [&](render::Drawn& drawn) {
+      const int width = drawn.image.width, height = drawn.image.height;
+      drawExactOutline(drawn.image, render::sliceView(field, slicePicture(view_, field), width, height),
+                       session_.exact(""));
+    };
+    outline(picture);
+    if (beside) outline(*beside);
+  }
   // The pictures of both fields are replaced together. After an error in the code above, both are unchanged, and
   // drawnFor_ still describes them.
   picture_ = std::move(picture);
@@ -402,9 +428,13 @@ const FieldStatistics& Explorer::figures() {
 }
 
 const std::vector<std::size_t>& Explorer::worst(std::size_t count) {
-  if (worstBy_ != view_.worstBy || worst_.size() < count)
-    worst_ = worstInterfaces(session_.jumps(), view_.worstBy, std::max<std::size_t>(count, 100));
+  // The list ends where there are no more interfaces: it is as long as it was asked for, unless there are fewer.
+  if (worstBy_ != view_.worstBy || worstOnSurface_ != view_.worstOnSurface || worstAsked_ < count) {
+    worstAsked_ = std::max<std::size_t>(count, 100);
+    worst_ = worstPlaces(session_.current().field, session_.jumps(), view_.worstBy, view_.worstOnSurface, worstAsked_);
+  }
   worstBy_ = view_.worstBy;
+  worstOnSurface_ = view_.worstOnSurface;
   return worst_;
 }
 

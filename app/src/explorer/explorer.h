@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "explorer/ui.h"
@@ -100,10 +101,13 @@ class Explorer final : public SessionExtension {
   Session& session() const { return session_; }
   /// The last picture of the field, without the panels.
   const std::optional<render::Drawn>& picture() const { return picture_; }
+  /// The last picture of the second field, which is shown beside the current one.
+  const std::optional<render::Drawn>& pictureBeside() const { return beside_; }
   /// Returns statistics of the current field. They are computed at the first call for this field.
   const FieldStatistics& figures();
-  /// Returns the indices of the cell interfaces with the greatest jumps of the field, in descending order of the jump.
-  /// Returns `count` indices or more, unless the field has fewer interfaces.
+  /// Returns the indices of the cell interfaces with the greatest jumps of the field, in descending order of the jump:
+  /// of all interfaces, or of those at the surface, as `view` has it. Returns `count` indices or more, unless there are
+  /// fewer interfaces.
   const std::vector<std::size_t>& worst(std::size_t count);
   /// Returns the field's values at the mouse pointer, or std::nullopt if the pointer is not over the field.
   std::optional<Readout> readout();
@@ -126,6 +130,8 @@ class Explorer final : public SessionExtension {
   std::string dragCommand(double dx, double dy) const;
   render::Drawn drawBeside(const Field& other, render::ReferenceData reference, const render::ScaleOptions& scale,
                            int shrink);
+  /// Draws the pictures of the current field and of the second field, if there is one, in a common colour scale.
+  std::pair<render::Drawn, std::optional<render::Drawn>> drawBoth(const Field* other, int shrink);
 
   Session& session_;
   Ui ui_;
@@ -150,7 +156,9 @@ class Explorer final : public SessionExtension {
 
   std::optional<FieldStatistics> figures_;
   std::vector<std::size_t> worst_;
+  std::size_t worstAsked_ = 0;       ///< number of interfaces that were asked for when `worst_` was made
   std::optional<JumpKind> worstBy_;  ///< kind of jump by which `worst_` is sorted
+  bool worstOnSurface_ = false;      ///< `worst_` has only interfaces at the surface
 
   std::optional<render::Drawn> picture_;
   std::optional<render::Drawn> beside_;  ///< picture of the second field, beside the current one

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "construction/build_arguments.h"
 #include "explorer/explorer.h"
+#include "explorer/worst_places.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "language/script.h"
@@ -30,7 +32,13 @@ void changeWorst(ViewState& view, const Arguments& arguments, Session&) {
     view.worstBy = arguments.text("by") == "value" ? JumpKind::value : JumpKind::gradient;
     view.worstPage = 0;
   }
+  if (arguments.given("on")) {
+    view.worstOnSurface = arguments.text("on") == "surface";
+    view.worstPage = 0;
+  }
   if (arguments.given("page")) view.worstPage = arguments.whole("page") - 1;
+  if (arguments.given("mark"))
+    view.mark = arguments.text("mark") == "none" ? std::nullopt : std::optional(pointOf(arguments, "mark"));
 }
 
 /// The point to which the command `fly` moves the camera or the slice.
@@ -40,29 +48,38 @@ struct Destination {
   int sliceAxis;    ///< axis perpendicular to the slice that shows the point best
 };
 
-double cellSize(const Field& field, int depth) {
-  return std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
-}
-
 /// Returns the point of the largest jump on a cell interface. Rank 1 is the interface with the largest jump of all. The
 /// slice through the point is perpendicular to the interface, so that it shows the cells on both sides.
 Destination worstPoint(Session& session, std::size_t rank) {
   const auto& worst = explorerOf(session).worst(rank);
   if (rank > worst.size())
-    throw Error(fmt::format("rank: the field has {} interfaces; give one of them", session.jumps().interfaces.size()));
+    throw Error(fmt::format("rank: the field has {} interfaces{}; give one of them", worst.size(),
+                            explorerOf(session).view().worstOnSurface ? " at the surface" : ""));
   const Interface& face = session.jumps().interfaces[worst[rank - 1]];
-  return {face.worst, cellSize(session.current().field, std::max(face.depths[0], face.depths[1])),
+  return {face.worst, cellSizeAt(session.current().field, std::max(face.depths[0], face.depths[1])),
           face.axis == 2 ? 1 : 2};
 }
 
 Destination destinationAt(Session& session, const Vector3& point) {
   const Field& field = session.current().field;
   if (!field.domain().contains(point)) throw Error("to: the point lies outside the field's domain; give one within it");
-  return {point, cellSize(field, field.cellAt(point).depth), explorerOf(session).view().axis};
+  return {point, cellSizeAt(field, field.cellAt(point).depth), explorerOf(session).view().axis};
+}
+
+/// Turns the camera so that it looks at the point from outside, along the gradient of the field.
+void lookFromOutside(render::OrbitCamera& camera, const Vector3& gradient) {
+  if (!(gradient.norm() > 0)) return;
+  const Vector3 outward = gradient.normalized();
+  const bool upY = camera.up == render::UpAxis::y;
+  const double height = upY ? outward.y() : outward.z(), front = upY ? outward.z() : -outward.y();
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  camera.elevationDegrees = std::asin(std::clamp(height, -1.0, 1.0)) * kDegrees;
+  camera.azimuthDegrees = std::atan2(outward.x(), front) * kDegrees;
 }
 
 /// Moves the camera or the slice to the destination, so close that the cell at this point takes about a sixth
-/// of the picture.
+/// of the picture, and marks the point. The camera looks at it from outside, so that the surface does not hide a point
+/// that lies on it. A clip plane of an earlier view is removed, because it might cut the point off.
 void runFly(Session& session, const Arguments& arguments) {
   Explorer& explorer = explorerOf(session);
   const Field& field = session.current().field;
@@ -78,16 +95,10 @@ void runFly(Session& session, const Arguments& arguments) {
   } else {
     view.camera.target = to.point;
     view.camera.distance = 10 * to.cellSize / field.domain().diagonal().norm();
-    // The surface may hide a point that does not lie on it. In that case a clip plane through the point removes
-    // the part of the surface in front of the point.
     view.clip.reset();
-    if (std::abs(field.value(to.point) - view.surfaceOffset) > to.cellSize) {
-      const Vector3 forward = render::cameraOf(view.camera, field.domain(), 16, 16).forward;
-      Eigen::Index axis = 0;
-      forward.cwiseAbs().maxCoeff(&axis);
-      view.clip = render::ClipPlane{int(axis), to.point[axis]};
-    }
+    lookFromOutside(view.camera, field.valueAndGradient(to.point).gradient);
   }
+  view.mark = to.point;
   explorer.change(std::move(view));
 }
 
@@ -173,18 +184,24 @@ void addFrameCommands(Registry& registry) {
   registry.addForScripts({
       .name = "worst",
       .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",
-      .help = "An interface is where two cells meet; it is measured by its greatest jump, as in 'jumps'.",
-      .examples = {"worst by=gradient page=2"},
+      .help =
+          "An interface is where two cells meet; it is measured by its greatest jump, as in 'jumps'. The list calls "
+          "it torn where the jump is greater than the field's value: there the surface has a gap.",
+      .examples = {"worst on=surface", "worst by=gradient page=2"},
       .parameters = {{"by", choice({"value", "gradient"}), "Greatest jump of the value, or of the gradient."},
-                     {"page", wholeNumber().within(1, 1000), "Of eight interfaces each."}},
+                     {"on", choice({"all", "surface"}), "All interfaces, or those at the surface."},
+                     {"page", wholeNumber().within(1, 1000), "Of eight interfaces each."},
+                     {"mark", numbers("X,Y,Z", {3}).orWords({"none"}).in("world units"),
+                      "The point that the picture marks, with a scale bar; 'fly' sets it. In a slice the outline of "
+                      "the exact surface is drawn too, where the exact distance is known."}},
       .action = changing(changeWorst),
   });
   registry.addForScripts({
       .name = "fly",
       .summary = "Take a close look at one of the worst interfaces between cells, or at a point.",
-      .help =
-          "A slice goes through it; a camera looks at it, and what lies before it is cut away. 'verify' writes such "
-          "lines for the worst points that it finds.",
+      .help = "A slice goes through it; a camera looks at it from outside. The picture marks it, and a cut of the "
+              "surface is "
+              "taken back. 'verify' writes such lines for the worst points that it finds.",
       .examples = {"fly 1", "fly to=0.2,0.6,-0.1"},
       .parameters = {{"rank", wholeNumber().within(1, 8000).positional(), "Its place in the list, 1 for the worst."},
                      {"to", numbers("X,Y,Z", {3}).in("world units"), "A point within the domain instead."}},

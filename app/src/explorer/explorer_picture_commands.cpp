@@ -64,10 +64,12 @@ void changeSurface(ViewState& view, const Arguments& arguments, Session& session
   }
   if (arguments.given("clip")) {
     const std::string axis = arguments.text("clip");
+    const int across = axis[0] - 'x';
     if (axis == "none")
       view.clip.reset();
-    else
-      view.clip = render::ClipPlane{axis[0] - 'x', view.clip ? view.clip->offset : 0};
+    else if (!view.clip || view.clip->axis != across)
+      view.clip = render::ClipPlane{
+          across, session.hasField() ? defaultOffset(shownBox(session.current().field), across) : 0.0};
   }
   if (arguments.given("clip-offset")) {
     if (!view.clip) throw Error("clip-offset: needs clip, the axis that it lies on");
@@ -188,16 +190,17 @@ void addSurfaceCommands(Registry& registry) {
       .summary = "Choose which surface the explorer shows, and where it is cut open.",
       .help = "As 'render' has it, of the picture that 'show surface' chooses. What is not given stays as it is.",
       .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
-      .parameters = {{"shown", flag(""), "Whether it is drawn: without it, planes and cells can be looked at alone."},
-                     {"offset", number().in("world units"), "The distance whose surface is drawn; 0 at first."},
-                     {"cracks", flag("").under(kDrawn).advanced(),
-                      "Mark where the surface is torn at a face between two cells."},
-                     {"defects", text("MESH|own|none").under(kDrawn).advanced(),
-                      "Mark where this mesh has defects, as 'mesh --picture' does; own for the one that the field was "
-                      "made from."},
-                     {"clip", choice({"none", "x", "y", "z"}).under(kDrawn),
-                      "Cut across this axis; the half towards the camera is left out."},
-                     {"clip-offset", number().in("world units").under(kDrawn), "Where the cut crosses that axis."}},
+      .parameters =
+          {{"shown", flag(""), "Whether it is drawn: without it, planes and cells can be looked at alone."},
+           {"offset", number().in("world units"), "The distance whose surface is drawn; 0 at first."},
+           {"cracks", flag("").under(kDrawn).advanced(), "Mark where the surface is torn at a face between two cells."},
+           {"defects", text("MESH|own|none").under(kDrawn).advanced(),
+            "Mark where this mesh has defects, as 'mesh --picture' does; own for the one that the field was "
+            "made from."},
+           {"clip", choice({"none", "x", "y", "z"}).under(kDrawn),
+            "Cut across this axis; the half towards the camera is left out."},
+           {"clip-offset", number().in("world units").under(kDrawn),
+            "Where the cut crosses that axis; another axis than before starts at the middle of the surface's box."}},
       .action = changing(changeSurface),
   });
 }
@@ -211,7 +214,7 @@ void addPlaneAndColorCommands(Registry& registry) {
       .examples = {"plane axis=x offset=0.2", "plane through=0,0,0,1,1,0", "plane zoom=8 target=0.2,0.6,0"},
       .parameters = {{"axis", choice({"x", "y", "z"}), "The plane is perpendicular to this axis; z at first."},
                      {"offset", numbers("NUMBER", {1}).orWords({"auto"}).in("world units"),
-                      "Where the plane crosses that axis; auto is 0, or the domain's middle where 0 lies outside."},
+                      "Where the plane crosses that axis; auto is the middle of the surface's box."},
                      {"through", numbers("PX,PY,PZ,NX,NY,NZ", {6}).in("world units"),
                       "A point of the plane and its normal instead."},
                      {"in-space", flag(""), "Whether the plane stands in the surface's picture too."},

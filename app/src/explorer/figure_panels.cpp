@@ -1,6 +1,7 @@
 // The panels of the explorer's right column.
 
 #include "explorer/panels.h"
+#include "explorer/worst_places.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/field.h"
 #include "text/text.h"
@@ -110,23 +111,33 @@ void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
 }
 
 void drawHistograms(Ui& ui, Explorer& explorer) {
-  const FieldStatistics& figures = explorer.figures();
   const auto& picture = explorer.picture();
   const auto legendOf = [&](render::ColorBy color) {
     return picture && explorer.view().colors().by == color ? &picture->legend : nullptr;
   };
-  drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
-  drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
+  const auto draw = [&](const FieldStatistics& figures) {
+    drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
+    drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
+  };
+  const std::string& beside = explorer.view().beside;
+  if (beside.empty()) return draw(explorer.figures());
+  ui.text("left: " + fileName(explorer.session().current().name));
+  draw(explorer.figures());
+  if (!explorer.pictureBeside()) return;  // the other field has not been read yet
+  ui.text("right: " + fileName(beside));
+  draw(explorer.session().otherFigures(beside));
 }
 
-void drawStatistics(Ui& ui, Explorer& explorer) {
-  const FieldStatistics& figures = explorer.figures();
-  const Field& field = explorer.session().current().field;
+namespace {
+
+/// Draws a table of statistics of a field. `jumps` is null while the jumps of the field are unknown.
+void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures, const Jumps* jumps) {
   std::vector<std::pair<std::string, std::string>> rows = {
       {"cells", grouped(figures.leaves)},
       {"coefficients", grouped(figures.coefficients)},
       {"memory", bytesText(double(figures.bytes))},
-      {"target error", shortNumber(field.metadata().settings.targetError.weighted())},
+      {"target error τ", shortNumber(field.metadata().settings.targetError.weighted())},
+      {"weighted estimate (τ)", shortNumber(field.metadata().totalError)},
   };
   if (const std::optional<Measurement>& m = field.metadata().measurement) {
     rows.emplace_back("RMS error near surface", shortNumber(m->near.rms));
@@ -139,12 +150,24 @@ void drawStatistics(Ui& ui, Explorer& explorer) {
     rows.emplace_back("exact cells", grouped(figures.exact.leaves));
     rows.emplace_back("exact triangles", grouped(figures.exact.triangles));
   }
-  if (explorer.session().knowsJumps()) {
-    const Jumps& jumps = explorer.session().jumps();
-    rows.emplace_back("jump of f, RMS", shortNumber(jumps.value.rms));
-    rows.emplace_back("jump of gradient, RMS", shortNumber(jumps.gradient.rms));
+  if (jumps != nullptr) {
+    rows.emplace_back("jump of f, RMS", shortNumber(jumps->value.rms));
+    rows.emplace_back("jump of gradient, RMS", shortNumber(jumps->gradient.rms));
   }
   ui.facts(rows);
+}
+
+}  // namespace
+
+void drawStatistics(Ui& ui, Explorer& explorer) {
+  Session& session = explorer.session();
+  const std::string& beside = explorer.view().beside;
+  if (!beside.empty()) ui.text("left: " + fileName(session.current().name));
+  drawStatisticsOf(ui, session.current().field, explorer.figures(), session.knowsJumps() ? &session.jumps() : nullptr);
+  if (beside.empty() || !explorer.pictureBeside()) return;
+  ui.text("right: " + fileName(beside));
+  const Session::Other& other = session.other(beside);
+  drawStatisticsOf(ui, other.field, session.otherFigures(beside), other.jumps ? &*other.jumps : nullptr);
 }
 
 void drawWorst(const Controls& controls, Explorer& explorer) {
@@ -153,21 +176,24 @@ void drawWorst(const Controls& controls, Explorer& explorer) {
   const Jumps& jumps = explorer.session().jumps();
   controls.choice("worst/by", "jump of", {"value", "gradient"}, view.worstBy == JumpKind::value ? "value" : "gradient",
                   "worst by=");
+  controls.choice("worst/on", "where", {"all", "surface"}, view.worstOnSurface ? "surface" : "all", "worst on=");
   const std::size_t first = std::size_t(view.worstPage) * kWorstRows;
-  const auto& worst = explorer.worst(first + kWorstRows);
+  const auto& worst = explorer.worst(first + kWorstRows + 1);  // one more tells whether there is a next page
   const std::size_t last = std::min(worst.size(), first + kWorstRows);
   for (std::size_t rank = first; rank < last; ++rank) {
     const Interface& face = jumps.interfaces[worst[rank]];
     const Vector3& x = face.worst;
     const std::array cells = {fmt::format("{}. {}", rank + 1, shortNumber(jumpOf(face, view.worstBy).max)),
-                              fmt::format("({:.2f}, {:.2f}, {:.2f})", x.x(), x.y(), x.z())};
+                              std::string(isTorn(explorer.session().current().field, face) ? "torn" : "")};
     if (controls.ui.row(fmt::format("worst/{}", rank - first + 1), cells, 90))
       controls.commands.push_back(fmt::format("fly {}", rank + 1));
+    // The shortest numbers that are read back as the same floats: they can be typed after 'fly to='.
+    controls.ui.text(fmt::format("{},{},{}", float(x.x()), float(x.y()), float(x.z())), true);
   }
   const auto page = [](int number) { return fmt::format("worst page={}", number); };
   controls.button("worst/previous", "previous", page(view.worstPage).c_str(), view.worstPage > 0);
   ImGui::SameLine();
-  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < jumps.interfaces.size());
+  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < worst.size());
 }
 
 }  // namespace hpsdf::app

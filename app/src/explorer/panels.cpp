@@ -2,6 +2,9 @@
 
 #include "explorer/panels.h"
 
+#include "pictures/picture_arguments.h"
+#include "text/text.h"
+
 namespace hpsdf::app {
 namespace {
 
@@ -52,6 +55,61 @@ void drawFieldNames(const Explorer& explorer, const Layout& layout) {
                kSoftInk);
 }
 
+/// A point in a picture.
+struct SpotInPicture {
+  float x, y;        ///< pixels from the picture's upper left corner
+  double pixelSize;  ///< world length of a pixel at the point
+};
+
+/// Returns where a picture of the explorer's view shows a point. Returns std::nullopt if the point is not in the view's
+/// plane or not before the camera.
+std::optional<SpotInPicture> spotAt(const ViewState& view, const Field& field, const Vector3& point, int width,
+                                    int height) {
+  if (view.slice) {
+    const render::SliceView plane = render::sliceView(field, slicePicture(view, field), width, height);
+    const Vector3 from = point - plane.origin;
+    const double pixel = plane.right.norm() / width;
+    if (std::abs(from.dot(plane.right.cross(plane.up).normalized())) > pixel) return std::nullopt;
+    return SpotInPicture{float(width * (0.5 + from.dot(plane.right) / plane.right.squaredNorm())),
+                         float(height * (0.5 - from.dot(plane.up) / plane.up.squaredNorm())), pixel};
+  }
+  const render::Camera camera = render::cameraOf(view.camera, field.domain(), width, height);
+  const render::PicturePoint at = render::project(camera, point, width, height);
+  if (!(at.depth > 0)) return std::nullopt;
+  return SpotInPicture{float(at.x), float(at.y), render::pixelSize(camera, at.depth, height)};
+}
+
+/// Draws a bar of 1, 2 or 5 times a power of ten, at most 120 pixels long, with its length in world units.
+void drawScaleBar(ImDrawList& list, const UiRect& rect, double pixelSize) {
+  const double most = 120 * pixelSize, power = std::pow(10, std::floor(std::log10(most)));
+  const double length = power * (most >= 5 * power ? 5 : most >= 2 * power ? 2 : 1);
+  const std::string text = shortNumber(length);
+  const float width = float(length / pixelSize), whole = std::max(width, widthOf(text));
+  const float x = float(rect.x1) - whole - 14, y = float(rect.y1) - 16;  // the axes are on the left
+  list.AddRectFilled({x - 6, y - 22}, {x + whole + 6, y + 8}, IM_COL32(250, 250, 248, 220), 2);
+  list.AddRectFilled({x, y}, {x + width, y + 3}, kInk);
+  list.AddText({x, y - 18}, kInk, text.c_str());
+}
+
+/// Draws a ring around the marked point and a scale bar into each half of the picture.
+void drawMark(const Explorer& explorer, const Layout& layout) {
+  const ViewState& view = explorer.view();
+  if (!view.mark || !explorer.picture()) return;
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  for (const UiRect& rect : {layout.canvas, layout.beside}) {
+    const int width = int(rect.width()), height = int(rect.height());
+    if (width < 16 || height < 16) continue;
+    const auto spot = spotAt(view, explorer.session().current().field, *view.mark, width, height);
+    if (!spot) continue;
+    const ImVec2 at(float(rect.x0) + spot->x, float(rect.y0) + spot->y);
+    list.PushClipRect({float(rect.x0), float(rect.y0)}, {float(rect.x1), float(rect.y1)});
+    list.AddCircle(at, 10, IM_COL32(255, 255, 255, 255), 24, 4);
+    list.AddCircle(at, 10, IM_COL32(20, 20, 30, 255), 24, 2);
+    drawScaleBar(list, rect, spot->pixelSize);
+    list.PopClipRect();
+  }
+}
+
 void drawReadout(Ui& ui, Explorer& explorer) {
   if (const auto& work = explorer.work) {
     ui.text(fmt::format("{} {:.0f} %", work->task, std::floor(100 * work->fraction)));
@@ -69,10 +127,16 @@ void drawReadout(Ui& ui, Explorer& explorer) {
     return;
   }
   if (!explorer.picture()) return;
-  std::string line;
-  for (const std::string& detail : explorer.picture()->details) line += (line.empty() ? "" : "   ") + detail;
-  ui.text(fileName(explorer.session().current().name) + "   " + line);
-  ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there", true);
+  const auto describe = [&](const std::string& name, const render::Drawn& drawn) {
+    std::string line = fileName(name);
+    for (const std::string& detail : drawn.details) line += "   " + detail;
+    ui.text(line);
+  };
+  describe(explorer.session().current().name, *explorer.picture());
+  if (explorer.pictureBeside())
+    describe(explorer.view().beside, *explorer.pictureBeside());
+  else
+    ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there", true);
 }
 
 }  // namespace
@@ -87,6 +151,10 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
     const double now = ui.column(name, rect, scroll, content);
     if (std::abs(now - scroll) > 0.5) commands.push_back(fmt::format("panel {}-scroll={}", name, now));
   };
+  if (explorer.work && !explorer.session().hasField()) {  // the first field is on its way: there is only its progress
+    if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
+    return;
+  }
   if (layout.bar.width() > 0) ui.column("bar", layout.bar, {}, [&] { drawBar(controls, explorer); });
   scrolling("left", layout.left, view.scroll[0], [&] {
     section(controls, view, Panel::view, view.slice ? "Slice" : "Surface", [&] { drawViewPanel(controls, explorer); });
@@ -99,6 +167,7 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
     section(controls, view, Panel::worst, "Worst interfaces", [&] { drawWorst(controls, explorer); });
   });
   if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
+  drawMark(explorer, layout);
   drawFieldNames(explorer, layout);
   ui.addArea("canvas", layout.canvas);
   if (layout.beside.width() > 0) ui.addArea("beside", layout.beside);

@@ -45,24 +45,25 @@ void drawSurface(const Controls& controls, const ViewState& view, const Box& dom
                     domain.max()[view.clip->axis], "surface clip-offset=");
 }
 
-void drawPlaneOffset(const Controls& controls, const ViewState& view, const Box& domain) {
+void drawPlaneOffset(const Controls& controls, const ViewState& view, const Field& field) {
+  const Box& domain = field.domain();
   controls.choice("view/axis", "plane across", {"x", "y", "z"}, axisName(view.axis), "plane axis=");
-  controls.slider("view/plane-offset", "plane at", view.planeOffset.value_or(defaultOffset(domain, view.axis)),
+  controls.slider("view/plane-offset", "plane at", view.planeOffset.value_or(defaultOffset(shownBox(field), view.axis)),
                   domain.min()[view.axis], domain.max()[view.axis], "plane offset=");
 }
 
-void drawPlane(const Controls& controls, const ViewState& view, const Box& domain) {
-  drawPlaneOffset(controls, view, domain);
+void drawPlane(const Controls& controls, const ViewState& view, const Field& field) {
+  drawPlaneOffset(controls, view, field);
   controls.slider("view/zoom", "zoom", view.zoom, 1, 32, "plane zoom=", "%.3g");
   controls.button("view/whole", "whole section", "plane zoom=1 target=center", view.sliceTarget || view.zoom != 1);
 }
 
 /// Draws the controls that show or hide the surface, a plane and the cells of the octree in the picture of a surface.
-void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Box& domain) {
+void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Field& field) {
   controls.checkbox("view/surface", "surface", view.surface, "surface shown=");
   ImGui::SameLine();
   controls.checkbox("view/plane", "plane", view.planeInSpace, "plane in-space=");
-  if (view.planeInSpace) drawPlaneOffset(controls, view, domain);
+  if (view.planeInSpace) drawPlaneOffset(controls, view, field);
   controls.choice("view/cells", "cells", {"none", "lines", "boxes"}, cellStyleName(view.cells.style), "cells ");
   if (view.cells.style == render::CellStyle::none) return;
   controls.field("view/degrees", "of degrees", levelText(view.cells.degrees), "cells degrees=");
@@ -159,13 +160,13 @@ void drawProgress(Ui& ui, Explorer& explorer) {
 
 void drawViewPanel(const Controls& controls, Explorer& explorer) {
   const ViewState& view = explorer.view();
-  const Box& domain = explorer.session().current().field.domain();
+  const Field& field = explorer.session().current().field;
   if (view.slice) {
-    drawPlane(controls, view, domain);
+    drawPlane(controls, view, field);
   } else {
     drawCamera(controls, view.camera);
-    drawSurface(controls, view, domain);
-    drawPlaneAndCells(controls, view, domain);
+    drawSurface(controls, view, field.domain());
+    drawPlaneAndCells(controls, view, field);
   }
   if (const auto v = controls.ui.slider("view/arrows", "arrows", view.arrows, 0, 120, "%.0f"))
     controls.commands.push_back(fmt::format("arrows {:.0f}", *v));

@@ -58,7 +58,7 @@ std::string panelLine(const ViewState& view) {
 
 render::Plane planeOf(const ViewState& view, const Field& field) {
   if (view.plane) return *view.plane;
-  return render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(field.domain(), view.axis))};
+  return render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(shownBox(field), view.axis))};
 }
 
 }  // namespace
@@ -102,8 +102,9 @@ std::string scriptOf(const ViewState& view) {
          cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + cellsLine(view.cells) +
          fmt::format("arrows {}\n", view.arrows) + colorLine(view.surfaceColors, "surface") +
          colorLine(view.sliceColors, "slice") + fmt::format("beside {}\n", wordOrNone(view.beside)) +
-         fmt::format("worst by={} page={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
-                     view.worstPage + 1) +
+         fmt::format("worst by={} on={} page={} mark={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
+                     view.worstOnSurface ? "surface" : "all", view.worstPage + 1,
+                     view.mark ? textOf(*view.mark) : "none") +
          panelLine(view);
 }
 

@@ -29,7 +29,7 @@ struct ViewState {
   bool slice = false;  ///< true shows a slice of the field, false the surface in space
 
   int axis = 2;                            ///< index of the axis perpendicular to the plane
-  std::optional<double> planeOffset;       ///< position on the axis, world units; by default 0 or the domain's middle
+  std::optional<double> planeOffset;       ///< position on the axis, world units; by default `defaultOffset`
   std::optional<render::FreePlane> plane;  ///< if set, used instead of `axis` and `planeOffset`
   bool planeInSpace = false;               ///< also draws the plane in the picture of the surface
   double zoom = 1;                         ///< magnification of the slice; 1 shows the whole section
@@ -49,7 +49,9 @@ struct ViewState {
   Coloring surfaceColors{.by = render::ColorBy::normal};
   Coloring sliceColors{.by = render::ColorBy::degree};
   JumpKind worstBy = JumpKind::value;  ///< kind of jump by which the list of interfaces is sorted
+  bool worstOnSurface = false;         ///< the list has only interfaces at the surface
   int worstPage = 0;                   ///< page of the list of interfaces, from 0
+  std::optional<Vector3> mark;         ///< point that is marked in the picture, world units
 
   std::array<bool, kPanels> open = {true, true, true, true, true, true, true, true};
   std::array<double, 2> scroll = {0, 0};  ///< scroll positions of the left and the right column, pixels

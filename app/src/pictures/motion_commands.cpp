@@ -48,7 +48,7 @@ void runTurntable(Session& session, const Arguments& arguments) {
   const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  picture = surfacePicture(arguments, field.domain());
+  picture = surfacePicture(arguments, shownBox(field));
   const double first = picture.camera.azimuthDegrees;
   const bool seen = withProgress(session.console(), [&](const Progress& progress) {
     bool any = false;
@@ -107,9 +107,9 @@ render::Drawn drawFrame(Session& session, const Call& call, const std::optional<
     const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
     return draw(session.renderer(backend(arguments)), session.current().field, picture, reference);
   };
-  const Box& domain = session.current().field.domain();
-  if (!isSlice(call)) return drawn(surfacePicture(arguments, domain), render::drawSurface);
-  return drawn(slicePicture(arguments, domain), render::drawSlice);
+  const Box box = shownBox(session.current().field);
+  if (!isSlice(call)) return drawn(surfacePicture(arguments, box), render::drawSurface);
+  return drawn(slicePicture(arguments, box), render::drawSlice);
 }
 
 /// Returns the numbers of refinement steps after which a frame is drawn, in strictly ascending order: 0, then a

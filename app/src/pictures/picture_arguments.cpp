@@ -78,10 +78,9 @@ render::ShownCells shownCells(const Arguments& arguments) {
 
 render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
 
-render::AxisPlane axisPlane(const Arguments& arguments, const char* axisName, const char* offsetName,
-                            const Box& domain) {
+render::AxisPlane axisPlane(const Arguments& arguments, const char* axisName, const char* offsetName, const Box& box) {
   const int axis = arguments.text(axisName)[0] - 'x';
-  return {axis, arguments.given(offsetName) ? arguments.number(offsetName) : defaultOffset(domain, axis)};
+  return {axis, arguments.given(offsetName) ? arguments.number(offsetName) : defaultOffset(box, axis)};
 }
 
 /// Sets the size of a picture and its number of samples per pixel.
@@ -94,7 +93,7 @@ void setPixels(Picture& picture, const Arguments& arguments) {
 
 /// Returns the plane that `render` draws, given by six numbers or by an axis with an offset. Returns
 /// std::nullopt if no plane is given.
-std::optional<render::Plane> scenePlane(const Arguments& arguments, const Box& domain) {
+std::optional<render::Plane> scenePlane(const Arguments& arguments, const Box& box) {
   if (!arguments.given("plane")) {
     if (arguments.given("plane-offset")) throw Error("plane-offset: needs plane, the axis that it lies on");
     return std::nullopt;
@@ -104,7 +103,7 @@ std::optional<render::Plane> scenePlane(const Arguments& arguments, const Box& d
       throw Error("plane-offset: is for a plane across an axis; a point and a normal tell where theirs lies");
     return freePlane(numbers);
   }
-  return axisPlane(arguments, "plane", "plane-offset", domain);
+  return axisPlane(arguments, "plane", "plane-offset", box);
 }
 
 }  // namespace
@@ -194,14 +193,14 @@ Vector3 pointOf(const Arguments& arguments, const char* name) {
   return {p[0], p[1], p[2]};
 }
 
-render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain) {
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& box) {
   render::SlicePicture picture;
   if (arguments.given("plane")) {
     if (arguments.given("axis") || arguments.given("offset"))
       throw Error("plane: excludes axis and offset; give one or the other");
     picture.plane = freePlane(arguments.numbers("plane"));
   } else {
-    picture.plane = axisPlane(arguments, "axis", "offset", domain);
+    picture.plane = axisPlane(arguments, "axis", "offset", box);
   }
   picture.zoom = arguments.number("zoom");
   if (arguments.given("target")) picture.target = pointOf(arguments, "target");
@@ -245,17 +244,19 @@ render::SurfacePicture cameraPicture(const Arguments& arguments) {
   return picture;
 }
 
-render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain) {
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& box) {
   render::SurfacePicture picture = cameraPicture(arguments);
   picture.camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
   picture.offset = arguments.number("offset");
-  if (arguments.given("clip"))
-    picture.clip = render::ClipPlane{arguments.text("clip")[0] - 'x', arguments.number("clip-offset")};
-  else if (arguments.given("clip-offset"))
+  if (arguments.given("clip")) {
+    const render::AxisPlane cut = axisPlane(arguments, "clip", "clip-offset", box);
+    picture.clip = render::ClipPlane{cut.axis, cut.offset};
+  } else if (arguments.given("clip-offset")) {
     throw Error("clip-offset: needs clip, the axis that it lies on");
+  }
   picture.cracks = arguments.flag("cracks");
   picture.surface = arguments.flag("surface");
-  picture.plane = scenePlane(arguments, domain);
+  picture.plane = scenePlane(arguments, box);
   picture.cells = shownCells(arguments);
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
@@ -263,8 +264,20 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& dom
   return picture;
 }
 
-double defaultOffset(const Box& domain, int axis) {
-  return domain.min()[axis] <= 0 && domain.max()[axis] > 0 ? 0 : domain.center()[axis];
+Box shownBox(const Field& field) {
+  const Box surface = field.domain().intersection(field.metadata().source.box);
+  return surface.isEmpty() ? field.domain() : surface;
+}
+
+double defaultOffset(const Box& box, int axis) {
+  const double middle = box.center()[axis], size = box.sizes()[axis];
+  if (!(size > 0)) return middle;
+  // A power of ten divides exactly enough that the quotient is the double with the fewest digits, but only if the power
+  // itself is exact, as positive powers up to 10²² are.
+  const double digits = 3 - std::floor(std::log10(size));
+  const double rounded = digits >= 0 ? std::round(middle * std::pow(10, digits)) / std::pow(10, digits)
+                                     : std::round(middle / std::pow(10, -digits)) * std::pow(10, -digits);
+  return rounded + 0.0;  // turns -0 into 0
 }
 
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen) {

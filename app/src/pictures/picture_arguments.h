@@ -44,12 +44,12 @@ std::vector<int> levelList(const std::string& text, const char* name, int most);
 /// Returns the value of a parameter of three numbers as a point. The parameter must have a value.
 Vector3 pointOf(const Arguments& arguments, const char* name);
 
-/// A placeholder for the field's domain, with which arguments can be checked before the field is loaded.
-inline const Box kAnyDomain(Vector3::Constant(-1), Vector3::Constant(1));
+/// A placeholder for the result of `shownBox`, with which arguments can be checked before the field is loaded.
+inline const Box kAnyBox(Vector3::Constant(-1), Vector3::Constant(1));
 
 /// Returns the settings of a picture from the arguments of `slice`. If no offset is given, the plane is at
-/// `defaultOffset`. Throws `Error` if both a plane and an axis are given.
-render::SlicePicture slicePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
+/// `defaultOffset` of `box`. Throws `Error` if both a plane and an axis are given.
+render::SlicePicture slicePicture(const Arguments& arguments, const Box& box = kAnyBox);
 
 /// Names of the parameters of `render` that all commands with a camera share.
 inline constexpr std::array kCameraParameters = {"camera", "view",    "target", "projection",
@@ -63,10 +63,10 @@ std::unique_ptr<render::BodyRenderer> makeBodyRenderer(std::vector<TriangleMesh>
 /// camera or the size is out of range.
 render::SurfacePicture cameraPicture(const Arguments& arguments);
 
-/// Returns the settings of a picture from the arguments of `render`. If no offset is given, the plane is at
-/// `defaultOffset`. Throws `Error` if the camera is out of range, if two given parameters exclude each other, or if a
-/// given parameter needs another one.
-render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& domain = kAnyDomain);
+/// Returns the settings of a picture from the arguments of `render`. If no offset is given, a plane or a cut is at
+/// `defaultOffset` of `box`. Throws `Error` if the camera is out of range, if two given parameters exclude each other,
+/// or if a given parameter needs another one.
+render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& box = kAnyBox);
 
 /// Writes a note to the console if the picture is empty, or if the walls of the domain cut off the surface.
 void noteOddSurface(const Console& console, const Field& field, const render::SurfacePicture& picture, bool seen);
@@ -78,9 +78,13 @@ render::ReferenceData referenceDataFor(Session& session, const Arguments& argume
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SurfacePicture& picture);
 
-/// Returns the default offset of a plane perpendicular to an axis: 0, or the middle of the domain if 0 lies
-/// outside the domain.
-double defaultOffset(const Box& domain, int axis);
+/// Returns the part of the domain that holds the surface. Returns the domain if the field does not know the surface's
+/// box.
+Box shownBox(const Field& field);
+
+/// Returns the default offset of a plane perpendicular to an axis: the middle of `box`, rounded to about a thousandth
+/// of its size, so that captions and commands have a short number.
+double defaultOffset(const Box& box, int axis);
 
 /// Throws `Error` unless the file ends in .png.
 void requirePng(const std::string& file);

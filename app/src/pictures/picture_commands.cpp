@@ -84,7 +84,7 @@ void runSlice(Session& session, const Arguments& arguments) {
   const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  picture = slicePicture(arguments, field.domain());
+  picture = slicePicture(arguments, shownBox(field));
   if (format == SliceFormat::png) {
     session.setPicture(render::drawSlice(renderer, field, picture, reference));
     savePng(session.picture().image, file);
@@ -114,7 +114,7 @@ void runRender(Session& session, const Arguments& arguments) {
   const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  picture = surfacePicture(arguments, field.domain());
+  picture = surfacePicture(arguments, shownBox(field));
   session.setPicture(render::drawSurface(renderer, field, picture, reference));
   savePng(session.picture().image, file);
   noteOddSurface(session.console(), field, picture, session.picture().seen);
@@ -126,7 +126,7 @@ using render::ColorBy;
 const std::vector<Parameter> kSlicePlane = {
     {"axis", choice({"x", "y", "z"}).byDefault("z"), "Axis to which the plane is perpendicular."},
     {"offset", number().in("world units"),
-     "Coordinate at which the plane crosses that axis. When left out, 0, or the domain's middle where 0 lies outside."},
+     "Coordinate at which the plane crosses that axis. When left out, the middle of the surface's box."},
     {"plane", numbers("PX,PY,PZ,NX,NY,NZ", {6}).in("world units"),
      "Point and normal of the plane, instead of axis and offset."},
     {"zoom", number().above(0).byDefault("1"), "Magnification; 1 shows the whole section."},
@@ -153,7 +153,8 @@ const std::vector<Parameter> kRenderDrawn = {
     {"clip", choice({"x", "y", "z"}),
      "Cuts the body across this axis. The half towards the camera is left out, and the section shows the cells in the "
      "colours of the picture."},
-    {"clip-offset", number().in("world units").byDefault("0"), "Coordinate at which the cut crosses that axis."},
+    {"clip-offset", number().in("world units"),
+     "Coordinate at which the cut crosses that axis. When left out, the middle of the surface's box."},
     {"cracks", flag().advanced(),
      "Marks cracks in magenta: pixels in which the field jumps across the drawn distance from one cell to the next. "
      "The caption names the widest jump."},
@@ -165,8 +166,7 @@ const std::vector<Parameter> kRenderDrawn = {
      "Also draws a section of the domain in the colours of the picture, with outlined cells and the surface as a line: "
      "across an axis, or through a point with a normal."},
     {"plane-offset", number().in("world units").advanced(),
-     "Coordinate at which such a plane crosses its axis. When left out, 0, or the domain's middle where 0 lies "
-     "outside."},
+     "Coordinate at which such a plane crosses its axis. When left out, the middle of the surface's box."},
     {"cells", choice({"none", "lines", "boxes"}).byDefault("none"),
      "Also draws the cells of the octree: lines along their edges, faded where cells are small in the picture, or "
      "boxes of 0.8 of their extent in the colours of the picture."},

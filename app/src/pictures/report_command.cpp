@@ -7,6 +7,7 @@
 #include "console/version.h"
 #include "construction/build_arguments.h"
 #include "construction/build_field.h"
+#include "construction/file_kind.h"
 #include "construction/mesh_summary.h"
 #include "files/html_page.h"
 #include "files/output_folder.h"
@@ -73,11 +74,9 @@ ReportPicture drawInto(const fs::path& folder, Session& session, render::Rendere
   command += " -o " + file;
   render::Image image;
   if (drawing.slice) {
-    const double offset = defaultOffset(field.domain(), 2);
-    if (offset != 0) command += fmt::format(" --offset={}", offset);
-    image = render::draw(
-        renderer, field,
-        render::SlicePicture{.plane = render::AxisPlane{2, offset}, .color = drawing.color, .samples = samples});
+    const render::AxisPlane plane{2, defaultOffset(shownBox(field), 2)};  // the one that `slice` takes by default
+    image =
+        render::draw(renderer, field, render::SlicePicture{.plane = plane, .color = drawing.color, .samples = samples});
   } else {
     render::SurfacePicture picture;
     picture.color = drawing.color;
@@ -110,22 +109,20 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   rows.emplace_back("Total error ε",
                     fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));
   if (const std::optional<Measurement>& m = metadata.measurement) {
-    const auto errorText = [&](const Measurement::Error& error) {
-      return fmt::format("RMS {}, greatest {}; over the longest side {}, {}", shortNumber(error.rms),
-                         shortNumber(error.max), shortNumber(error.rms / metadata.referenceLength),
-                         shortNumber(error.max / metadata.referenceLength));
+    const auto row = [&](const char* label, const Measurement::Error& error) {
+      const double side = metadata.referenceLength;
+      rows.emplace_back(label, fmt::format("{}; over the longest side: {}", errorText(error),
+                                           errorText({.rms = error.rms / side, .max = error.max / side})));
     };
-    rows.emplace_back("Error near the surface", errorText(m->near));
-    rows.emplace_back("Error over the domain", errorText(m->domain));
-    rows.emplace_back("Wrong signs", fmt::format("{} of {} points", grouped(m->wrongSigns), grouped(m->points)));
-    rows.emplace_back("Torn", fmt::format("{} % of the surface", shortNumber(100 * m->tornShare)));
+    row("Error near the surface", m->near);
+    row("Error over the domain", m->domain);
+    rows.emplace_back("Wrong signs", wrongSignsText(*m));
+    rows.emplace_back("Torn", tornText(*m));
   }
   rows.emplace_back("Exact distances taken", grouped(metadata.exactEvaluations));
   if (built != nullptr) rows.emplace_back("Construction", fmt::format("{:.1f} s", built->seconds));
   return rows;
 }
-
-bool isFieldFile(const std::string& source) { return fs::path(source).extension() == ".hpsdf"; }
 
 void runReport(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
@@ -133,7 +130,7 @@ void runReport(Session& session, const Arguments& arguments) {
   OutputFolder folder(arguments.text("output"));
   checkWritable(folder.path() / "index.html");
   std::optional<BuiltField> built;
-  if (arguments.has("source") && !isFieldFile(arguments.text("source"))) {
+  if (arguments.has("source") && kindOfFile(arguments.text("source")) != FileKind::field) {
     built = buildField(console, arguments.text("source"), arguments);
     session.setField({std::move(built->field), arguments.text("source")});
   } else if (arguments.has("source")) {

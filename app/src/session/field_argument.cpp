@@ -1,9 +1,13 @@
 #include "session/field_argument.h"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <utility>
 
+#include "construction/file_kind.h"
 #include "hpsdf/field_file.h"
+#include "session/field_surface.h"
 
 namespace hpsdf::app {
 
@@ -20,6 +24,23 @@ void loadField(Session& session, const std::string& file) {
 void useField(Session& session, const Arguments& arguments) {
   if (arguments.has("field")) return loadField(session, arguments.text("field"));
   session.current();  // throws `Error` if there is no field
+}
+
+std::string useFieldWithSurface(Session& session, const Arguments& arguments) {
+  const std::string field = arguments.textOr("field", "");
+  const FileKind kind = field.empty() ? FileKind::field : kindOfFile(field);
+  if (kind == FileKind::surface) {
+    if (session.hasField() && !arguments.has("mesh")) return field;
+    throw Error(
+        fmt::format("{}: this is a mesh or a shape; give the file of a field (*.hpsdf) first, then the mesh", field));
+  }
+  if (kind == FileKind::unknown && std::filesystem::exists(field))
+    throw Error(
+        fmt::format("{}: this is neither a field nor a mesh: it does not begin as field files do, and its name "
+                    "does not end as those of meshes do",
+                    field));
+  useField(session, arguments);
+  return arguments.has("mesh") ? arguments.text("mesh") : surfaceOf(session.current());
 }
 
 }  // namespace hpsdf::app

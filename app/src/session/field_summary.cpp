@@ -173,6 +173,13 @@ std::string measuredText(const Field& field) {
                      unitText(field));
 }
 
+std::string estimateLine(const Field& field) {
+  const FieldMetadata& metadata = field.metadata();
+  const std::optional<Measurement>& m = metadata.measurement;
+  return fmt::format("weighted estimate (τ) {}, {}", shortNumber(metadata.totalError),
+                     m ? "measured near the surface " + errorText(m->near) : "not measured");
+}
+
 Json measuredJson(const Field& field) {
   const std::optional<Measurement>& m = field.metadata().measurement;
   if (!m) return {};
@@ -274,7 +281,7 @@ std::string fieldText(const CurrentField& current) {
     row("worst point", vectorText(m->worst));
     row("signs, cracks", wrongSignsText(*m) + "; " + tornText(*m));
   } else {
-    row("measured", "not since the field was changed; 'hpsdf verify' measures it");
+    row("measured", "no, or not since the field was changed; 'hpsdf verify' measures it");
   }
   if (!hasTolerance(field))
     row("weighted estimate", shortNumber(metadata.rmsEstimate(field.domain())) + ", √(ε/|Ω|)" + unitText(field));

@@ -28,13 +28,22 @@ std::string fieldText(const CurrentField& current);
 
 /// Returns the measured errors of a field as text: "near the surface RMS 2.06e-4, greatest 3.12e-3; over the domain RMS
 /// 1.83e-4, greatest 4.57e-3; 2.57 % of the surface torn (mesh units)". Wrong signs are told if there are any. Returns
-/// "not measured" for a field that was changed after it was measured, or that an earlier version made.
+/// "not measured" for a field that was changed after it was measured, or that was never measured.
 std::string measuredText(const Field& field);
 
 /// Returns true if the field was built within a tolerance.
 bool hasTolerance(const Field& field);
 /// Returns the tolerance of a field, and whether the measurement found it kept.
 std::string toleranceText(const Field& field);
+
+/// Return parts of `measuredText`: "RMS 2.06e-4, greatest 3.12e-3", "2.57 % of the surface torn", and the number of
+/// points with a wrong sign.
+std::string errorText(const Measurement::Error& error);
+std::string tornText(const Measurement& m);
+std::string wrongSignsText(const Measurement& m);
+
+/// Returns the error that the construction estimated, and the measured error near the surface beside it, in one line.
+std::string estimateLine(const Field& field);
 
 /// Returns the measured errors of a field as JSON. Returns null if the field was not measured.
 Json measuredJson(const Field& field);

@@ -21,10 +21,6 @@ std::string surfaceOf(const CurrentField& current, const char* asked) {
                           source.empty() ? "" : ", " + source));
 }
 
-std::string surfaceFor(const CurrentField& current, const Arguments& arguments) {
-  return arguments.has("mesh") ? arguments.text("mesh") : surfaceOf(current);
-}
-
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
                    std::string_view otherwise) {
   if (reference.fieldIsMadeFromIt) return;

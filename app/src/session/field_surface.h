@@ -17,10 +17,6 @@ Parameter surfaceParameter();
 /// the message then asks the user for the argument `asked`.
 std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
 
-/// Returns the surface that the argument `mesh` names. Without this argument, returns the result of
-/// `surfaceOf`.
-std::string surfaceFor(const CurrentField& current, const Arguments& arguments);
-
 /// Throws `Error` if the current field was not made from `surface`. `reference` holds the data of `surface`.
 /// The error message ends with the text `otherwise`.
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,

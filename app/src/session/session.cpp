@@ -125,6 +125,12 @@ const Jumps& Session::otherJumps(const std::string& file) {
   return jumpsOf(other.field, other.jumps, console_);
 }
 
+const FieldStatistics& Session::otherFigures(const std::string& file) {
+  Other& other = this->other(file);
+  if (!other.figures) other.figures = statistics(other.field);
+  return *other.figures;
+}
+
 render::Renderer& Session::otherRenderer(const std::string& file, const Backend& backend) {
   Other& other = this->other(file);
   if (!other.renderer || other.backend != backend) other.renderer = makeRenderer(other.field, backend);

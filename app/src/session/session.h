@@ -92,6 +92,7 @@ class Session {
     Field field;
     std::filesystem::file_time_type written = {};  ///< modification time of the file when it was read
     std::optional<Jumps> jumps = {};
+    std::optional<FieldStatistics> figures = {};
     std::unique_ptr<render::Renderer> renderer = {};
     Backend backend = {};
   };
@@ -100,6 +101,7 @@ class Session {
   /// second field whose file was deleted is kept.
   bool forgetChangedOthers();
   const Jumps& otherJumps(const std::string& file);
+  const FieldStatistics& otherFigures(const std::string& file);
   render::Renderer& otherRenderer(const std::string& file, const Backend& backend);
 
   /// Returns the data that a colour mode needs in addition to the field: the jumps, the exact distance to `surface` for

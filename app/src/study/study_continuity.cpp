@@ -152,7 +152,8 @@ Study continuityStudy() {
   std::iota(counts.begin(), counts.end(), 1);
   std::vector<std::string> left = endParameters(
       {BuildSetting::Ending::tolerance, BuildSetting::Ending::otherQuantity, BuildSetting::Ending::steps});
-  left.insert(left.end(), {"enrich", "continuity", "continuity-weight", "blend-width", "bounds", "paper"});
+  left.insert(left.end(),
+              {"within", "certified", "enrich", "continuity", "continuity-weight", "blend-width", "bounds", "paper"});
   return {
       .name = "continuity",
       .help = paragraphs(R"(

@@ -69,7 +69,7 @@ Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& sam
   BuildOptions options = input.options;
   options.strategy = strategy;
   options.coefficients = CoefficientType::float64;
-  options.targetError = std::numeric_limits<double>::min();  // never reached: other limits end the construction
+  options.targetError = 0;  // none, at any scale: the number of coefficients ends the construction
   Json stages = Json::array();
   const auto inspect = [&](const Field& field) {
     const std::size_t coefficients = statistics(field).coefficients;
@@ -270,7 +270,9 @@ std::vector<Parameter> unweightedBuildParameters() {
   using Ending = BuildSetting::Ending;
   std::vector<std::string> left =
       endParameters({Ending::target, Ending::byDistance, Ending::tolerance, Ending::otherQuantity, Ending::steps});
-  left.insert(left.end(), {"near-distance", "strategy", "coefficients", "band", "bounds", "paper"});
+  // The criterion decides what is taken back at the end of a construction, which the curves do not show.
+  left.insert(left.end(), {"near-distance", "within", "certified", "strategy", "coefficients", "criterion", "band",
+                           "bounds", "paper"});
   std::vector<Parameter> parameters = buildParametersWithout(left);
   parameterNamed("nearness", parameters).defaultText = "0";
   return parameters;

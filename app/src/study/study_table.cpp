@@ -40,7 +40,7 @@ struct Level {
 constexpr std::array kLevels = {Level{render::ColorBy::degree, "degree", "Degree", &FieldStatistics::degreeVolume},
                                 Level{render::ColorBy::depth, "depth", "Depth", &FieldStatistics::depthVolume}};
 
-/// A picture of a slice through the middle of the domain, coloured by degree or depth, and a bar in the same colours.
+/// A picture of a slice through the middle of the surface, coloured by degree or depth, and a bar in the same colours.
 /// The bar shows which share of the domain's volume each degree or depth takes.
 struct LevelPicture {
   std::string png = {};     ///< bytes of the slice's PNG file
@@ -75,7 +75,7 @@ TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, c
 
 LevelPicture pictureOf(render::Renderer& renderer, const TableRow& row, const Level& level,
                        const std::vector<int>& levels) {
-  const render::SlicePicture picture{.plane = render::AxisPlane{2, defaultOffset(row.field.domain(), 2)},
+  const render::SlicePicture picture{.plane = render::AxisPlane{2, defaultOffset(shownBox(row.field), 2)},
                                      .color = level.color,
                                      .width = kThumbnail,
                                      .height = kThumbnail,
@@ -120,14 +120,15 @@ std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
           {"cells", grouped(row.figures.leaves) + exactCountText(row.figures)},
           {"τ", shortNumber(metadata.settings.targetError.weighted())},
           {"memory", bytesText(double(row.figures.bytes))},
-          {"estimated RMS", shortNumber(row.estimatedRms())},
+          {"weighted estimate (τ)", shortNumber(row.estimatedRms())},
           {"measured RMS", shortNumber(row.error.rms / row.scale())},
           {"measured max", shortNumber(row.error.max / row.scale())}};
 }
 
 constexpr const char* kErrorsNote =
     "Errors are at the scale where the mesh's longest side is 2; measured ones at random points in the domain. Bars: "
-    "shares of the volume by polynomial degree and by depth. Slices: through the middle, by degree and by depth.";
+    "shares of the volume by polynomial degree and by depth. Slices: through the middle of the surface, by degree and "
+    "by depth.";
 
 std::string markdownOf(const std::vector<TableRow>& rows) {
   std::string head = "|", rule = "|", body;

@@ -60,7 +60,7 @@ Arguments pointArguments(const Session& session, const Arguments& arguments, std
 TradeoffPoint tradeoffPoint(const Console& console, const BuildInput& input, const Arguments& buildArguments,
                             const Arguments& arguments, double target) {
   const auto start = std::chrono::steady_clock::now();
-  const BuildOptions options = buildOptions(buildArguments);
+  const BuildOptions options = buildOptions(buildArguments, input.exact->source().box.sizes().maxCoeff());
   return withProgress(console, [&](const Progress& progress) {
     const Field field = build(*input.exact, input.domain, options, progress);
     const double seconds = input.setUpSeconds + secondsSince(start);
@@ -286,8 +286,8 @@ void runTradeoff(Session& session, const Arguments& arguments) {
 std::vector<Parameter> rangeBuildParameters() {
   using Ending = BuildSetting::Ending;
   std::vector<std::string> left =
-      endParameters({Ending::target, Ending::byDistance, Ending::otherQuantity, Ending::steps});
-  left.emplace_back("near-distance");
+      endParameters({Ending::target, Ending::byDistance, Ending::tolerance, Ending::otherQuantity, Ending::steps});
+  left.insert(left.end(), {"near-distance", "within", "certified"});
   return buildParametersWithout(left);
 }
 

@@ -16,6 +16,7 @@
 #include "explorer/explorer.h"
 #include "files/text_file.h"
 #include "language/script.h"
+#include "session/field_summary.h"
 #include "window/live_work.h"
 #include "window/recording.h"
 
@@ -44,8 +45,8 @@ class Desktop {
   Desktop() {
     if (!glfwInit())
       throw Error(
-          fmt::format("no window can be opened here ({}): set DISPLAY, or write frames without one, by 'shot' in a "
-                      "script",
+          fmt::format("no window can be opened here ({}): set DISPLAY, or draw without a window, by 'hpsdf render' or "
+                      "by 'shot' in a script",
                       glfwProblem()));
   }
   ~Desktop() { glfwTerminate(); }
@@ -155,11 +156,14 @@ class Window {
   Window(Session& session, const WindowOptions& options)
       : explorer_(explorerOf(session)),
         screen_(options.width, options.height, options.title),
-        recording_(explorer_, {options.opening}),
         work_(explorer_, [this] { refresh(); }) {
     listen();
     const auto size = screen_.size().value_or(std::array{options.width, options.height});
-    explorer_.run(fmt::format("show size={}x{} {}", size[0], size[1], backendText(options.backend)));
+    const std::string show = fmt::format("show size={}x{} {}", size[0], size[1], backendText(options.backend));
+    explorer_.run(show);
+    openField(options.opening);
+    recording_.emplace(explorer_, std::vector{options.opening});
+    explorer_.run(show);
   }
 
   void run() {
@@ -178,7 +182,7 @@ class Window {
     return frame(1);
   }
 
-  const Recording& recording() const { return recording_; }
+  const Recording& recording() const { return *recording_; }
 
  private:
   bool ended() const { return glfwWindowShouldClose(screen_.window()) || InterruptGuard::interrupted(); }
@@ -312,8 +316,17 @@ class Window {
     }
   }
 
+  /// Shows in the window's title what the field is and how wrong it is.
+  void showTitle() {
+    const CurrentField& current = explorer_.session().current();
+    const std::string title = fmt::format("{} - {} - hpsdf", current.name, estimateLine(current.field));
+    if (title != title_) glfwSetWindowTitle(screen_.window(), title.c_str());
+    title_ = title;
+  }
+
   /// Draws and shows a frame. If `roughly` is true and the picture takes too long, it is drawn with fewer pixels.
   void draw(bool roughly) {
+    showTitle();
     const bool slow = roughly && fullSeconds_ > kSmoothSeconds;
     const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kSmoothSeconds))), 2, 4) : 1;
     const bool measures = explorer_.isStale() && shrink == 1;
@@ -321,6 +334,20 @@ class Window {
     const render::Image image = frame(shrink);
     if (measures) fullSeconds_ = std::chrono::duration<double>(Clock::now() - start).count();
     screen_.show(image);
+  }
+
+  /// Loads or builds the field. The window is there at once and shows the progress; closing it or Escape cancels the
+  /// work.
+  void openField(const std::string& opening) {
+    explorer_.work = Explorer::Work{"opening", 0, true};
+    screen_.show(explorer_.frame());
+    explorer_.work.reset();
+    try {
+      explorer_.run(opening);
+    } catch (const Error& error) {
+      throw Error(withoutPosition(error.what()));
+    }
+    if (ended()) throw Cancelled();
   }
 
   /// Handles input events and shows a frame while long work runs. Screenshots wait until the work has ended.
@@ -346,7 +373,7 @@ class Window {
     attempt([&] { explorer_.releaseInput(); });  // a released slider may start long work
     frame(1);                                    // if drawing fails, undoes changes of the view, also in the recording
     explorer_.message.clear();
-    recording_.notePointer();
+    recording_->notePointer();
   }
 
   /// Writes the frame to a file with the next unused name.
@@ -361,10 +388,11 @@ class Window {
 
   Explorer& explorer_;
   Screen screen_;
-  Recording recording_;
   LiveWork work_;
+  std::optional<Recording> recording_;       ///< begins once there is a field
   std::deque<std::optional<Input>> events_;  ///< waiting events; std::nullopt asks for a screenshot
   bool damaged_ = false;                     ///< true if the desktop has lost the window's content
+  std::string title_ = {};                   ///< title of the window; empty before the first frame
   double fullSeconds_ = 0;                   ///< time that the last picture in full resolution took
 };
 
@@ -372,9 +400,15 @@ class Window {
 
 std::size_t showWindow(Session& session, const WindowOptions& options) {
   const Desktop desktop;
-  runScript(session, parseScript(session.registry(), "view", options.opening, {}));
   const InterruptGuard guard;
-  Window window(session, options);
+  std::optional<Window> shown;
+  try {
+    shown.emplace(session, options);
+  } catch (const Cancelled&) {
+    if (InterruptGuard::interrupted()) throw;
+    return 0;  // the user closed the window before there was a field
+  }
+  Window& window = *shown;
   const auto write = [&] {
     if (options.record) writeTextFile(*options.record, window.recording().script());
   };

@@ -19,8 +19,9 @@ struct WindowOptions {
   std::optional<std::string> shot;    ///< file for the last frame, *.png
 };
 
-/// Shows the window until the user closes it or presses Ctrl-C. Returns the number of recorded lines. Throws
-/// `Error`, before the field is made, if there is no display or if the program was built without GLFW.
+/// Shows the window until the user closes it or presses Ctrl-C. It shows the progress while the field is loaded or
+/// built; if the user closes it then, nothing is written. Returns the number of recorded lines. Throws `Error`, before
+/// the field is made, if there is no display or if the program was built without GLFW.
 std::size_t showWindow(Session& session, const WindowOptions& options);
 
 /// Adds the command `view`, which shows the explorer in a window.

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "construction/surface.h"
+#include "construction/file_kind.h"
 #include "explorer/view_state.h"
 #include "hpsdf/detail/output_file.h"
 #include "pictures/picture_arguments.h"
@@ -15,7 +15,7 @@ namespace {
 void runView(Session& session, const Arguments& arguments) {
   const std::string field = arguments.text("field");
   WindowOptions options;
-  const bool made = !isShape(field) && lowerExtension(field) == ".hpsdf";
+  const bool made = kindOfFile(field) == FileKind::field;
   options.opening = (made ? "load " : "build ") + scriptWord(field);
   options.backend = backend(arguments);
   options.width = arguments.size("size")[0];
@@ -45,7 +45,7 @@ void addWindowCommand(Registry& registry) {
       .summary = "Look at a field in a window: turn it, cut it, colour it, build it anew.",
       .help = paragraphs(R"(
 FIELD is a field's file (*.hpsdf), or what 'build' takes: a mesh, builtin:SHAPE or analytic:SHAPE, from which a field is
-built with the default settings first.
+built with the default settings first; the window shows the progress, and closing it cancels the construction.
 
 Mouse over the picture: drag to turn the surface or move the slice, drag with the right button to move the surface,
 wheel to go nearer or farther, hover to read out what is there. In the panels: Ctrl+click a slider to type its number,

@@ -42,6 +42,29 @@ class Error : public std::runtime_error {
   ErrorKind kind_ = ErrorKind::general;
 };
 
+/// Thrown if a construction needs more memory than `BuildOptions::memoryLimit` or the machine allows. It is of the kind
+/// `limit`.
+class MemoryLimitError : public Error {
+ public:
+  /// `shortage` tells what is needed and how to need less. `enough` is a memory limit in bytes that is likely to
+  /// suffice, or 0 if it is more than the machine allows.
+  MemoryLimitError(const std::string& shortage, std::uint64_t enough)
+      : Error(ErrorKind::limit, "",
+              shortage + (enough > 0 ? ", or allow more memory: a memoryLimit of " + std::to_string(enough) +
+                                           " bytes is likely to suffice"
+                                     : "; this machine has not enough memory")),
+        shortage_(shortage),
+        enough_(enough) {}
+
+  /// Returns the message without what it says of memory limits.
+  const std::string& shortage() const { return shortage_; }
+  std::uint64_t enough() const { return enough_; }
+
+ private:
+  std::string shortage_;
+  std::uint64_t enough_;
+};
+
 /// Thrown by a long operation if its `Progress` asks it to stop. The stopped operation has written no output.
 class Cancelled : public std::runtime_error {
  public:

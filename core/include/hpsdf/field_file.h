@@ -17,4 +17,7 @@ void save(const Field& field, const std::filesystem::path& file);
 /// a `.hpsdf` file.
 Field load(const std::filesystem::path& file);
 
+/// Tells whether a file begins as files that `save` wrote do. Returns false for a file that cannot be read.
+bool isFieldFile(const std::filesystem::path& file);
+
 }  // namespace hpsdf

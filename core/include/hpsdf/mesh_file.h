@@ -38,6 +38,9 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// for float, or has no area.
 ImportedMesh importMesh(const std::filesystem::path& file);
 
+/// Tells whether a file's name ends as the names of mesh files that `importMesh` reads.
+bool isMeshFileName(const std::filesystem::path& file);
+
 /// Returns the spacing, in mesh units, to which assimp rounds the coordinates of `mesh` when it reads them from
 /// `file`: the spacing of `float` numbers at the largest coordinate. Coordinates that are written with exponents
 /// may be off by twice this spacing. Returns 0 if `file` itself holds floats (3DS, glTF, binary STL and most

@@ -67,7 +67,8 @@ BuildOptions settled(BuildOptions options, const DistanceFunction& distance, con
     const ExactEstimate estimate = exactEstimate(distance, options, domain, kMostNodesOfAutomatic, progress);
     if (estimate.nodes > kMostNodesOfAutomatic) options.strategy = Strategy::hp;
   } else if (options.exactTolerance == 0) {  // polynomials in place of lists would be unknown to the estimate
-    requireMemoryForExact(exactEstimate(distance, options, domain, mostNodes(options), progress), options);
+    // The estimate goes on to what the machine allows, so that an error can name the memory that suffices.
+    requireMemoryForExact(exactEstimate(distance, options, domain, mostNodes({}), progress), distance.bytes(), options);
   }
   return options;
 }

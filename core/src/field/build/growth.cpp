@@ -114,8 +114,9 @@ class Growth {
       tree.addBaseCells();
       if (setup_.exactCells) {
         const auto smooth = [&](const Box& cell) { return smoothFit(cell); };
-        placeExactLeaves(tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress,
-                         [&](const ExactEstimate& soFar) { requireMemoryForExact(soFar, setup_.options); });
+        placeExactLeaves(
+            tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress,
+            [&](const ExactEstimate& soFar) { requireMemoryForExact(soFar, setup_.distance.bytes(), setup_.options); });
       }
     }
     const std::size_t count = tree.nodes.size();

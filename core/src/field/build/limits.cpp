@@ -19,6 +19,16 @@ double allowedMemory(const BuildOptions& options) {
   return options.memoryLimit ? std::min(most, double(*options.memoryLimit)) : most;
 }
 
+/// Throws a `MemoryLimitError` whose message is made of the parts. `enough` are the bytes that are likely to suffice;
+/// the limit that is suggested is some more, with two significant digits.
+template <typename... Parts>
+[[noreturn]] void refuseMemory(double enough, const Parts&... parts) {
+  constexpr double kSpare = 1.2;
+  const double unit = std::pow(10, std::floor(std::log10(kSpare * enough)) - 1);
+  const double limit = std::ceil(kSpare * enough / unit) * unit;
+  throw MemoryLimitError(messageOf(parts...), limit <= hpsdf::allowedMemory() ? std::uint64_t(limit) : 0);
+}
+
 /// Returns a number of cells as rounded text for messages.
 std::string cellsText(double cells) {
   constexpr double kFew = 1e4;
@@ -132,6 +142,7 @@ int mostDegree(const BuildOptions& options) {
 static void requireGridMemory(const BuildOptions& options) {
   const double cells = double(options.grid[0]) * options.grid[1] * options.grid[2];
   const double bytesPerCell = kBytesPerNode + kBytesPerCoefficient * coefficientCount(startDegree(options));
+  constexpr double kGridRoom = 2;  // the octree takes some memory besides the grid
   const double allowed = allowedMemory(options), byMemory = allowed / bytesPerCell;
   const double byNumbers = 0xffffffff / double(coefficientCount(startDegree(options)));
   if (cells <= std::min(byMemory, byNumbers)) return;
@@ -142,8 +153,8 @@ static void requireGridMemory(const BuildOptions& options) {
     refuse(grid.str(), "with more than 2^32 coefficients: take at most ", std::floor(std::cbrt(byNumbers)), " an axis");
   grid << "and would need " << bytesText(cells * bytesPerCell) << ", more than the " << bytesText(allowed)
        << " allowed: ";
-  if (byMemory < 1) refuse(grid.str(), "allow more memory");
-  refuse(grid.str(), "take at most ", std::floor(std::cbrt(byMemory)), " an axis, or allow more memory");
+  refuseMemory(kGridRoom * cells * bytesPerCell, grid.str(), "take at most ",
+               std::max(1.0, std::floor(std::cbrt(byMemory))), " an axis");
 }
 
 std::size_t ByteBudget::finalCoefficients(const Fit& fit) const {
@@ -155,31 +166,36 @@ void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
   // serves to refuse a construction that chases noise soon after its start; the lower bound passes the allowed memory
   // only when most of the time is spent.
   constexpr double kLikelyTolerance = 50;
+  constexpr double kRoomBesideDistance = 1e8;  // enough for most meshes at usual settings
   const double fixed = double(need.fixedBytes), most = allowedMemory(options);
   if (fixed > most)
-    refuse("the distance that the field is made from holds ", bytesText(fixed), " of memory, more than the ",
-           bytesText(most), " allowed: simplify the mesh, or allow more memory");
+    refuseMemory(fixed + kRoomBesideDistance, "the distance that the field is made from holds ", bytesText(fixed),
+                 " of memory, more than the ", bytesText(most), " allowed: simplify the mesh");
   const double bytes = kBytesPerNode * double(need.nodes) + kBytesPerCoefficient * double(need.coefficients);
   const bool isLikelyTooMuch = fixed + bytes * need.likelyFactor > kLikelyTolerance * most;
   const double factor = isLikelyTooMuch ? std::max(need.likelyFactor, need.growthFactor) : need.growthFactor;
   const double finally = fixed + bytes * factor;
   if (fixed + bytes <= most && finally <= kTolerance * most) return;
-  refuse("about ", cellsText(double(need.nodes) * factor), " and ", bytesText(finally),
-         " of memory are needed, more than the ", bytesText(most),
-         " allowed: take a larger target error or a lower maximum depth, or allow more memory");
+  refuseMemory(fixed + bytes * std::max(need.likelyFactor, need.growthFactor), "about ",
+               cellsText(double(need.nodes) * factor), " and ", bytesText(finally),
+               " of memory are needed, more than the ", bytesText(most),
+               " allowed: take a larger target error or a lower maximum depth");
 }
 
 double mostNodes(const BuildOptions& options) {
   return kOverestimateBySamples * allowedMemory(options) / kBytesPerNode;
 }
 
-void requireMemoryForExact(const ExactEstimate& estimate, const BuildOptions& options) {
+void requireMemoryForExact(const ExactEstimate& estimate, std::size_t fixedBytes, const BuildOptions& options) {
   // Lists are in memory twice when the arrays of the field are made.
   const double bytes = kBytesPerNode * estimate.nodes + 2 * estimate.listBytes, most = allowedMemory(options);
   if (bytes <= estimate.overestimate * most) return;
-  refuse("the exact cells near the surface need more than the ", bytesText(most),
-         " of memory allowed: take strategy hp, more exact-triangles a cell, a smaller exact-within or a lower maximum "
-         "depth, or allow more memory");
+  // An estimate from samples is of all exact leaves. A count is of those so far; samples suggested that all take at
+  // most this many times the limit.
+  const double all = estimate.overestimate > 1 ? bytes : std::max(bytes, kOverestimateBySamples * most);
+  refuseMemory(double(fixedBytes) + all, "the exact cells near the surface need more than the ", bytesText(most),
+               " of memory allowed: take strategy hp, more exact-triangles a cell, a smaller exact-within or a lower "
+               "maximum depth");
 }
 
 double referenceLength(const Source& source, const Box& domain) {

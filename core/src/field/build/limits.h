@@ -47,8 +47,9 @@ void requireMemory(const MemoryNeed& need, const BuildOptions& options);
 /// Returns the number of nodes that an estimated octree may have without being refused.
 double mostNodes(const BuildOptions& options);
 
-/// Throws `Error` if the exact leaves exceed the allowed memory, or certainly will.
-void requireMemoryForExact(const ExactEstimate& estimate, const BuildOptions& options);
+/// Throws `Error` if the exact leaves exceed the allowed memory, or certainly will. `fixedBytes` are held besides the
+/// octree; they count only in the memory that the error suggests.
+void requireMemoryForExact(const ExactEstimate& estimate, std::size_t fixedBytes, const BuildOptions& options);
 
 /// Computes the bytes of the finished field from its numbers of nodes and coefficients. The lookup grid and the
 /// triangles of exact leaves do not count.

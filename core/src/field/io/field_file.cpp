@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -193,6 +194,12 @@ void save(const Field& field, const std::filesystem::path& file) {
   write(data.exact.triangles);
   write(data.exact.lists);
   writer.finish();
+}
+
+bool isFieldFile(const std::filesystem::path& file) {
+  std::array<char, kFieldMagic.size()> first{};
+  std::ifstream stream(file, std::ios::binary);
+  return stream.read(first.data(), first.size()) && std::ranges::equal(first, kFieldMagic);
 }
 
 Field load(const std::filesystem::path& file) {

@@ -41,7 +41,7 @@ void requireReadable(const fs::path& file) {
   if (!fs::is_regular_file(status)) refuse("not a regular file; name a mesh file");
 
   const std::string extension = lowerExtension(file);
-  if (std::ranges::find(kExtensions, extension) == kExtensions.end()) {
+  if (!hasKnownExtension(file)) {
     std::string known;
     for (const std::string_view e : kExtensions) known += (known.empty() ? "" : ", ") + std::string(e);
     refuse((extension.empty() ? "no extension" : "unknown format " + extension) + "; a mesh file ends in one of " +
@@ -264,6 +264,10 @@ TriangleMesh readByAssimp(const fs::path& file) {
   requireSoundHeader(file);
   Assimp::Importer importer;
   return joined(readScene(importer, file), file);
+}
+
+bool hasKnownExtension(const fs::path& file) {
+  return std::ranges::find(kExtensions, lowerExtension(file)) != kExtensions.end();
 }
 
 bool mayExceedFloat(const fs::path& file) {

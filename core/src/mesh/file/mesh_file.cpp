@@ -143,6 +143,8 @@ double coordinateSpacing(const fs::path& file, const TriangleMesh& mesh) {
   return box.isEmpty() || !mesh::mayExceedFloat(file) ? 0 : floatSpacing(largestCoordinate(box));
 }
 
+bool isMeshFileName(const fs::path& file) { return mesh::hasKnownExtension(file); }
+
 ImportedMesh importMesh(const fs::path& file) {
   ImportedMesh result = cleaned(mesh::readByAssimp(file), file);
   result.mesh.name = file.filename().string();

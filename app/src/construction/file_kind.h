@@ -1,0 +1,16 @@
+#pragma once
+// What a file or a name stands for: a field, a surface from which a field can be built, or neither.
+
+#include <cstdint>
+#include <string>
+
+namespace hpsdf::app {
+
+enum class FileKind : std::uint8_t { field, surface, unknown };
+
+/// Tells what `name` stands for. A shape's name, such as builtin:torus, is a surface. A file that can be read is a
+/// field if it begins as field files do. All other names, also those of files that do not exist yet, are told apart by
+/// their ends.
+FileKind kindOfFile(const std::string& name);
+
+}  // namespace hpsdf::app
