@@ -350,7 +350,7 @@ TEST(Arguments, definePictures) {
   EXPECT_EQ(surface.camera.distance, standard.distance);
 }
 
-TEST(Pictures, defaultOffsetsAreShortNumbersNearTheMiddle) {
+TEST(DefaultOffset, isAShortNumberNearTheMiddle) {
   const auto offset = [](double low, double high) {
     return defaultOffset(Box(Vector3::Constant(low), Vector3::Constant(high)), 2);
   };
