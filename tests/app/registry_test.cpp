@@ -386,7 +386,7 @@ TEST(Help, showsOptionsByGroupAndAdvancedOnesOnRequest) {
   const Registry registry = makeRegistry();
   const Command& build = registry.command("build");
   const std::string common = commandHelp(build, HelpDetail::common), all = commandHelp(build, HelpDetail::all);
-  EXPECT_THAT(common, HasSubstr("\nWhat you ask for:\n  --target-error NUMBER\n"));
+  EXPECT_THAT(common, HasSubstr("\nWhat you ask for:\n  --tolerance NUMBER\n"));
   EXPECT_THAT(common, HasSubstr("--outer-hull"));
   EXPECT_EQ(common.find("--nearness-kind"), std::string::npos);
   EXPECT_THAT(common, HasSubstr("\n'hpsdf build --help-all' also explains "));

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "field/cells/cell_bounds.h"
-#include "field/cells/cell_lattice.h"
 #include "field/cells/surface_points.h"
+#include "field/tolerance/cell_lattice.h"
 #include "hpsdf/build.h"
 #include "hpsdf/detail/exact_samples.h"
 #include "hpsdf/exact_distance.h"

@@ -270,15 +270,21 @@ void addBuildCommand(Registry& registry) {
 MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), the mesh of a built-in shape (builtin:SHAPE,parameter=value,…) or a
 shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes' lists the shapes.
 
-The construction refines the worst cell, by a higher degree or by eight children, until the weighted squared error over
-the domain falls below the target error τ. As in the paper, τ refers to a mesh whose longest side is 2. A mesh with the
-longest side L is built for τ·(L/2)^5, so that the same τ gives the same cells whether its units are metres or
-millimetres. One hundredth of τ gives about one tenth of the RMS error.
+Say how exact the field must be with --tolerance: 0.01 in the mesh's units, or 0.02% of its longest side. The error of the
+distance then exceeds it nowhere within --within of the surface; farther away 1 % of the further distance is allowed in
+addition. Of all fields within the tolerance, the one that takes the fewest bytes is built. Early in the construction a
+line says how many bytes and seconds it will take.
+
+Without a tolerance, the construction is that of the paper: it refines the worst cell, by a higher degree or by eight
+children, until the weighted squared error over the domain falls below the target error τ. As in the paper, τ refers to
+a mesh whose longest side is 2. A mesh with the longest side L is built for τ·(L/2)^5, so that the same τ gives the same
+cells whether its units are metres or millimetres. One hundredth of τ gives about one tenth of the RMS error.
 
 The finished field is measured against the exact distance at 20,000 to 100,000 random points: the RMS and the greatest
 error near the surface and over the domain, points on the wrong side, and the share of the surface that cracks between
-cells tear. The field keeps these figures, and 'hpsdf info' shows them. Where a measured error exceeds --near-error,
---far-error or --max-error, the field is written all the same, the last line says so, and the exit status is 1.
+cells tear. The field keeps these figures, and 'hpsdf info' shows them. Where the tolerance is missed, or a measured error
+exceeds --near-error, --far-error or --max-error, the field is written all the same, the last line says so, and the exit
+status is 1.
 
 The inside is what the mesh encloses. Where that is not certain, because the mesh has holes or intersects itself, a line
 reports which inside test was chosen (see --sign). Ctrl-C stops the construction without writing a field; with
@@ -289,7 +295,7 @@ With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, and one line 
 result. A mesh that fails does not stop the others; the exit status is 3 then. Fields that exist already, made from the
 same contents with the same options, are skipped. Any number of processes may share one list and one folder: each mesh
 is built by one of them. docs/batch.md shows how, also with GNU parallel and Slurm.)"),
-      .examples = {"hpsdf build bunny.obj -o bunny.hpsdf",
+      .examples = {"hpsdf build part.stl -o part.hpsdf --tolerance 0.02%", "hpsdf build bunny.obj -o bunny.hpsdf",
                    "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
                    "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
                    "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint",

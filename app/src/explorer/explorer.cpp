@@ -119,6 +119,8 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   for (const BuildSetting& setting : buildSettings()) {
     const std::string text = settingText(setting, built);
     const bool isStored = setting.storedAt > 0 || setting.name == "grid";
+    const bool ofTolerance = setting.name == "tolerance" || setting.owner == "tolerance";
+    if (built.tolerance > 0 && !ofTolerance && !setting.hasEffectWithTolerance) continue;
     if (setting.isOffered && !text.empty() && (isStored || text != defaultText(setting)))
       settings[std::string(setting.name)] = text;
   }

@@ -26,9 +26,15 @@ struct SampleOptions {
   int threads = 0;  ///< greatest number of threads; 0: all that the machine offers
 };
 
+/// Thrown where hardly any point of the domain is as close to the surface as asked.
+class NoSamplesError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// Draws random points and evaluates the signed distance Φ (`distance`) at them. The points are uniform in the domain
-/// or, if `band` is above 0, in the part of the domain where |Φ| ≤ `band`. Throws `Error` if no such point is found or
-/// if Φ is not finite. Throws `Cancelled` when `progress` says so.
+/// or, if `band` is above 0, in the part of the domain where |Φ| ≤ `band`. Throws `NoSamplesError` if no such point is
+/// found, and `Error` if Φ is not finite. Throws `Cancelled` when `progress` says so.
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band = 0,
                            const SampleOptions& options = {}, const Progress& progress = {});
 
@@ -38,8 +44,8 @@ std::vector<Vector3> sampleSurface(const TriangleMesh& surface, const Box& domai
 
 /// Draws random points near a surface and evaluates the signed distance Φ (`distance`) at them. Each point is a
 /// uniformly distributed point of the surface plus a vector that is uniformly distributed in a ball of `radius` (above
-/// 0). A point outside the domain is drawn again. Throws `Error` if hardly any point lies in the domain, if the surface
-/// has no area or if Φ is not finite. Throws `Cancelled` when `progress` says so.
+/// 0). A point outside the domain is drawn again. Throws `NoSamplesError` if hardly any point lies in the domain, and
+/// `Error` if the surface has no area or if Φ is not finite. Throws `Cancelled` when `progress` says so.
 ExactSamples sampleNear(const DistanceFunction& distance, const TriangleMesh& surface, const Box& domain, double radius,
                         const SampleOptions& options = {}, const Progress& progress = {});
 

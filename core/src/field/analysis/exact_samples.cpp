@@ -75,7 +75,7 @@ std::vector<double> distancesAt(const DistanceFunction& distance, const std::vec
 }
 
 /// Draws candidate points draw(0), draw(1), … until `options.count` of them are accepted. A candidate must lie
-/// in the domain and, if `band` is above 0, in the narrow band. Throws `Error` with `noneMessage` if too few
+/// in the domain and, if `band` is above 0, in the narrow band. Throws `NoSamplesError` with `noneMessage` if too few
 /// candidates are accepted.
 template <typename Draw>
 ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, double band, const SampleOptions& options,
@@ -83,7 +83,7 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
   if (options.count >= std::size_t{1} << 32) throw Error("too many points; give fewer than 4,294,967,296");
   ExactSamples samples;
   for (std::size_t drawn = 0; samples.points.size() < options.count;) {
-    if (drawn > kMaxCandidates * (samples.points.size() + 1)) throw Error(noneMessage);
+    if (drawn > kMaxCandidates * (samples.points.size() + 1)) throw NoSamplesError(noneMessage);
     const std::size_t missing = options.count - samples.points.size();
     std::vector<Vector3> round(drawn == 0 ? missing : 2 * missing);
     tbb::parallel_for(std::size_t{0}, round.size(), [&](std::size_t n) { round[n] = draw(drawn + n); });
@@ -159,7 +159,7 @@ ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, 
       return drawSamples(distance, domain, band, options, progress, noneMessage,
                          [&](std::uint64_t n) { return detail::Random(options.seed, n).inBox(domain); });
     const std::vector<Box> blocks = blocksInBand(distance, domain, band);
-    if (blocks.empty()) throw Error(noneMessage);
+    if (blocks.empty()) throw NoSamplesError(noneMessage);
     return drawSamples(distance, domain, band, options, progress, noneMessage, [&](std::uint64_t n) {
       detail::Random random(options.seed, n);
       const double block = random.unit() * static_cast<double>(blocks.size());

@@ -88,7 +88,7 @@ ExactSamples samplesNear(const DistanceFunction& distance, const std::optional<T
   try {
     if (surface) return sampleNear(distance, *surface, domain, near, options, progress);
     return sampleUniform(distance, domain, near, options, progress);
-  } catch (const Error&) {
+  } catch (const NoSamplesError&) {
     return {};
   }
 }

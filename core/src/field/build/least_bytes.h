@@ -12,7 +12,7 @@
 #include "field/build/limits.h"
 #include "field/cells/build_tree.h"
 #include "field/cells/exact_leaves.h"
-#include "field/cells/tolerance_fit.h"
+#include "field/tolerance/tolerance_fit.h"
 
 namespace hpsdf::detail {
 

@@ -1,4 +1,4 @@
-#include "field/cells/tolerance_fit.h"
+#include "field/tolerance/tolerance_fit.h"
 
 #include <array>
 #include <limits>

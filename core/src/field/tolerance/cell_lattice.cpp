@@ -1,4 +1,4 @@
-#include "field/cells/cell_lattice.h"
+#include "field/tolerance/cell_lattice.h"
 
 #include <Eigen/QR>
 
