@@ -139,9 +139,8 @@ void Explorer::setSetting(const std::string& name, const std::string& value) {
   settings_[name] = value;
 }
 
-void Explorer::rebuild(std::optional<int> maxSteps) {
-  std::map<std::string, std::string> settings = settingsOfField();
-  if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
+/// Removes settings of the field that the settings of the next rebuild replace, or on which these leave no effect.
+void Explorer::removeWithoutEffect(std::map<std::string, std::string>& settings) const {
   const bool isWithinTolerance =
       settings_.contains("tolerance") || (settings.contains("tolerance") && !settings_.contains("target-error"));
   for (const BuildSetting& setting : buildSettings()) {
@@ -150,6 +149,12 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
     if (isWithinTolerance ? !ofTolerance && !setting.hasEffectWithTolerance : ofTolerance)
       settings.erase(std::string(setting.name));
   }
+}
+
+void Explorer::rebuild(std::optional<int> maxSteps) {
+  std::map<std::string, std::string> settings = settingsOfField();
+  if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
+  removeWithoutEffect(settings);
   for (const auto& [name, value] : settings_) settings[name] = value;
   // If the settings name a kind of continuity (weak, exact, both or none), drop the parameters of the kinds not named.
   const auto continuity = settings_.find("continuity");

@@ -119,6 +119,7 @@ class Explorer final : public SessionExtension {
   std::string pictureKey() const;
   /// Returns the `build` parameters that made the current field, as far as the field's metadata record them.
   std::map<std::string, std::string> settingsOfField() const;
+  void removeWithoutEffect(std::map<std::string, std::string>& settings) const;
   void drawPicture(int shrink);
   render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
                       const render::ScaleOptions& scale, int shrink) const;
