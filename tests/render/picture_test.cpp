@@ -287,6 +287,17 @@ TEST(Legend, namesExactLeaves) {
   EXPECT_EQ(describeLevels({{kExactDegree, 1}}), "exact");
 }
 
+TEST(Picture, tellsWhatErrorWasAskedFor) {
+  FieldData data;
+  data.domain = Box(Vector3::Constant(-1), Vector3::Constant(1));
+  data.nodes = {node::leaf(0, 0)};
+  data.coefficients = std::vector<double>{1};
+  data.metadata.settings.targetError = 2e-6;
+  EXPECT_EQ(describeTarget(Field(data)), "τ = 2e-6");
+  data.metadata.settings.tolerance = 0.25;
+  EXPECT_EQ(describeTarget(Field(data)), "tolerance 0.25");
+}
+
 TEST(Picture, differsForAnotherField) {
   const Field right = planeField({2, 3, 5}), wrong = planeField({3, 2, 5});
   FakeRenderer ofRight(right), ofWrong(wrong);

@@ -4,6 +4,7 @@
 #include "explorer/worst_places.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/field.h"
+#include "session/field_summary.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -136,9 +137,13 @@ void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures
       {"cells", grouped(figures.leaves)},
       {"coefficients", grouped(figures.coefficients)},
       {"memory", bytesText(double(figures.bytes))},
-      {"target error τ", shortNumber(field.metadata().settings.targetError.weighted())},
-      {"weighted estimate (τ)", shortNumber(field.metadata().totalError)},
   };
+  if (hasTolerance(field)) {
+    rows.emplace_back("tolerance", shortNumber(field.metadata().settings.tolerance));
+  } else {
+    rows.emplace_back("target error τ", shortNumber(field.metadata().settings.targetError.weighted()));
+    rows.emplace_back("weighted estimate (τ)", shortNumber(field.metadata().totalError));
+  }
   if (const std::optional<Measurement>& m = field.metadata().measurement) {
     rows.emplace_back("RMS error near surface", shortNumber(m->near.rms));
     rows.emplace_back("greatest near surface", shortNumber(m->near.max));

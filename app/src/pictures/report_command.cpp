@@ -105,9 +105,13 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
                     fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));
   if (counts.exact.leaves > 0) rows.emplace_back("Exact triangles", exactTrianglesText(counts.exact));
   rows.emplace_back("Memory", memoryText(field));
-  rows.emplace_back("Target error τ", shortNumber(metadata.settings.targetError.weighted()));
-  rows.emplace_back("Total error ε",
-                    fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));
+  if (hasTolerance(field)) {
+    rows.emplace_back("Tolerance", toleranceText(field));
+  } else {
+    rows.emplace_back("Target error τ", shortNumber(metadata.settings.targetError.weighted()));
+    rows.emplace_back("Total error ε",
+                      fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));
+  }
   if (const std::optional<Measurement>& m = metadata.measurement) {
     const auto row = [&](const char* label, const Measurement::Error& error) {
       const double side = metadata.referenceLength;

@@ -176,8 +176,9 @@ std::string measuredText(const Field& field) {
 std::string estimateLine(const Field& field) {
   const FieldMetadata& metadata = field.metadata();
   const std::optional<Measurement>& m = metadata.measurement;
-  return fmt::format("weighted estimate (τ) {}, {}", shortNumber(metadata.totalError),
-                     m ? "measured near the surface " + errorText(m->near) : "not measured");
+  const std::string asked = hasTolerance(field) ? "tolerance " + shortNumber(metadata.settings.tolerance)
+                                                : "weighted estimate (τ) " + shortNumber(metadata.totalError);
+  return fmt::format("{}, {}", asked, m ? "measured near the surface " + errorText(m->near) : "not measured");
 }
 
 Json measuredJson(const Field& field) {

@@ -29,7 +29,9 @@ std::string describeSource(const Field& field) {
 }
 
 std::string describeTarget(const Field& field) {
-  return "τ = " + formatNumber(field.metadata().settings.targetError.weighted(), 3);
+  const BuildOptions& settings = field.metadata().settings;
+  if (settings.tolerance > 0) return "tolerance " + formatNumber(settings.tolerance, 3);
+  return "τ = " + formatNumber(settings.targetError.weighted(), 3);
 }
 
 std::string describePlane(const std::string& name, const Plane& plane) {

@@ -121,7 +121,7 @@ class ToleranceBuild {
   /// Estimates what the whole construction takes from the tasks that are done. Reports it once, and throws `Error` if
   /// it is more than the memory allows.
   void forecast(std::size_t done) {
-    constexpr std::size_t kShare = 20;  // the forecast is made after one of so many tasks
+    constexpr std::size_t kShare = 14;  // the forecast is made after one of so many tasks
     for (; summed_ < done; ++summed_) taskBytes_ += tasks_[summed_].cell->bytes;
     const double scale = double(tasks_.size()) / double(done), bytes = taskBytes_ * scale;
     // Cells are in memory as they are built, and again as the arrays of the field are made.
