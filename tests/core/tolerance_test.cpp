@@ -26,7 +26,7 @@ namespace tolerance_test {
 double greatestRatio(const Field& field, const DistanceFunction& distance, const TriangleMesh& surface) {
   const FieldMetadata& metadata = field.metadata();
   const AllowedError allowed = allowedError(metadata.settings, metadata.referenceLength);
-  const SampleOptions options{.count = 200'000, .seed = 3};
+  const SampleOptions options{.count = 50'000, .seed = 3};
   double greatest = 0;
   for (const ExactSamples& samples : {sampleNear(distance, surface, field.domain(), allowed.within, options),
                                       sampleUniform(distance, field.domain(), 0, options)}) {
@@ -47,11 +47,11 @@ TEST(Tolerance, allowsMoreFarFromTheSurface) {
 }
 
 TEST(Tolerance, isKept) {
-  for (const char* shape : {"torus,segments=48,sides=24", "gear,teeth=7", "sphere"}) {
+  for (const char* shape : {"torus,segments=24,sides=12", "gear,teeth=5"}) {
     const TriangleMesh mesh = shapes::mesh(shape);
     const ExactDistance distance(mesh);
     std::size_t before = 0;
-    for (const double tolerance : {0.02, 0.002}) {
+    for (const double tolerance : {0.03, 0.006}) {
       SCOPED_TRACE(std::string(shape) + ", tolerance " + std::to_string(tolerance));
       const Field field = build(distance, domainAround(mesh), {.tolerance = tolerance});
       EXPECT_LE(greatestRatio(field, distance, mesh), 1);
@@ -84,17 +84,17 @@ TEST(Tolerance, takesExactLeavesWhereTheseAreSmaller) {
   EXPECT_GT(statistics(field).exact.leaves, 100U);
   EXPECT_LT(field.bytes(), 12'000U);
   const DistanceFunction withoutTriangles([&](const Vector3& x) { return distance(x); }, distance.source());
-  const Field polynomials = build(withoutTriangles, domainAround(mesh), {.tolerance = 4e-3});
+  const Field polynomials = build(withoutTriangles, domainAround(mesh), {.tolerance = 2e-2});
   EXPECT_EQ(statistics(polynomials).exact.leaves, 0U);
-  EXPECT_GT(polynomials.bytes(), 10 * field.bytes());
+  EXPECT_GT(polynomials.bytes(), 2 * field.bytes());
   EXPECT_LE(greatestRatio(polynomials, withoutTriangles, mesh), 1);
 }
 
 TEST(Tolerance, doesNotDependOnThreads) {
   const TriangleMesh mesh = shapes::mesh("gear,teeth=7");
   const ExactDistance distance(mesh);
-  const Field one = build(distance, domainAround(mesh), {.tolerance = 0.004, .threads = 1});
-  const Field all = build(distance, domainAround(mesh), {.tolerance = 0.004});
+  const Field one = build(distance, domainAround(mesh), {.tolerance = 0.01, .threads = 1});
+  const Field all = build(distance, domainAround(mesh), {.tolerance = 0.01});
   EXPECT_EQ(one.data().nodes, all.data().nodes);
   EXPECT_EQ(one.data().coefficients, all.data().coefficients);
   EXPECT_EQ(one.data().exact.lists, all.data().exact.lists);
@@ -144,7 +144,7 @@ TEST(Tolerance, saysWhereItCannotBeKept) {
 }
 
 TEST(Tolerance, foretellsBytesOnceAndEarly) {
-  const TriangleMesh mesh = shapes::mesh("gear,teeth=24");
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=9");
   const ExactDistance distance(mesh);
   std::vector<Forecast> forecasts;
   double fraction = 0, fractionThen = 1;
@@ -154,7 +154,7 @@ TEST(Tolerance, foretellsBytesOnceAndEarly) {
                                 forecasts.push_back(forecast);
                                 fractionThen = fraction;
                               }};
-  const Field field = build(distance, domainAround(mesh), {.tolerance = 5e-4}, progress);
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 2e-3}, progress);
   ASSERT_EQ(forecasts.size(), 1U);
   EXPECT_LE(fractionThen, 0.1);
   EXPECT_GT(forecasts[0].seconds, 0);
@@ -163,9 +163,9 @@ TEST(Tolerance, foretellsBytesOnceAndEarly) {
 }
 
 TEST(Tolerance, isRefusedEarlyWhereMemoryIsShort) {
-  const TriangleMesh mesh = shapes::mesh("torus,segments=96,sides=48");
+  const TriangleMesh mesh = shapes::mesh("torus,segments=24,sides=12");
   const ExactDistance distance(mesh);
-  const BuildOptions options{.tolerance = 1e-6, .memoryLimit = distance.bytes() + 3'000'000};
+  const BuildOptions options{.tolerance = 1e-6, .memoryLimit = distance.bytes() + 500'000};
   double fraction = 0;
   try {
     build(distance, domainAround(mesh), options,
@@ -178,12 +178,12 @@ TEST(Tolerance, isRefusedEarlyWhereMemoryIsShort) {
 }
 
 TEST(Tolerance, canBeCertified) {
-  const TriangleMesh mesh = shapes::mesh("torus,segments=24,sides=12");
+  const TriangleMesh mesh = shapes::mesh("torus,segments=16,sides=8");
   const ExactDistance distance(mesh);
-  const BuildOptions checked{.tolerance = 0.01}, certified{.tolerance = 0.01, .certified = true};
+  const BuildOptions checked{.tolerance = 0.02}, certified{.tolerance = 0.02, .certified = true};
   const Field field = build(distance, domainAround(mesh), certified);
   EXPECT_TRUE(field.metadata().settings.certified);
-  EXPECT_LE(field.metadata().measuredError, 0.01);
+  EXPECT_LE(field.metadata().measuredError, 0.02);
   EXPECT_LE(greatestRatio(field, distance, mesh), 1);
   EXPECT_GT(field.bytes(), build(distance, domainAround(mesh), checked).bytes());
 }

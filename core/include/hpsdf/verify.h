@@ -85,7 +85,8 @@ struct MeasureOptions {
   int threads = 0;  ///< greatest number of threads; 0: all that the machine offers
 };
 
-/// Measures the errors of a field against the signed distance Φ (`distance`) that it approximates. Without triangles,
+/// Measures the errors of a field against the signed distance Φ (`distance`) that it approximates. Points of the domain
+/// are drawn apart for exact leaves and for polynomials, and their errors weighted by volume. Without triangles,
 /// points near the surface are those of the domain at which |Φ| is small, and no share of the surface is torn. Throws
 /// `Error` if Φ is not finite, and `Cancelled` when `progress` says so.
 Measurement measure(const Field& field, const DistanceFunction& distance, const MeasureOptions& options = {},

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "hpsdf/distance_function.h"
@@ -24,6 +25,8 @@ struct SampleOptions {
   std::size_t count = 500'000;
   std::uint64_t seed = 1;
   int threads = 0;  ///< greatest number of threads; 0: all that the machine offers
+  /// A point for which this returns false is drawn again, before Φ is evaluated there. If it is empty, all are taken.
+  std::function<bool(const Vector3&)> where = {};
 };
 
 /// Thrown where hardly any point of the domain is as close to the surface as asked.

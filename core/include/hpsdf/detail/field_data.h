@@ -25,7 +25,7 @@ struct Measurement {
   std::uint64_t points = 0;      ///< number of random points, half of them near the surface, half in the domain
   double nearDistance = 0;       ///< greatest distance of the points near the surface from it
   Error near;                    ///< errors near the surface
-  Error domain;                  ///< errors at points that are uniform in the domain or, if there is one, in the band
+  Error domain;                  ///< errors over the domain or, if there is one, over the band
   std::uint64_t wrongSigns = 0;  ///< points at which f and Φ have different signs and |Φ| exceeds `signThreshold`
   double signThreshold = 0;
   /// Share of the surface's area that is torn: the area of the cracks between cells, as wide as f jumps there, over the

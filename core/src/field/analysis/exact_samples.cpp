@@ -88,7 +88,7 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
     std::vector<Vector3> round(drawn == 0 ? missing : 2 * missing);
     tbb::parallel_for(std::size_t{0}, round.size(), [&](std::size_t n) { round[n] = draw(drawn + n); });
     drawn += round.size();
-    std::erase_if(round, [&](const Vector3& x) { return !domain.contains(x); });
+    std::erase_if(round, [&](const Vector3& x) { return !domain.contains(x) || (options.where && !options.where(x)); });
     const std::vector<double> distances = distancesAt(distance, round, domain, progress);
     for (std::size_t n = 0; n < round.size() && samples.points.size() < options.count; ++n) {
       if (band > 0 && std::abs(distances[n]) > band) continue;

@@ -49,6 +49,47 @@ void addPoints(Measurement& result, double& greatest, const ErrorsAtPoints& at, 
   }
 }
 
+/// The errors at random points of a part of the domain.
+struct DomainPart {
+  double share;  ///< of the domain's volume
+  ErrorsAtPoints errors;
+};
+
+/// Draws random points of the domain, apart for polynomial and exact leaves, and measures the errors there. Exact
+/// leaves have hardly any error: most points lie in the other leaves, however small their share of the volume is.
+std::vector<DomainPart> measureDomain(const Field& field, const DistanceFunction& distance,
+                                      const SampleOptions& options, const Progress& progress) {
+  constexpr double kLeastShare = 0.005, kMostShare = 0.75;  // of polynomials, for which parts are worth while
+  const double band = field.metadata().settings.band;
+  const auto volume = statistics(field).degreeVolume;
+  const auto exact = volume.find(kExactDegree);
+  const double share = exact == volume.end() ? 1 : 1 - exact->second;
+  std::vector<DomainPart> parts;
+  if (band > 0 || share < kLeastShare || share > kMostShare) {
+    parts.push_back({1, {field, sampleUniform(distance, field.domain(), band, options, progress)}});
+    return parts;
+  }
+  for (const bool isExact : {false, true}) {
+    SampleOptions part = options;
+    part.count = isExact ? options.count / 4 : options.count - options.count / 4;
+    part.where = [&field, isExact](const Vector3& x) { return (field.cellAt(x).degree == kExactDegree) == isExact; };
+    parts.push_back({isExact ? 1 - share : share, {field, sampleUniform(distance, field.domain(), 0, part, progress)}});
+  }
+  return parts;
+}
+
+/// Returns the errors over all parts of the domain.
+Measurement::Error errorOver(const std::vector<DomainPart>& parts) {
+  Measurement::Error error;
+  double square = 0;
+  for (const DomainPart& part : parts) {
+    square += part.share * part.errors.sums.rms() * part.errors.sums.rms();
+    error.max = std::max(error.max, part.errors.sums.max);
+  }
+  error.rms = std::sqrt(square);
+  return error;
+}
+
 /// Returns true if x lies within half of the field's jump across a face of its cell from this face. Where the field
 /// jumps by J, its surface ends in a step of about this height, and J times the length of all such faces is the area of
 /// the cracks.
@@ -113,17 +154,20 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
   other.seed = ~options.seed;
   const std::optional<TriangleMesh> surface = surfaceOf(distance);
   return withThreads(options.threads, [&] {
-    const ErrorsAtPoints uniform(field, sampleUniform(distance, field.domain(), metadata.settings.band, half,
-                                                      detail::partOf(progress, 0, 0.45)));
+    const std::vector<DomainPart> parts = measureDomain(field, distance, half, detail::partOf(progress, 0, 0.45));
     const ErrorsAtPoints near(field, samplesNear(distance, surface, field.domain(), result.nearDistance, other,
                                                  detail::partOf(progress, 0.45, 0.9)));
-    result.points = uniform.values.size() + near.values.size();
+    result.points = near.values.size();
     result.near = {near.sums.rms(), near.sums.max};
-    result.domain = {uniform.sums.rms(), uniform.sums.max};
+    result.domain = errorOver(parts);
     result.signThreshold = std::max(10 * result.near.rms, kLeastThreshold * length);
     const AllowedError allowed = allowedError(metadata.settings, length);
     double greatest = -1;
-    for (const ErrorsAtPoints* at : {&near, &uniform}) addPoints(result, greatest, *at, allowed);
+    addPoints(result, greatest, near, allowed);
+    for (const DomainPart& part : parts) {
+      result.points += part.errors.values.size();
+      addPoints(result, greatest, part.errors, allowed);
+    }
     progress.update("measuring", 0.95);
     if (surface) result.tornShare = tornShare(field, *surface, half);
     return result;
