@@ -119,7 +119,7 @@ void requireAskedErrors(const Arguments& arguments, const Field& field) {
   if (tolerance > 0 && metadata.measuredError > tolerance)
     throw Failed(
         fmt::format("tolerance: missed in some cells, where the error is {:.3g} times as great as allowed: the "
-                    "distance jumps there; repair the mesh, or take another inside test (--sign)",
+                    "distance jumps there, or changes faster than the smallest cells can follow",
                     metadata.measuredError / tolerance));
   if (m->beyondTolerance > 0) throw Failed("tolerance: " + toleranceText(field));
   require("max-error", "an error", std::max(m->near.max, m->domain.max));
@@ -272,7 +272,7 @@ shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes
 
 Say how exact the field must be with --tolerance: 0.01 in the mesh's units, or 0.02% of its longest side. The error of the
 distance then exceeds it nowhere within --within of the surface; farther away 1 % of the further distance is allowed in
-addition. Of all fields within the tolerance, the one that takes the fewest bytes is built. Early in the construction a
+addition. Among the fields within the tolerance, the construction seeks the one that takes the fewest bytes. Early in the construction a
 line says how many bytes and seconds it will take.
 
 Without a tolerance, the construction is that of the paper: it refines the worst cell, by a higher degree or by eight

@@ -72,7 +72,8 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
     BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
     withinMemory(arguments, [&] { checkBuild(domain, options); });
-    if (options.certified && prepared.report && !prepared.report->closed())
+    const bool isShell = insideOptions.insideTest == InsideTest::shell;
+    if (options.certified && !isShell && prepared.report && !prepared.report->closed())
       throw Error("certified: the mesh has holes, beside which nothing is proven: close them, or leave certified out");
     warnOfCutSurface(console, box, domain);
 

@@ -95,8 +95,8 @@ Json fieldJson(const CurrentField& current) {
                {"precision", field.singlePrecision() ? "float" : "double"},
                {"bytes", figures.bytes},
                {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
-               {"total_error", metadata.totalError},
-               {"rms_estimate", metadata.rmsEstimate(field.domain())},
+               {"total_error", hasTolerance(field) ? Json() : Json(metadata.totalError)},
+               {"rms_estimate", hasTolerance(field) ? Json() : Json(metadata.rmsEstimate(field.domain()))},
                {"measured", measuredJson(field)},
                {"rounding_rms", metadata.roundingRms},
                {"exact_evaluations", metadata.exactEvaluations},
@@ -105,7 +105,8 @@ Json fieldJson(const CurrentField& current) {
                {"grid", field.grid()}};
   addSettings(json, metadata.settings);
   json["target_error"] = metadata.settings.targetError.weighted();
-  json["measured_error"] = metadata.settings.maxError > 0 ? Json(metadata.measuredError) : Json();
+  json["measured_error"] =
+      metadata.settings.maxError > 0 || hasTolerance(field) ? Json(metadata.measuredError) : Json();
   json.update(
       {{"continuity", settingText(buildSetting("continuity"), settingsOf(field.data()))},
        {"blend", field.data().blend},
@@ -157,7 +158,8 @@ std::string toleranceText(const Field& field) {
   const std::optional<Measurement>& m = field.metadata().measurement;
   std::string text = fmt::format("{} within {} of the surface, and 1 % of the distance beyond",
                                  shortNumber(settings.tolerance), shortNumber(settings.within));
-  if (!m) return text;
+  if (field.metadata().measuredError > settings.tolerance) return text + "; missed in some cells";
+  if (!m) return text + "; not measured";
   if (m->beyondTolerance > 0)
     return text + fmt::format("; missed at {} of {} points, where the error is up to {:.3g} times as great",
                               grouped(m->beyondTolerance), grouped(m->points), m->toleranceRatio);

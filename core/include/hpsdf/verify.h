@@ -78,8 +78,8 @@ struct MeasureOptions {
   /// Number of random points, half of them near the surface; 0: a tenth of the points at which the construction
   /// evaluated Φ, but 20,000 to 100,000, so that measuring takes a small part of the construction's time.
   std::size_t points = 0;
-  /// Greatest distance of points near the surface from it; 0: the distance up to which the field's tolerance holds or,
-  /// without a tolerance, 1 % of the surface's longest side.
+  /// Greatest distance of points near the surface from it; 0: the distance up to which the field's tolerance holds, at
+  /// most an eighth of the domain's diagonal, or, without a tolerance, 1 % of the surface's longest side.
   double near = 0;
   std::uint64_t seed = 1;
   int threads = 0;  ///< greatest number of threads; 0: all that the machine offers

@@ -1,5 +1,6 @@
 #include "hpsdf/build_options.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "hpsdf/error.h"
@@ -22,7 +23,8 @@ BuildOptions paperOptions() {
 
 AllowedError allowedError(const BuildOptions& options, double referenceLength) {
   constexpr double kShareWithin = 0.05;
-  return {options.tolerance, options.within > 0 ? options.within : kShareWithin * referenceLength};
+  const double within = options.within > 0 ? options.within : kShareWithin * referenceLength;
+  return {options.tolerance, std::max(within, options.tolerance)};
 }
 
 Box domainAround(const Box& surface, DomainShape shape, double margin) {

@@ -144,7 +144,8 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
   const FieldMetadata& metadata = field.metadata();
   const double length = metadata.referenceLength;
   Measurement result;
-  const double usual = metadata.settings.tolerance > 0 ? allowedError(metadata.settings, length).within : 0.01 * length;
+  const double within = std::min(allowedError(metadata.settings, length).within, field.domain().diagonal().norm() / 8);
+  const double usual = metadata.settings.tolerance > 0 ? within : 0.01 * length;
   result.nearDistance = options.near > 0 ? options.near : usual;
   const std::size_t points =
       options.points > 0 ? options.points : std::clamp(metadata.exactEvaluations / 10, kFewest, kMost);

@@ -17,10 +17,11 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-void LeastBytes::consider(CheapCell& cell, Fit&& fit, double bytes) const {
+void LeastBytes::consider(CheapCell& cell, Fit&& fit, double bytes, double ratio) const {
   if (bytes >= cell.bytes) return;
   cell.fit = std::move(fit);
   cell.bytes = bytes;
+  cell.leafRatio = ratio;
 }
 
 /// Returns the bytes of a leaf without error. A triangle is stored once, however many leaves refer to it. Its bytes
@@ -49,16 +50,16 @@ void LeastBytes::makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&
   if (polynomial.closest.coefficients.empty()) polynomial = fitter_.fit(box, 0);
   cell.isMissed = !polynomial.fit;
   Fit fit = cell.isMissed ? std::move(polynomial.closest) : std::move(*polynomial.fit);
-  cell.ratio = polynomial.ratio;
   const double bytes = polynomialBytes(fit);
-  consider(cell, std::move(fit), bytes);
+  consider(cell, std::move(fit), bytes, polynomial.ratio);
 }
 
 bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove) const {
   constexpr double kSmallestChild = 4;  // coefficients
   const double leastOfChildren = budget_.bytes(8, 8 * kSmallestChild);
   const Box box = tree_.boxOf(place);
-  ++cells_;
+  constexpr std::uint64_t kBetweenChecks = 4096;
+  if (++cells_ % kBetweenChecks == 0) requireRoom_(cells_);
   cell.bytes = kNone;
   if (exact_) {
     if (std::optional<Fit> fit = exact_->fitOfFarCell(box, kFewTriangles)) {
@@ -71,7 +72,7 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
   cell.ratio = polynomial.ratio;
   if (polynomial.fit) {
     const double bytes = polynomialBytes(*polynomial.fit);
-    consider(cell, std::move(*polynomial.fit), bytes);
+    consider(cell, std::move(*polynomial.fit), bytes, polynomial.ratio);
   }
   constexpr int kCheapDegree = 2;  // a longer list than those above does not take fewer bytes
   if (exact_ && (!polynomial.fit || cell.fit.degree > kCheapDegree)) {

@@ -5,8 +5,10 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "field/build/limits.h"
@@ -21,20 +23,27 @@ struct CheapCell {
   Fit fit;                ///< as a leaf; empty if the cell has children
   double bytes = 0;       ///< of the leaf, or of all descendants, in the finished field
   double ratio = 0;       ///< error of the cell's best polynomial over the allowed error
+  double leafRatio = 0;   ///< error of the leaf over the allowed error, 0 for an exact leaf
   bool isMissed = false;  ///< the leaf is a polynomial that misses the tolerance, in a cell that is not divided further
   std::unique_ptr<std::array<CheapCell, 8>> children = {};
 };
 
-/// Finds the octree of a cell that takes the fewest bytes within a tolerance. A leaf is a polynomial of low degree or,
+/// Seeks the octree of a cell that takes the fewest bytes within a tolerance. A leaf is a polynomial of low degree or,
 /// if the distance is measured to triangles, an exact leaf. A cell is divided if its children take fewer bytes.
 /// Thread-safe.
 class LeastBytes {
  public:
   /// Keeps references to its arguments. `tree` gives the boxes of cells. `exact` is empty if there can be no exact
   /// leaves. A cell of depth `maxDepth` is not divided.
+  /// `requireRoom` is called with the number of cells from time to time; it throws where they do not fit into memory.
   LeastBytes(const BuildTree& tree, const ToleranceFitter& fitter, const std::optional<ExactCells>& exact,
-             std::uint32_t maxDepth, const ByteBudget& budget)
-      : tree_(tree), fitter_(fitter), exact_(exact), maxDepth_(maxDepth), budget_(budget) {}
+             std::uint32_t maxDepth, const ByteBudget& budget, std::function<void(std::uint64_t)> requireRoom)
+      : tree_(tree),
+        fitter_(fitter),
+        exact_(exact),
+        maxDepth_(maxDepth),
+        budget_(budget),
+        requireRoom_(std::move(requireRoom)) {}
 
   /// Makes the leaf of a cell that takes the fewest bytes. Returns true if the cell's children might take fewer bytes,
   /// or if there is no such leaf. `ratioAbove` is the error ratio of the parent, 0 if there is none.
@@ -50,7 +59,7 @@ class LeastBytes {
   std::uint64_t cells() const { return cells_; }
 
  private:
-  void consider(CheapCell& cell, Fit&& fit, double bytes) const;
+  void consider(CheapCell& cell, Fit&& fit, double bytes, double ratio = 0) const;
   double polynomialBytes(const Fit& fit) const { return budget_.bytes(1, double(fit.coefficients.size())); }
   double exactBytes(const Fit& fit, const Box& box) const;
   void makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&& polynomial) const;
@@ -60,6 +69,7 @@ class LeastBytes {
   const std::optional<ExactCells>& exact_;
   std::uint32_t maxDepth_;
   const ByteBudget& budget_;
+  std::function<void(std::uint64_t)> requireRoom_;
   mutable std::atomic<std::uint64_t> cells_ = 0;
 };
 

@@ -178,8 +178,8 @@ void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
   if (fixed + bytes <= most && finally <= kTolerance * most) return;
   refuseMemory(fixed + bytes * std::max(need.likelyFactor, need.growthFactor), "about ",
                cellsText(double(need.nodes) * factor), " and ", bytesText(finally),
-               " of memory are needed, more than the ", bytesText(most),
-               " allowed: take a larger target error or a lower maximum depth");
+               " of memory are needed, more than the ", bytesText(most), " allowed: take a larger ",
+               options.tolerance > 0 ? "tolerance" : "target error or a lower maximum depth");
 }
 
 double mostNodes(const BuildOptions& options) {

@@ -36,7 +36,8 @@ class ToleranceBuild {
         fitter_(distance, allowedError(options, length_), domain, options.blend, options.certified, progress),
         budget_(options),
         exact_(exactCells(distance, options, length_)),
-        cells_(tree_, fitter_, exact_, greatestDepth(), budget_) {}
+        cells_(tree_, fitter_, exact_, greatestDepth(), budget_,
+               [this](std::uint64_t cells) { requireRoom(double(cells), 0); }) {}
 
   FieldData run() {
     tree_.addBaseCells();
@@ -62,8 +63,10 @@ class ToleranceBuild {
 
   static std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options,
                                               double length) {
+    constexpr double kShareOfPlanes = 0.01;  // of the tolerance, for planes that stand for triangles
     if (!mayHaveExactLeaves(distance, length)) return std::nullopt;
-    return ExactCells(*distance.triangleSearch(), 0, static_cast<std::size_t>(options.exactTriangles), options.blend);
+    return ExactCells(*distance.triangleSearch(), 0, static_cast<std::size_t>(options.exactTriangles), options.blend,
+                      kShareOfPlanes * options.tolerance);
   }
 
   /// Returns the greatest depth at which cell indices are whole numbers of 32 bits.
@@ -80,6 +83,7 @@ class ToleranceBuild {
     constexpr std::size_t kEnough = 500;
     for (std::uint32_t n = 0; n < roots_.size(); ++n) tasks_.push_back({&roots_[n], {0, tree_.nodes[n].cellIndex}, 0});
     while (!tasks_.empty() && tasks_.size() < kEnough && firstDepths_ < int(greatestDepth())) {
+      progress_.update("fitting first cells", 0);
       std::vector<std::uint8_t> divides(tasks_.size());
       tbb::parallel_for(std::size_t{0}, tasks_.size(), [&](std::size_t t) {
         divides[t] = cells_.makeLeaf(*tasks_[t].cell, tasks_[t].place, tasks_[t].ratioAbove);
@@ -95,6 +99,7 @@ class ToleranceBuild {
       tasks_ = std::move(next);
       ++firstDepths_;
     }
+    firstCells_ = cells_.cells();
   }
 
   void doTasks() {
@@ -125,10 +130,7 @@ class ToleranceBuild {
     for (; summed_ < done; ++summed_) taskBytes_ += tasks_[summed_].cell->bytes;
     const double scale = double(tasks_.size()) / double(done), bytes = taskBytes_ * scale;
     // Cells are in memory as they are built, and again as the arrays of the field are made.
-    requireMemory({.nodes = std::size_t(double(cells_.cells()) * scale),
-                   .coefficients = std::size_t(2 * bytes / sizeof(double)),
-                   .fixedBytes = distance_.bytes()},
-                  options_);
+    requireRoom(double(firstCells_) + double(cells_.cells() - firstCells_) * scale, 2 * bytes);
     if (hasForecast_ || done * kShare < tasks_.size()) return;
     hasForecast_ = true;
     if (!progress_.forecast) return;
@@ -160,11 +162,8 @@ class ToleranceBuild {
   /// Moves a cell with its descendants into the tree. Returns the greatest error ratio of its polynomials.
   double moveToTree(std::uint32_t node, CheapCell&& cell) {
     if (!cell.children) {
-      const bool isPolynomial = cell.isMissed || !cell.fit.isExact();
       constexpr double kUnproven = 1.001;  // counts as missed, whatever its error at the checked points
-      const double ratio = cell.isMissed  ? std::max(cell.ratio, kUnproven)
-                           : isPolynomial ? std::min(cell.ratio, 1.0)
-                                          : 0;
+      const double ratio = cell.isMissed ? std::max(cell.leafRatio, kUnproven) : cell.leafRatio;
       tree_.nodes[node].fit = std::move(cell.fit);
       return ratio;
     }
@@ -192,6 +191,14 @@ class ToleranceBuild {
     return metadata;
   }
 
+  /// Throws `Error` if so many cells, and so many bytes of arrays, do not fit into the allowed memory.
+  void requireRoom(double cells, double bytes) const {
+    requireMemory({.nodes = std::size_t(cells),
+                   .coefficients = std::size_t(bytes / sizeof(double)),
+                   .fixedBytes = distance_.bytes()},
+                  options_);
+  }
+
   const DistanceFunction& distance_;
   const BuildOptions& options_;
   const Progress& progress_;
@@ -204,7 +211,8 @@ class ToleranceBuild {
   LeastBytes cells_;
   std::vector<CheapCell> roots_;
   std::vector<Task> tasks_;
-  int firstDepths_ = 0;     ///< number of depths that `lookAtFirstDepths` looked at
+  int firstDepths_ = 0;  ///< number of depths that `lookAtFirstDepths` looked at
+  std::uint64_t firstCells_ = 0;
   std::size_t summed_ = 0;  ///< number of tasks whose bytes are in `taskBytes_`
   double taskBytes_ = 0;
   bool hasForecast_ = false;

@@ -148,7 +148,8 @@ void roundCoefficients(CoefficientType type, FieldData& field) {
   query::toFloat(field);
   query::roundVertices(field.exact);
   metadata.roundingRms = rounding.rms;
-  if (spoilsMaximum) metadata.measuredError += rounding.max;
+  const bool spoilsTolerance = tolerance > 0 && rounding.max > kNegligible * tolerance;
+  if (spoilsMaximum || spoilsTolerance) metadata.measuredError += rounding.max;
 }
 
 }  // namespace hpsdf::detail

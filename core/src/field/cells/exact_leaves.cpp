@@ -15,7 +15,7 @@
 namespace hpsdf::detail {
 namespace {
 
-/// A plane that contains triangles up to the rounding of their vertices to float.
+/// A plane that contains triangles up to the rounding of their vertices to float and to a tolerance.
 struct CommonPlane {
   Vector3 origin, normal;
 };
@@ -27,7 +27,8 @@ Vector3 normalOf(const TriangleSearch& search, std::uint32_t triangle) {
   return (vertices[b] - vertices[a]).cross(vertices[c] - vertices[a]);
 }
 
-std::optional<CommonPlane> commonPlane(const TriangleSearch& search, std::span<const std::uint32_t> triangles) {
+std::optional<CommonPlane> commonPlane(const TriangleSearch& search, std::span<const std::uint32_t> triangles,
+                                       double tolerance) {
   const auto corner = [&](std::uint32_t triangle, int k) -> const Vector3& {
     return search.vertices()[search.triangles()[triangle][k]];
   };
@@ -40,8 +41,8 @@ std::optional<CommonPlane> commonPlane(const TriangleSearch& search, std::span<c
     for (int k = 0; k < 3; ++k) {
       const Vector3& v = corner(triangle, k);
       const double size = v.cwiseAbs().maxCoeff() + plane.origin.cwiseAbs().maxCoeff();
-      if (std::abs((v - plane.origin).dot(plane.normal)) > std::numeric_limits<float>::epsilon() * size)
-        return std::nullopt;
+      const double allowed = std::min(tolerance, std::numeric_limits<float>::epsilon() * size);
+      if (std::abs((v - plane.origin).dot(plane.normal)) > allowed) return std::nullopt;
     }
   }
   return plane;
@@ -74,7 +75,8 @@ Fit planeFit(const Box& cell, const CommonPlane& plane) {
 std::optional<Fit> ExactCells::fitFrom(const Box& cell, const Box& box, TriangleList list) const {
   const std::optional<LeafSign> sign = search_.signIn(box, list.triangles);
   if (!sign) return std::nullopt;
-  const auto plane = sign->rule == ExactSign::pseudonormal ? commonPlane(search_, list.triangles) : std::nullopt;
+  const auto plane =
+      sign->rule == ExactSign::pseudonormal ? commonPlane(search_, list.triangles, planeTolerance_) : std::nullopt;
   Fit fit;
   if (plane) {
     fit = planeFit(cell, *plane);

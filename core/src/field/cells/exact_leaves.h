@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -20,8 +21,10 @@ class ExactCells {
   /// Keeps a reference to the search. `within` is the distance from the surface up to which the field is exact, `most`
   /// the greatest number of triangles of a leaf that could be divided further. `blend` is the width of the field's
   /// blend zones in edges of a leaf; a leaf is exact in its blend zones too.
-  ExactCells(const TriangleSearch& search, double within, std::size_t most, double blend)
-      : search_(search), within_(within), most_(most), blend_(blend) {}
+  /// Triangles count as lying in one plane if their corners do up to `planeTolerance` and to the rounding to float.
+  ExactCells(const TriangleSearch& search, double within, std::size_t most, double blend,
+             double planeTolerance = std::numeric_limits<double>::infinity())
+      : search_(search), within_(within), most_(most), blend_(blend), planeTolerance_(planeTolerance) {}
 
   /// Returns true if a point of the cell may be so close to the surface that the field must be exact there.
   bool mustBeExact(const Box& cell) const { return search_.comesWithin(cell, within_); }
@@ -62,6 +65,7 @@ class ExactCells {
   double within_;
   std::size_t most_;
   double blend_;
+  double planeTolerance_;
 };
 
 /// Tries to make a polynomial that stands for the triangles of a cell.

@@ -184,6 +184,7 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
     throw Error("the field is weakly continuous already: take it as it was before, or build it anew");
   FieldData data = field.data();
   data.metadata.measurement.reset();
+  data.metadata.settings.certified = false;
   query::toDouble(data);
   const continuity::WeakContinuityFigures figures =
       withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
@@ -200,6 +201,7 @@ Field blended(const Field& field, double width) {
   FieldData data = field.data();
   data.blend = width;
   data.metadata.measurement.reset();
+  data.metadata.settings.certified = false;
   data.bounds.clear();  // The bounds depend on which leaves contribute at a point, and blending changes this.
   return Field(std::move(data));
 }
