@@ -165,7 +165,7 @@ TEST(Tolerance, foretellsBytesOnceAndEarly) {
 TEST(Tolerance, isRefusedEarlyWhereMemoryIsShort) {
   const TriangleMesh mesh = shapes::mesh("torus,segments=24,sides=12");
   const ExactDistance distance(mesh);
-  const BuildOptions options{.tolerance = 1e-6, .memoryLimit = distance.bytes() + 500'000};
+  const BuildOptions options{.tolerance = 1e-6, .memoryLimit = distance.bytes() + 200'000};
   double fraction = 0;
   try {
     build(distance, domainAround(mesh), options,
