@@ -272,7 +272,7 @@ shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes
 
 Say how exact the field must be with --tolerance: 0.01 in the mesh's units, or 0.02% of its longest side. The error of the
 distance then exceeds it nowhere within --within of the surface; farther away 1 % of the further distance is allowed in
-addition. Among the fields within the tolerance, the construction seeks the one that takes the fewest bytes. Early in the construction a
+addition. Among the fields within the tolerance, the construction seeks the one that takes the fewest bytes. Early on, a
 line says how many bytes and seconds it will take.
 
 Without a tolerance, the construction is that of the paper: it refines the worst cell, by a higher degree or by eight

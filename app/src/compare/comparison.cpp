@@ -118,8 +118,8 @@ FieldFigures figuresOf(std::size_t number, const CurrentField& current, const Po
                        .file = printable(current.name),
                        .fileBytes = current.fileBytes.value_or(0),
                        .counts = statistics(current.field),
-                       .near = measureError(current.field, sets[1], threads),
-                       .domain = measureError(current.field, sets[0], threads),
+                       .near = measureError(values[1], sets[1].distances, threads),
+                       .domain = measureError(values[0], sets[0].distances, threads),
                        .bins = binsOf(sets, values)};
   forEachPoint(sets, values, [&](const Vector3&, double exact, double value) {
     if (!(value < 0 && exact > 0) && !(value > 0 && exact < 0)) return;

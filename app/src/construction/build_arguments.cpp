@@ -84,7 +84,7 @@ bool isAnyGiven(const Arguments& arguments, std::initializer_list<BuildSetting::
 void requireEffect(const Arguments& arguments) {
   for (const BuildSetting& setting : buildSettings())
     if (setting.isOffered && arguments.given(setting.name) && !setting.hasEffectWithTolerance &&
-        setting.ending != BuildSetting::Ending::tolerance && setting.ending != BuildSetting::Ending::target)
+        setting.ending != BuildSetting::Ending::target)
       throw Error(fmt::format("{} has no effect with tolerance, which decides how the field is built: leave one out",
                               setting.name));
   if (arguments.flag("paper")) throw Error("paper and tolerance exclude each other: give one of them");
@@ -157,6 +157,13 @@ std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Endin
   std::vector<std::string> names;
   for (const BuildSetting& setting : buildSettings())
     if (std::ranges::find(endings, setting.ending) != endings.end()) names.emplace_back(setting.name);
+  return names;
+}
+
+std::vector<std::string> endParametersAndTheirs(std::initializer_list<BuildSetting::Ending> endings) {
+  std::vector<std::string> names = endParameters(endings);
+  for (const BuildSetting& setting : buildSettings())
+    if (std::ranges::find(names, setting.owner) != names.end()) names.emplace_back(setting.name);
   return names;
 }
 

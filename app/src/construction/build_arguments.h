@@ -22,6 +22,8 @@ std::vector<Parameter> checkpointParameters();
 
 /// Returns the names of the parameters that set a stopping criterion of one of the kinds `endings`.
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings);
+/// Returns these names, and those of the parameters that have an effect only with one of them.
+std::vector<std::string> endParametersAndTheirs(std::initializer_list<BuildSetting::Ending> endings);
 
 /// Returns the command parameter for the setting `name` of the table `buildSettings`. The function `settingKind`
 /// returns only the type, the accepted values and the default of this parameter.

@@ -1,5 +1,5 @@
 #pragma once
-// What a file or a name stands for: a field, a surface from which a field can be built, or neither.
+// Tells whether a file or a name stands for a field, for a surface from which a field can be built, or for neither.
 
 #include <cstdint>
 #include <string>

@@ -119,8 +119,7 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   for (const BuildSetting& setting : buildSettings()) {
     const std::string text = settingText(setting, built);
     const bool isStored = setting.storedAt > 0 || setting.name == "grid";
-    const bool ofTolerance = setting.name == "tolerance" || setting.owner == "tolerance";
-    if (built.tolerance > 0 && !ofTolerance && !setting.hasEffectWithTolerance) continue;
+    if (built.tolerance > 0 && !setting.hasEffectWithTolerance) continue;
     if (setting.isOffered && !text.empty() && (isStored || text != defaultText(setting)))
       settings[std::string(setting.name)] = text;
   }
@@ -146,8 +145,7 @@ void Explorer::removeWithoutEffect(std::map<std::string, std::string>& settings)
   for (const BuildSetting& setting : buildSettings()) {
     if (settings_.contains(std::string(setting.name))) settings.erase(std::string(setting.exclusive));
     const bool ofTolerance = setting.name == "tolerance" || setting.owner == "tolerance";
-    if (isWithinTolerance ? !ofTolerance && !setting.hasEffectWithTolerance : ofTolerance)
-      settings.erase(std::string(setting.name));
+    if (isWithinTolerance ? !setting.hasEffectWithTolerance : ofTolerance) settings.erase(std::string(setting.name));
   }
 }
 

@@ -150,10 +150,9 @@ void runContinuity(Session& session, const Arguments& arguments) {
 Study continuityStudy() {
   std::vector<std::size_t> counts(32);
   std::iota(counts.begin(), counts.end(), 1);
-  std::vector<std::string> left = endParameters(
+  std::vector<std::string> left = endParametersAndTheirs(
       {BuildSetting::Ending::tolerance, BuildSetting::Ending::otherQuantity, BuildSetting::Ending::steps});
-  left.insert(left.end(),
-              {"within", "certified", "enrich", "continuity", "continuity-weight", "blend-width", "bounds", "paper"});
+  left.insert(left.end(), {"enrich", "continuity", "continuity-weight", "blend-width", "bounds", "paper"});
   return {
       .name = "continuity",
       .help = paragraphs(R"(

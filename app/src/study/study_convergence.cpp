@@ -268,11 +268,10 @@ void runConvergence(Session& session, const Arguments& arguments) {
 /// paper's curves show unweighted errors.
 std::vector<Parameter> unweightedBuildParameters() {
   using Ending = BuildSetting::Ending;
-  std::vector<std::string> left =
-      endParameters({Ending::target, Ending::byDistance, Ending::tolerance, Ending::otherQuantity, Ending::steps});
+  std::vector<std::string> left = endParametersAndTheirs(
+      {Ending::target, Ending::byDistance, Ending::tolerance, Ending::otherQuantity, Ending::steps});
   // The criterion decides what is taken back at the end of a construction, which the curves do not show.
-  left.insert(left.end(), {"near-distance", "within", "certified", "strategy", "coefficients", "criterion", "band",
-                           "bounds", "paper"});
+  left.insert(left.end(), {"strategy", "coefficients", "criterion", "band", "bounds", "paper"});
   std::vector<Parameter> parameters = buildParametersWithout(left);
   parameterNamed("nearness", parameters).defaultText = "0";
   return parameters;

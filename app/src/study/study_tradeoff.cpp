@@ -232,8 +232,7 @@ svg.chart { display: block; max-width: 100%; height: auto; margin: 1rem 0; }
 
 constexpr const char* kTradeoffNote =
     "Errors are measured at random points, half of them within a hundredth of the mesh's longest side of the surface, "
-    "and "
-    "are in the units of the field. Time is that of the construction on this machine.";
+    "and are in the units of the field. Time is that of the construction on this machine.";
 
 std::string tradeoffSection(const Tradeoff& tradeoff) {
   std::string html = fmt::format("<h2>{}</h2>\n<table>\n<tr>", htmlEscaped(tradeoff.mesh));
@@ -285,9 +284,8 @@ void runTradeoff(Session& session, const Arguments& arguments) {
 /// Returns the parameters of `build` except those that the range replaces: whatever else ends a construction.
 std::vector<Parameter> rangeBuildParameters() {
   using Ending = BuildSetting::Ending;
-  std::vector<std::string> left =
-      endParameters({Ending::target, Ending::byDistance, Ending::tolerance, Ending::otherQuantity, Ending::steps});
-  left.insert(left.end(), {"near-distance", "within", "certified"});
+  std::vector<std::string> left = endParametersAndTheirs(
+      {Ending::target, Ending::byDistance, Ending::tolerance, Ending::otherQuantity, Ending::steps});
   return buildParametersWithout(left);
 }
 
@@ -310,13 +308,11 @@ which errors are measured lie near the surface. Writes index.html with the table
 tradeoff.json.)"),
       .parameters = joined(
           {{{"target-errors", numbers("τ,τ,…", countsFrom(1, 20)).above(0).byDefault("1e-4,3e-5,1e-5,3e-6,1e-6,3e-7"),
-             "The target errors of the range. Each makes a field of its own, so that the smallest one takes most of "
-             "the "
-             "time."},
+             "The target errors of the range. Each makes a field of its own, so that the smallest one takes most "
+             "of the time."},
             {"budget", number().above(0).in("bytes"),
              "Recommends the most exact field that takes at most this memory. To build for a budget without a study, "
-             "use "
-             "'build --max-bytes'."},
+             "use 'build --max-bytes'."},
             {"within-seconds", number().above(0).in("seconds"),
              "Recommends the most exact field whose construction takes at most this time on this machine."}},
            samplingParameters(),

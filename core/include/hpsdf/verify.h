@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "hpsdf/detail/exact_samples.h"
@@ -128,6 +129,8 @@ struct VerifiedSurface {
 
 /// Measures |f − Φ| at the samples. The result does not depend on `threads` (0: all that the machine offers).
 ErrorFigures measureError(const Field& field, const ExactSamples& samples, int threads = 0);
+/// Does the same for values f of a field that are known already, at points with the exact distances `distances`.
+ErrorFigures measureError(std::span<const double> values, std::span<const double> distances, int threads = 0);
 
 /// Measures the errors, signs, gradients and bounds of a field; `findJumps` measures its jumps. The result does
 /// not depend on the number of threads. Throws `Error` for options out of range, and as `sampleUniform` and

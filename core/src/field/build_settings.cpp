@@ -166,6 +166,7 @@ const std::vector<Row> kRows = {
          .orShare()
          .ends(Ending::tolerance)
          .insteadOf("target-error")
+         .suitsTolerance()
          .stored(17),
      positive<&BuildOptions::tolerance>,
      "Greatest error of the distance near the surface: 0.01, or 0.02% of the mesh's longest side. It holds within "

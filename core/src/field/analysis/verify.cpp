@@ -200,15 +200,20 @@ void checkOptions(const VerifyOptions& options) {
 
 }  // namespace
 
+ErrorFigures measureError(std::span<const double> values, std::span<const double> distances, int threads) {
+  std::vector<double> errors(values.size());
+  for (std::size_t n = 0; n < errors.size(); ++n) errors[n] = std::abs(values[n] - distances[n]);
+  return withThreads(threads, [&] { return errorFigures(std::move(errors)); });
+}
+
 ErrorFigures measureError(const Field& field, const ExactSamples& samples, int threads) {
-  return withThreads(threads, [&] {
-    std::vector<double> values(samples.points.size());
+  std::vector<double> values(samples.points.size());
+  withThreads(threads, [&] {
     detail::forEachChunk(values.size(), kPointsPerTask, [&](std::size_t, std::size_t first, std::size_t count) {
       field.values(std::span(samples.points).subspan(first, count), std::span(values).subspan(first, count));
-      for (std::size_t n = first; n < first + count; ++n) values[n] = std::abs(values[n] - samples.distances[n]);
     });
-    return errorFigures(std::move(values));
   });
+  return measureError(values, samples.distances, threads);
 }
 
 Verification verify(const Field& field, const VerifiedSurface& surface, const VerifyOptions& options,

@@ -42,6 +42,16 @@ std::size_t cubeIndex(int i, int j, int k, int degree) {
   return (std::size_t(i) * (degree + 1) + j) * (degree + 1) + k;
 }
 
+/// Arranges the coefficients of a polynomial of degree `own` as a cube of (degree + 1)³ numbers. `degree` is at least
+/// `own`.
+template <typename T>
+std::vector<double> cubeFrom(const T* coefficients, int own, int degree) {
+  std::vector<double> cube(cubeIndex(degree, degree, degree, degree) + 1, 0.0);
+  basis::forEachCoefficient(
+      own, [&](int i, int j, int k, int index) { cube[cubeIndex(i, j, k, degree)] = coefficients[index]; });
+  return cube;
+}
+
 /// Transforms the coefficients c of a leaf's polynomial to the coordinates of one part of the leaf, one axis at
 /// a time.
 std::vector<double> partCoefficients(std::vector<double> c, int degree,
@@ -183,11 +193,7 @@ class Proof {
 
   bool holds() const {
     constexpr int kHalvings = 2;
-    std::vector<double> cube(cubeIndex(polynomial_.degree, polynomial_.degree, polynomial_.degree, polynomial_.degree) +
-                             1);
-    basis::forEachCoefficient(polynomial_.degree, [&](int i, int j, int k, int index) {
-      cube[cubeIndex(i, j, k, polynomial_.degree)] = polynomial_.coefficients[index];
-    });
+    const std::vector<double> cube = cubeFrom(polynomial_.coefficients.data(), polynomial_.degree, polynomial_.degree);
     return holdsIn(cube, polynomial_.cell, kHalvings);
   }
 
@@ -232,15 +238,8 @@ float roundedUp(double number) {
 /// degree.
 std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degree) {
   const std::uint64_t bits = field.nodes[leaf];
-  std::vector<double> cube(cubeIndex(degree, degree, degree, degree) + 1, 0.0);
-  std::visit(
-      [&](const auto& c) {
-        basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
-          cube[cubeIndex(i, j, k, degree)] = c[node::offset(bits) + index];
-        });
-      },
-      field.coefficients);
-  return cube;
+  return std::visit([&](const auto& c) { return cubeFrom(c.data() + node::offset(bits), node::degree(bits), degree); },
+                    field.coefficients);
 }
 
 /// The box in which two touching leaves both have a blending weight. It extends on either side of the leaves' common

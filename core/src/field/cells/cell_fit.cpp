@@ -120,13 +120,17 @@ double meanSquareOf(const Fit& fit) {
 }
 
 double squaredErrorAt(const Fit& fit, const Vector3& local, double exact) {
-  const double error = query::evaluate(fit.coefficients.data(), fit.degree, {local.x(), local.y(), local.z()}) - exact;
+  const double error = fit.valueAt(local) - exact;
   return error * error;
 }
 
 double volumeOf(const Box& box) { return (box.max() - box.min()).prod(); }
 
 }  // namespace
+
+double Fit::valueAt(const Vector3& local) const {
+  return query::evaluate(coefficients.data(), degree, {local.x(), local.y(), local.z()});
+}
 
 void requireFinite(std::span<const Vector3> points, std::span<const double> distances) {
   for (std::size_t i = 0; i < distances.size(); ++i)
@@ -158,25 +162,31 @@ const CellFitter::Rules& CellFitter::rules(int degree) const {
   return *rules_[degree];
 }
 
-std::vector<double> CellFitter::sample(std::span<const Box> cells, std::span<const Vector3> local,
-                                       std::span<const std::uint32_t> order) const {
+std::vector<double> sampleCells(const DistanceFunction& distance, std::span<const Box> cells,
+                                std::span<const Vector3> local, std::span<const std::uint32_t> order,
+                                const Progress& progress) {
   std::vector<double> samples(cells.size() * local.size());
   std::array<Vector3, kBatch> points;
   std::array<double, kBatch> values;
   for (std::size_t first = 0; first < samples.size(); first += kBatch) {
-    progress_.throwIfCancelled();
+    progress.throwIfCancelled();
     const std::size_t count = std::min(kBatch, samples.size() - first);
     const auto sampleAt = [&](std::size_t i) { return order.empty() ? first + i : order[first + i]; };
     for (std::size_t i = 0; i < count; ++i) {
       const Box& cell = cells[sampleAt(i) / local.size()];
       points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(local[sampleAt(i) % local.size()]);
     }
-    distance_(std::span(points).first(count), std::span(values).first(count));
+    distance(std::span(points).first(count), std::span(values).first(count));
     requireFinite(std::span(points).first(count), std::span(values).first(count));
     for (std::size_t i = 0; i < count; ++i) samples[sampleAt(i)] = values[i];
   }
-  evaluations_ += samples.size();
   return samples;
+}
+
+std::vector<double> CellFitter::sample(std::span<const Box> cells, std::span<const Vector3> local,
+                                       std::span<const std::uint32_t> order) const {
+  evaluations_ += cells.size() * local.size();
+  return sampleCells(distance_, cells, local, order, progress_);
 }
 
 bool CellFitter::outsideBand(const Box& cell, const basis::Projection& projection,

@@ -23,6 +23,13 @@ namespace hpsdf::detail {
 /// Throws `Error` if a distance is not finite. The message names the first such point.
 void requireFinite(std::span<const Vector3> points, std::span<const double> distances);
 
+/// Returns the exact distances at the same local points of several cells, one cell after another. They are evaluated in
+/// the order `order` or, if `order` is empty, in the order of the points. Throws `Error` if a distance is not finite,
+/// and `Cancelled` when `progress` says so.
+std::vector<double> sampleCells(const DistanceFunction& distance, std::span<const Box> cells,
+                                std::span<const Vector3> local, std::span<const std::uint32_t> order,
+                                const Progress& progress);
+
 /// The projection of a cell's samples onto the highest polynomial degree for which the samples suffice.
 struct CachedProjection {
   std::vector<double> coefficients;
@@ -44,6 +51,8 @@ struct Fit {
   LeafSign sign = {};
 
   bool isExact() const { return degree == kExactDegree; }
+  /// Returns the value of the polynomial at a point in local coordinates of the cell.
+  double valueAt(const Vector3& local) const;
 };
 
 /// Exact distances at points of a cell that are not among its samples, for `Estimator::checked`.
@@ -96,8 +105,7 @@ class CellFitter {
   };
 
   const Rules& rules(int degree) const;
-  /// Returns the exact distances at the same local points of several cells, one cell after another. They are
-  /// evaluated in the order `order` or, if `order` is empty, in the order of the points.
+  /// Calls `sampleCells` and counts the evaluations.
   std::vector<double> sample(std::span<const Box> cells, std::span<const Vector3> local,
                              std::span<const std::uint32_t> order) const;
   bool outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const;

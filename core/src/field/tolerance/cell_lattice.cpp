@@ -8,16 +8,6 @@
 namespace hpsdf::detail {
 namespace {
 
-/// Calls visit(x, y, z) for all positions in a lattice with `across` points along each axis, in blocks of eight
-/// neighbours. `across` is even.
-template <typename F>
-void forEachInBlocks(int across, const F& visit) {
-  for (int z = 0; z < across; z += 2)
-    for (int y = 0; y < across; y += 2)
-      for (int x = 0; x < across; x += 2)
-        for (int corner = 0; corner < 8; ++corner) visit(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2));
-}
-
 Eigen::MatrixXd valuesAt(std::span<const Vector3> points, int degree) {
   Eigen::MatrixXd values(points.size(), coefficientCount(degree));
   std::array<double, CellLattice::kMostDegree + 1> x, y, z;
@@ -40,14 +30,9 @@ std::vector<double> product(const Eigen::MatrixXd& matrix, std::span<const doubl
 
 }  // namespace
 
-CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (kAcross - 1)) {
-  std::array<std::array<std::array<std::uint32_t, kAcross>, kAcross>, kAcross> indices;
-  forEachInBlocks(kAcross, [&](int x, int y, int z) {
-    indices[x][y][z] = static_cast<std::uint32_t>(points_.size());
-    points_.push_back(spacing_ * Vector3(x, y, z) - Vector3::Constant(reach));
-    for (const auto& [i, j, k] : {std::array{x - 1, y, z}, std::array{x, y - 1, z}, std::array{x, y, z - 1}})
-      if (i >= 0 && j >= 0 && k >= 0) neighbours_.emplace_back(indices[i][j][k], points_.size() - 1);
-  });
+CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (ProbeLattice::kAcross - 1)) {
+  constexpr int kAcross = ProbeLattice::kAcross;
+  for (const Vector3& point : probePoints()) points_.push_back(reach * point);
 
   // Along each axis there are the two ends and the middles of all intervals.
   const auto between = [&](int n) { return n == 0 ? 0.0 : n == kAcross ? double(kAcross - 1) : n - 0.5; };

@@ -8,26 +8,27 @@
 #include <utility>
 #include <vector>
 
+#include "field/cells/probes.h"
 #include "hpsdf/types.h"
 
 namespace hpsdf::detail {
 
-/// A lattice of 8 × 8 × 8 points between opposite corners of a cell, with least-squares fits of the polynomials of low
-/// total degree to samples at these points. Points are in local coordinates of the cell.
+/// The lattice of 8 × 8 × 8 points at which a cell is probed (`ProbeLattice`), scaled about the cell's centre, with
+/// least-squares fits of the polynomials of low total degree to samples at these points. Points are in local
+/// coordinates of the cell.
 class CellLattice {
  public:
-  static constexpr int kAcross = 8;
   static constexpr int kMostDegree = 5;  ///< 56 coefficients; with more of them, errors between the points grow
 
   /// The lattice reaches from −`reach` to `reach` along each axis.
   explicit CellLattice(double reach);
 
-  /// Points of the lattice, in blocks of eight neighbours: exact distances are fastest for such blocks.
+  /// Points of the lattice, in blocks of eight neighbours.
   std::span<const Vector3> points() const { return points_; }
   /// Points halfway between those of the lattice, in the interior, on the faces and on the edges of the cell.
   std::span<const Vector3> pointsBetween() const { return between_; }
   /// Pairs of neighbours in `points()`.
-  std::span<const std::pair<std::uint32_t, std::uint32_t>> neighbours() const { return neighbours_; }
+  std::span<const std::pair<std::uint32_t, std::uint32_t>> neighbours() const { return probeLattice().neighbours; }
   /// Distance between two neighbours along an axis.
   double spacing() const { return spacing_; }
   double reach() const { return reach_; }
@@ -45,7 +46,6 @@ class CellLattice {
 
   double reach_, spacing_;
   std::vector<Vector3> points_, between_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> neighbours_;
   std::array<Matrices, kMostDegree + 1> matrices_;  ///< by degree; there are none for degree 0
 };
 

@@ -5,12 +5,9 @@
 #include <utility>
 
 #include "field/cells/cell_bounds.h"
-#include "field/query/evaluate.h"
 
 namespace hpsdf::detail {
 namespace {
-
-constexpr std::size_t kPointsAtOnce = 512;
 
 /// Greatest ratio of an error to the allowed error that a polynomial may have at the checked points. The rest is for
 /// errors between them and for the rounding of coefficients.
@@ -22,14 +19,6 @@ constexpr double kHopeless = 200;
 
 /// Share of the difference between the errors at two neighbouring points that is added to the greater one.
 constexpr double kShareOfDifference = 0.25;
-
-double valueAt(const Fit& fit, const Vector3& local) {
-  return query::evaluate(fit.coefficients.data(), fit.degree, {local.x(), local.y(), local.z()});
-}
-
-Vector3 worldPoint(const Box& cell, const Vector3& local) {
-  return cell.center() + (cell.sizes() / 2).cwiseProduct(local);
-}
 
 /// Returns true if the distance changes faster between two neighbouring points than a signed distance can.
 bool hasJump(const CellLattice& lattice, const Box& cell, std::span<const double> distances) {
@@ -64,17 +53,8 @@ ToleranceFitter::ToleranceFitter(const DistanceFunction& distance, const Allowed
 }
 
 std::vector<double> ToleranceFitter::distances(const Box& cell, std::span<const Vector3> local) const {
-  progress_.throwIfCancelled();
-  std::vector<Vector3> points(local.size());
-  std::vector<double> values(local.size());
-  for (std::size_t i = 0; i < local.size(); ++i) points[i] = worldPoint(cell, local[i]);
-  for (std::size_t first = 0; first < local.size(); first += kPointsAtOnce) {
-    const std::size_t count = std::min(kPointsAtOnce, local.size() - first);
-    distance_(std::span(points).subspan(first, count), std::span(values).subspan(first, count));
-  }
-  requireFinite(points, values);
   evaluations_ += local.size();
-  return values;
+  return sampleCells(distance_, {&cell, 1}, local, {}, progress_);
 }
 
 /// Returns the greatest error at the lattice, in multiples of the allowed error. A part of the difference between
@@ -94,7 +74,7 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::check(const Fit& fit
   const std::vector<double> exact = distances(cell, local);
   std::vector<CheckedPoint> points(local.size());
   for (std::size_t i = 0; i < local.size(); ++i)
-    points[i] = {local[i], std::abs(valueAt(fit, local[i]) - exact[i]) / allowed_.at(exact[i])};
+    points[i] = {local[i], std::abs(fit.valueAt(local[i]) - exact[i]) / allowed_.at(exact[i])};
   return points;
 }
 
@@ -152,7 +132,7 @@ void ToleranceFitter::addSurfacePoints(const Fit& fit, const Box& cell, std::vec
   const Vector3 half = cell.sizes() / 2;
   surface_->forEachIn(cell, [&](const Vector3& point) {
     const Vector3 local = (point - cell.center()).cwiseQuotient(half);
-    points.push_back({local, std::abs(valueAt(fit, local) + surface_->offset()) / allowed_.at(surface_->offset())});
+    points.push_back({local, std::abs(fit.valueAt(local) + surface_->offset()) / allowed_.at(surface_->offset())});
   });
 }
 

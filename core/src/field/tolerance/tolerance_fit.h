@@ -1,9 +1,7 @@
 #pragma once
 // Polynomials of cells whose errors stay within a tolerance.
 
-#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -30,7 +28,7 @@ struct ToleranceFit {
 class ToleranceFitter {
  public:
   /// Keeps references to the distance and to the progress. `certified` takes only polynomials for which
-  /// `polynomialBound` proves the tolerance in the whole cell. `domain` limits the points at which this bound evaluates
+  /// `isProvenWithin` proves the tolerance in the whole cell. `domain` limits the points at which the proof evaluates
   /// the distance.
   ToleranceFitter(const DistanceFunction& distance, const AllowedError& allowed, const Box& domain, double blend,
                   bool certified, const Progress& progress);
