@@ -113,7 +113,7 @@ std::map<std::string, std::string> Explorer::settingsOfField() const {
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
   BuildOptions built = settingsOf(field.data());
   // If the construction had no target error, use the error that the field reached as the target.
-  if (built.targetError.isNone() && !(built.maxError > 0) && !(built.tolerance > 0))
+  if (built.targetError.isNone() && !(built.maxError > 0) && !(built.tolerance > 0) && !built.maxBytes)
     built.targetError = field.metadata().totalError;
   std::map<std::string, std::string> settings;
   for (const BuildSetting& setting : buildSettings()) {

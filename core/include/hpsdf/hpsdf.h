@@ -4,6 +4,7 @@
 
 #include "hpsdf/build.h"
 #include "hpsdf/build_options.h"
+#include "hpsdf/cell_history.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/error.h"

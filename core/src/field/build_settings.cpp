@@ -214,7 +214,7 @@ const std::vector<Row> kRows = {
      "Error to be exceeded nowhere (within the band, if there is one): after the target, if one is given, every cell "
      "is probed at 512 points and refined where the error is greater. Expensive; takes no target error unless one is "
      "given."},
-    {"max-bytes", kAsked, wholeNumber().within(1, kMostBytes).in("bytes").ends(Ending::otherQuantity),
+    {"max-bytes", kAsked, wholeNumber().within(1, kMostBytes).in("bytes").ends(Ending::otherQuantity).stored(22),
      member<&BuildOptions::maxBytes>,
      "The best field of at most so many bytes of memory, e.g. 4e6. Takes no target error unless one is given; with "
      "max-error it ends where that is reached."},
@@ -273,10 +273,10 @@ const std::vector<Row> kRows = {
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,
      "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of the distances "
      "for the same error."},
-    {"cubature", kMethod, choice({"compact", "product"}).advanced(), member<&BuildOptions::cubature>,
+    {"cubature", kMethod, choice({"compact", "product"}).stored(20).advanced(), member<&BuildOptions::cubature>,
      "Rule by which cells are sampled: compact needs half the points for the same order where such rules are known "
      "(orders up to 13); product takes Gauss points along each axis, as the paper does."},
-    {"trial-samples", kMethod, choice({"children", "own"}).hidden(), member<&BuildOptions::trialSamples>, ""},
+    {"trial-samples", kMethod, choice({"children", "own"}).stored(21).hidden(), member<&BuildOptions::trialSamples>, ""},
     {"band", kResult, number().atLeast(0).in("world units").stored(7).advanced(), member<&BuildOptions::band>,
      "Width of a narrow band: cells farther from the surface than this are not refined and do not count. 0: no band."},
     // settings for changes to the finished octree and for the number of threads

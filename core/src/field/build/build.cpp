@@ -26,28 +26,10 @@ namespace {
 
 using namespace detail;
 
-/// Returns the error down to which the octree is refined. If pruning follows, this error is smaller than the goal of
-/// the whole construction.
-ErrorGoal growthGoal(const BuildOptions& options, const ErrorGoal& goal) {
-  return options.criterion == Criterion::optimal ? goal.times(kGrowth) : goal;
-}
-
-double nearDistance(const BuildOptions& options, double referenceLength) {
-  const double asked = options.targetError.byDistance().nearDistance;
-  return asked > 0 ? asked : 0.01 * referenceLength;
-}
-
-std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, const Box& domain) {
-  const double length = referenceLength(distance.source(), domain);
-  if (options.strategy != Strategy::hpx || !mayHaveExactLeaves(distance, length)) return std::nullopt;
-  return ExactCells(*distance.triangleSearch(), options.exactWithin * length,
-                    static_cast<std::size_t>(options.exactTriangles), options.blend);
-}
-
 /// Estimates the octree of the exact leaves, as far as it has no more than `mostNodes` nodes.
 ExactEstimate exactEstimate(const DistanceFunction& distance, const BuildOptions& options, const Box& domain,
                             double mostNodes, const Progress& progress) {
-  const std::optional<ExactCells> cells = exactCells(distance, options, domain);
+  const std::optional<ExactCells> cells = exactCells(distance, domain, options);
   if (!cells) return {};
   BuildTree baseCells{.domain = domain, .grid = options.grid, .nodes = {}};
   baseCells.addBaseCells();
@@ -86,15 +68,8 @@ class Construction {
   Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                const Progress& progress)
       : budget_(options),
-        setup_{.distance = distance,
-               .options = options,
-               .progress = progress,
-               .referenceLength = referenceLength(distance.source(), domain),
-               .goal = errorGoal(options, referenceLength(distance.source(), domain)),
-               .growthGoal = growthGoal(options, errorGoal(options, referenceLength(distance.source(), domain))),
-               .budget = budget_,
-               .exactCells = exactCells(distance, options, domain)},
-        fitter_(distance, options, state_.nearness, nearDistance(options, setup_.referenceLength), progress),
+        setup_(makeSetup(distance, domain, options, budget_, progress)),
+        fitter_(distance, options, state_.nearness, setup_.nearDistance, progress),
         refiner_{setup_, fitter_, state_, observer_} {
     state_.nearness = nearnessOf(options, domain);
     state_.tree.domain = domain;

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "field/build/refiner.h"
-#include "field/cells/probes.h"
 
 namespace hpsdf::detail {
 namespace {
@@ -113,21 +112,20 @@ class Growth {
     if (tree.nodes.empty()) {
       tree.addBaseCells();
       if (setup_.exactCells) {
-        const auto smooth = [&](const Box& cell) { return smoothFit(cell); };
+        const auto smooth = [&](const Box& cell) { return refiner_.smoothFit(cell); };
         placeExactLeaves(
             tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress,
             [&](const ExactEstimate& soFar) { requireMemoryForExact(soFar, setup_.distance.bytes(), setup_.options); });
       }
     }
     const std::size_t count = tree.nodes.size();
-    const int degree = startDegree(setup_.options);
     while (state_.fittedCells < count) {
       const auto begin = std::size_t(state_.fittedCells);
       setup_.progress.update("fitting first cells", double(begin) / double(count));
       const std::size_t end = std::min(begin + kChunk, count);
       tbb::parallel_for(begin, end, [&](std::size_t n) {
         BuildNode& node = tree.nodes[n];
-        if (node.firstChild == 0 && !node.fit.isFinal) node.fit = firstFit(tree.boxOf(node), degree);
+        if (node.firstChild == 0 && !node.fit.isFinal) node.fit = refiner_.firstFit(tree.boxOf(node));
       });
       state_.fittedCells = end;
       refiner_.observer.atWholeState();
@@ -154,19 +152,6 @@ class Growth {
       least += setup_.budget.leafBytes(mayLower ? leastDegree(setup_.options) : node.fit.degree);
     }
     setup_.budget.requireRoomForFirstCells(refiner_.bytes(), least, state_.exactSize.inField);
-  }
-
-  /// Returns a polynomial that stands for the triangles near a cell, if there is one.
-  std::optional<Fit> smoothFit(const Box& cell) const {
-    const double tolerance = setup_.options.exactTolerance * setup_.referenceLength;
-    if (!(tolerance > 0)) return std::nullopt;
-    return fitWithin(fitter_, cell, tolerance, setup_.options.maxDegree,
-                     [&] { return setup_.exactCells->isSmooth(cell); });
-  }
-
-  Fit firstFit(const Box& cell, int degree) const {
-    std::optional<Fit> exact = setup_.exactCells ? setup_.exactCells->fitOfFirstCell(cell) : std::nullopt;
-    return exact ? std::move(*exact) : fitter_.fit(cell, degree);
   }
 
   /// Chooses the exponent θ of the weight by which errors far from the surface count less. With this θ, a cell at the
@@ -248,9 +233,7 @@ class Growth {
   }
 
   void refine(std::uint32_t leaf, Trial&& trial) {
-    const BuildNode& node = state_.tree.nodes[leaf];
-    const bool raises =
-        refiner_.allowed(node) != Refinement::octree && prefersDegree(node.fit, trial, setup_.options.estimator);
+    const bool raises = refiner_.raises(state_.tree.nodes[leaf], trial);
     refiner_.apply(leaf, std::move(trial), raises);
     if (state_.isFull) return;
     const std::uint32_t first = state_.tree.nodes[leaf].firstChild;

@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "field/cells/exact_lists.h"
+
 namespace hpsdf::detail {
 namespace {
 
@@ -17,44 +19,43 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-void LeastBytes::consider(CheapCell& cell, Fit&& fit, double bytes, double ratio) const {
+void LeastBytes::consider(CheapCell& cell, Fit&& fit, double bytes, double ratio,
+                          std::vector<LeafTrial>* trials) const {
+  if (trials) trials->push_back({fit.degree, bytes, ratio, fit.list.triangles.size(), bytes < cell.bytes});
   if (bytes >= cell.bytes) return;
   cell.fit = std::move(fit);
   cell.bytes = bytes;
   cell.leafRatio = ratio;
 }
 
-/// Returns the bytes of a leaf without error. A triangle is stored once, however many leaves refer to it. Its bytes
-/// count in the leaf that contains its first corner.
+/// Returns the bytes of a leaf without error.
 double LeastBytes::exactBytes(const Fit& fit, const Box& box) const {
   if (!fit.isExact()) return polynomialBytes(fit);
-  constexpr double kWord = 4, kTriangle = 12 + 12 / 2.0;  // a closed mesh has half as many vertices as triangles
-  const std::vector<std::uint32_t>& list = fit.list.triangles;
   const TriangleSearch& search = exact_->search();
-  std::size_t runs = 0, owned = 0;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    runs += i == 0 || list[i] != list[i - 1] + 1;
-    owned += box.contains(search.vertices()[search.triangles()[list[i]][0]]);
-  }
-  const std::size_t octantWords = (list.size() + 3) / 4, signWords = fit.sign.rule == ExactSign::winding ? 4 : 0;
-  return budget_.nodeBytes() + kWord * double(1 + octantWords + runs + signWords) + kTriangle * double(owned);
+  const auto isOwned = [&](std::uint32_t triangle) {
+    return box.contains(search.vertices()[search.triangles()[triangle][0]]);
+  };
+  const auto owned = static_cast<std::size_t>(std::ranges::count_if(fit.list.triangles, isOwned));
+  return budget_.nodeBytes() + listBytesOf(packedWords(fit.list, fit.sign), owned);
 }
 
 /// Makes a leaf of a cell that is not divided although no leaf is within the tolerance.
-void LeastBytes::makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&& polynomial) const {
+void LeastBytes::makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&& polynomial,
+                                  std::vector<LeafTrial>* trials) const {
   if (exact_)
     if (std::optional<Fit> fit = exact_->makeExact(box, false).fit) {
       const double bytes = exactBytes(*fit, box);
-      return consider(cell, std::move(*fit), bytes);
+      return consider(cell, std::move(*fit), bytes, 0, trials);
     }
   if (polynomial.closest.coefficients.empty()) polynomial = fitter_.fit(box, 0);
   cell.isMissed = !polynomial.fit;
   Fit fit = cell.isMissed ? std::move(polynomial.closest) : std::move(*polynomial.fit);
   const double bytes = polynomialBytes(fit);
-  consider(cell, std::move(fit), bytes, polynomial.ratio);
+  consider(cell, std::move(fit), bytes, polynomial.ratio, trials);
 }
 
-bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove) const {
+bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove,
+                          std::vector<LeafTrial>* trials) const {
   constexpr double kSmallestChild = 4;  // coefficients
   const double leastOfChildren = budget_.bytes(8, 8 * kSmallestChild);
   const Box box = tree_.boxOf(place);
@@ -63,8 +64,8 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
   cell.bytes = kNone;
   if (exact_) {
     if (std::optional<Fit> fit = exact_->fitOfFarCell(box, kFewTriangles)) {
-      cell.bytes = exactBytes(*fit, box);
-      cell.fit = std::move(*fit);
+      const double bytes = exactBytes(*fit, box);
+      consider(cell, std::move(*fit), bytes, 0, trials);
       return false;
     }
   }
@@ -72,13 +73,15 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
   cell.ratio = polynomial.ratio;
   if (polynomial.fit) {
     const double bytes = polynomialBytes(*polynomial.fit);
-    consider(cell, std::move(*polynomial.fit), bytes, polynomial.ratio);
+    consider(cell, std::move(*polynomial.fit), bytes, polynomial.ratio, trials);
+  } else if (trials && !polynomial.closest.coefficients.empty()) {
+    trials->push_back({polynomial.closest.degree, polynomialBytes(polynomial.closest), polynomial.ratio, 0, false});
   }
   constexpr int kCheapDegree = 2;  // a longer list than those above does not take fewer bytes
   if (exact_ && (!polynomial.fit || cell.fit.degree > kCheapDegree)) {
     if (std::optional<Fit> fit = exact_->fitOfFarCell(box, kMostTriangles)) {
       const double bytes = exactBytes(*fit, box);
-      consider(cell, std::move(*fit), bytes);
+      consider(cell, std::move(*fit), bytes, 0, trials);
     }
   }
   if (cell.bytes <= leastOfChildren) return false;
@@ -89,7 +92,7 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
   const bool isSmallest = place.depth >= maxDepth_ ||
                           (polynomial.jumps && box.sizes().maxCoeff() < kSmallestAtJump * fitter_.allowed().tolerance);
   if (!isSmallest) return true;
-  if (cell.bytes == kNone) makeSmallestLeaf(cell, box, std::move(polynomial));
+  if (cell.bytes == kNone) makeSmallestLeaf(cell, box, std::move(polynomial), trials);
   return false;
 }
 

@@ -28,6 +28,15 @@ struct CheapCell {
   std::unique_ptr<std::array<CheapCell, 8>> children = {};
 };
 
+/// A leaf that was considered for a cell.
+struct LeafTrial {
+  int degree = 0;  ///< `kExactDegree` for a list of triangles
+  double bytes = 0;
+  double ratio = 0;           ///< error over the allowed error, 0 without error
+  std::size_t triangles = 0;  ///< length of the list
+  bool isTaken = false;       ///< it takes the fewest bytes so far
+};
+
 /// Seeks the octree of a cell that takes the fewest bytes within a tolerance. A leaf is a polynomial of low degree or,
 /// if the distance is measured to triangles, an exact leaf. A cell is divided if its children take fewer bytes.
 /// Thread-safe.
@@ -46,8 +55,10 @@ class LeastBytes {
         requireRoom_(std::move(requireRoom)) {}
 
   /// Makes the leaf of a cell that takes the fewest bytes. Returns true if the cell's children might take fewer bytes,
-  /// or if there is no such leaf. `ratioAbove` is the error ratio of the parent, 0 if there is none.
-  bool makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove) const;
+  /// or if there is no such leaf. `ratioAbove` is the error ratio of the parent, 0 if there is none. Appends the leaves
+  /// that were considered to `trials`, if that is given.
+  bool makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove,
+                std::vector<LeafTrial>* trials = nullptr) const;
   /// Gives a cell eight children without fits.
   static void divide(CheapCell& cell) { cell.children = std::make_unique<std::array<CheapCell, 8>>(); }
   /// Decides between the leaf of a cell and its children, which are settled, and removes the other.
@@ -59,10 +70,11 @@ class LeastBytes {
   std::uint64_t cells() const { return cells_; }
 
  private:
-  void consider(CheapCell& cell, Fit&& fit, double bytes, double ratio = 0) const;
+  void consider(CheapCell& cell, Fit&& fit, double bytes, double ratio, std::vector<LeafTrial>* trials) const;
   double polynomialBytes(const Fit& fit) const { return budget_.bytes(1, double(fit.coefficients.size())); }
   double exactBytes(const Fit& fit, const Box& box) const;
-  void makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&& polynomial) const;
+  void makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&& polynomial,
+                        std::vector<LeafTrial>* trials) const;
 
   const BuildTree& tree_;
   const ToleranceFitter& fitter_;

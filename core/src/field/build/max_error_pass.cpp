@@ -17,7 +17,7 @@ namespace {
 class MaxErrorPass {
  public:
   explicit MaxErrorPass(Refiner& refiner)
-      : setup_(refiner.setup), fitter_(refiner.fitter), state_(refiner.state), refiner_(refiner) {}
+      : setup_(refiner.setup), state_(refiner.state), refiner_(refiner) {}
 
   void run() {
     constexpr std::size_t kRound = 256;
@@ -30,42 +30,34 @@ class MaxErrorPass {
     while (state_.processed < pending.size()) {
       refiner_.requireMemory();
       setup_.progress.update("probing the maximum error", double(state_.processed) / double(pending.size()));
-      std::vector<Candidate> candidates =
-          evaluateCandidates(std::min<std::size_t>(kRound, pending.size() - state_.processed));
-      for (std::size_t i = 0; i < candidates.size(); ++i)
-        apply(pending[state_.processed + i], std::move(candidates[i]));
-      state_.processed += candidates.size();
+      std::vector<Probed> probed =
+          probeLeaves(std::min<std::size_t>(kRound, pending.size() - state_.processed));
+      for (std::size_t i = 0; i < probed.size(); ++i)
+        apply(pending[state_.processed + i], std::move(probed[i]));
+      state_.processed += probed.size();
       refiner_.observer.atWholeState();
     }
     refiner_.sumTotals();
   }
 
  private:
-  /// The result of probing one leaf: its greatest error and, if that error is too great, the fits of its possible
-  /// refinements.
-  struct Candidate {
-    double worst = 0;  ///< greatest error, from `worstError`
-    std::optional<Trial> trial;
-    bool raises = false;
-  };
-
-  std::vector<Candidate> evaluateCandidates(std::size_t count) const {
-    std::vector<Candidate> candidates(count);
+  std::vector<Probed> probeLeaves(std::size_t count) const {
+    std::vector<Probed> probed(count);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      candidates[i] = evaluateCandidate(state_.tree.nodes[state_.pending[state_.processed + i]]);
+      probed[i] = probe(refiner_, state_.tree.nodes[state_.pending[state_.processed + i]]);
     });
-    return candidates;
+    return probed;
   }
 
   /// Applies the refinement that was chosen for a leaf. Appends the refined leaf or its children to the leaves
   /// that are still to be probed.
-  void apply(std::uint32_t leaf, Candidate&& candidate) {
-    if (!candidate.trial) {
-      state_.measuredError = std::max(state_.measuredError, candidate.worst);
+  void apply(std::uint32_t leaf, Probed&& probed) {
+    if (!probed.trial) {
+      state_.measuredError = std::max(state_.measuredError, probed.worst);
       return;
     }
     const bool mayStep = refiner_.mayStep();
-    if (mayStep) refiner_.apply(leaf, std::move(*candidate.trial), candidate.raises);
+    if (mayStep) refiner_.apply(leaf, std::move(*probed.trial), probed.raises);
     if (!mayStep || state_.isFull || state_.tree.nodes[leaf].firstChild == 0) {
       state_.pending.push_back(leaf);  // probe the leaf again; if no step is left, only to measure its error
       return;
@@ -74,49 +66,48 @@ class MaxErrorPass {
     for (std::uint32_t child = first; child < first + 8; ++child) state_.pending.push_back(child);
   }
 
-  Candidate evaluateCandidate(const BuildNode& leaf) const {
-    Candidate candidate;
-    if (leaf.fit.outsideBand || leaf.fit.isFinal) return candidate;
-    const double most = setup_.options.maxError;
-    const std::optional<Refinement> found = refiner_.allowed(leaf);
-    const bool mayRefine = refiner_.mayStep() && found;
-    const Refinement allowed = found.value_or(Refinement::either);
-
-    // Refine the leaf without probing it if its estimated RMS error exceeds half of the maximum error. Its greatest
-    // error is then very probably too great.
-    const bool isSurelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;
-    if (mayRefine && isSurelyBad) {
-      candidate.trial = refiner_.attempt(leaf, allowed);
-      candidate.raises = prefersDegree(leaf.fit, *candidate.trial, setup_.options.estimator);
-      return candidate;
-    }
-
-    // Compare the leaf's polynomial with the exact distance at the probes. A probe slightly outside the narrow band
-    // counts too, because it represents the points around it that lie within the band.
-    const Box box = state_.tree.boxOf(leaf);
-    const std::vector<double> exact = fitter_.distances(box, probePoints());
-    const double band = setup_.options.band;
-    const double farthest =
-        band > 0 ? band + probeSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();
-    candidate.worst = worstError(leaf.fit, exact, farthest);
-    if (candidate.worst <= most || !mayRefine) return candidate;
-
-    // Try the allowed refinements. Raise the degree if that makes the error small enough, else decide by the
-    // criterion of the paper.
-    candidate.trial = refiner_.attempt(leaf, allowed);
-    const std::optional<Fit>& raised = candidate.trial->raised;
-    candidate.raises = (raised && worstError(*raised, exact, farthest) <= most) ||
-                       prefersDegree(leaf.fit, *candidate.trial, setup_.options.estimator);
-    return candidate;
-  }
-
   const ConstructionSetup& setup_;
-  const CellFitter& fitter_;
   ConstructionState& state_;
   Refiner& refiner_;
 };
 
 }  // namespace
+
+Probed probe(const Refiner& refiner, const BuildNode& leaf) {
+  Probed probed;
+  if (leaf.fit.outsideBand || leaf.fit.isFinal) return probed;
+  const double most = refiner.setup.options.maxError;
+  const std::optional<Refinement> found = refiner.allowed(leaf);
+  const bool mayRefine = refiner.mayStep() && found;
+  const Refinement allowed = found.value_or(Refinement::either);
+
+  // Refine the leaf without probing it if its estimated RMS error exceeds half of the maximum error. Its greatest
+  // error is then very probably too great.
+  const bool isSurelyBad = leaf.fit.error.squared > most * most / 4 * leaf.fit.error.volume;
+  if (mayRefine && isSurelyBad) {
+    probed.trial = refiner.attempt(leaf, allowed);
+    probed.raises = refiner.raises(leaf, *probed.trial);
+    return probed;
+  }
+
+  // Compare the leaf's polynomial with the exact distance at the probes. A probe slightly outside the narrow band
+  // counts too, because it represents the points around it that lie within the band.
+  const Box box = refiner.state.tree.boxOf(leaf);
+  const std::vector<double> exact = refiner.fitter.distances(box, probePoints());
+  const double band = refiner.setup.options.band;
+  const double farthest =
+      band > 0 ? band + probeSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();
+  probed.worst = worstError(leaf.fit, exact, farthest);
+  if (probed.worst <= most || !mayRefine) return probed;
+
+  // Try the allowed refinements. Raise the degree if that makes the error small enough, else decide by the
+  // criterion of the paper.
+  probed.trial = refiner.attempt(leaf, allowed);
+  const std::optional<Fit>& raised = probed.trial->raised;
+  probed.raises = (raised && allowed != Refinement::octree && worstError(*raised, exact, farthest) <= most) ||
+                     refiner.raises(leaf, *probed.trial);
+  return probed;
+}
 
 void refineByProbes(Refiner& refiner) { MaxErrorPass(refiner).run(); }
 

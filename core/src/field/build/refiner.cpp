@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "basis/projection.h"
+#include "field/cells/probes.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::detail {
@@ -18,24 +19,50 @@ double embeddedError(const Fit& fit) {
 }
 
 template <typename ErrorOf>
-bool gainsMoreByDegree(const Fit& current, const Trial& trial, const ErrorOf& errorOf) {
-  double worstChild = 0;
-  for (const Fit& child : *trial.children) worstChild = std::max(worstChild, errorOf(child));
+Gains gainsBy(const Fit& current, const Trial& trial, const ErrorOf& errorOf) {
   const int p = current.degree;
   const double error = errorOf(current);
-  const double mu = (error - 8 * errorOf(*trial.raised)) / (coefficientCount(p + 1) - coefficientCount(p));
-  const double nu = (error - 8 * worstChild) / (7 * coefficientCount(p));
-  return mu > nu;
+  Gains gains;
+  if (trial.raised)
+    gains.degree = (error - 8 * errorOf(*trial.raised)) / (coefficientCount(p + 1) - coefficientCount(p));
+  if (trial.children) {
+    double worstChild = 0;
+    for (const Fit& child : *trial.children) worstChild = std::max(worstChild, errorOf(child));
+    gains.octree = (error - 8 * worstChild) / (7 * coefficientCount(p));
+  }
+  return gains;
 }
 
 }  // namespace
 
-bool prefersDegree(const Fit& current, const Trial& trial, Estimator estimator) {
+Gains gainsOf(const Fit& current, const Trial& trial, Estimator estimator) {
   constexpr double kBlind = 4;  // the embedded estimate sees hardly anything of an error so many times greater
-  if (!trial.raised || !trial.children) return trial.raised.has_value();
   if (estimator == Estimator::checked && current.error.weighted <= kBlind * embeddedError(current))
-    return gainsMoreByDegree(current, trial, embeddedError);
-  return gainsMoreByDegree(current, trial, [](const Fit& fit) { return fit.error.weighted; });
+    return gainsBy(current, trial, embeddedError);
+  return gainsBy(current, trial, [](const Fit& fit) { return fit.error.weighted; });
+}
+
+ConstructionSetup makeSetup(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+                            const ByteBudget& budget, const Progress& progress) {
+  const double length = referenceLength(distance.source(), domain);
+  const ErrorGoal goal = errorGoal(options, length);
+  const double asked = options.targetError.byDistance().nearDistance;
+  return {.distance = distance,
+          .options = options,
+          .progress = progress,
+          .referenceLength = length,
+          .nearDistance = asked > 0 ? asked : 0.01 * length,
+          .goal = goal,
+          .growthGoal = options.criterion == Criterion::optimal ? goal.times(kGrowth) : goal,
+          .budget = budget,
+          .exactCells = exactCells(distance, domain, options)};
+}
+
+std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Box& domain, const BuildOptions& options) {
+  const double length = referenceLength(distance.source(), domain);
+  if (options.strategy != Strategy::hpx || !mayHaveExactLeaves(distance, length)) return std::nullopt;
+  return ExactCells(*distance.triangleSearch(), options.exactWithin * length,
+                    static_cast<std::size_t>(options.exactTriangles), options.blend);
 }
 
 ErrorTotals sumOfErrors(const BuildTree& tree) {
@@ -54,6 +81,24 @@ std::optional<Refinement> Refiner::allowed(const BuildNode& leaf) const {
   if (mayRaise) return Refinement::degree;
   if (maySplit) return Refinement::octree;
   return std::nullopt;
+}
+
+std::optional<Fit> Refiner::smoothFit(const Box& cell) const {
+  const double tolerance = setup.options.exactTolerance * setup.referenceLength;
+  if (!(tolerance > 0)) return std::nullopt;
+  return fitWithin(fitter, cell, tolerance, setup.options.maxDegree, [&] { return setup.exactCells->isSmooth(cell); });
+}
+
+Fit Refiner::firstFit(const Box& cell) const {
+  std::optional<Fit> exact = setup.exactCells ? setup.exactCells->fitOfFirstCell(cell) : std::nullopt;
+  return exact ? std::move(*exact) : fitter.fit(cell, startDegree(setup.options));
+}
+
+bool Refiner::raises(const BuildNode& leaf, const Trial& trial) const {
+  if (allowed(leaf) == Refinement::octree || !trial.raised) return false;
+  if (!trial.children) return true;
+  const Gains gains = gainsOf(leaf.fit, trial, setup.options.estimator);
+  return *gains.degree > *gains.octree;
 }
 
 bool Refiner::mayStep() const {

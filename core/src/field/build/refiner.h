@@ -39,6 +39,7 @@ struct ConstructionSetup {
   const BuildOptions& options;
   const Progress& progress;
   double referenceLength;  ///< length L by which the target error is scaled
+  double nearDistance;     ///< distance up to which an error counts as near the surface
   ErrorGoal goal;
   ErrorGoal growthGoal;  ///< goal before pruning: a smaller error than `goal` if pruning follows
   const ByteBudget& budget;
@@ -49,6 +50,13 @@ struct ConstructionSetup {
     return detail::exactSize(tree, distance.triangleSearch(), budget.coefficientType());
   }
 };
+
+/// Returns the setup of a construction. It keeps references to the arguments.
+ConstructionSetup makeSetup(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+                            const ByteBudget& budget, const Progress& progress);
+
+/// Returns what makes exact leaves for these options; std::nullopt if they ask for none, or if there can be none.
+std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Box& domain, const BuildOptions& options);
 
 /// Callbacks during the refinement of the octree.
 struct GrowthObserver {
@@ -71,6 +79,16 @@ struct Refiner {
   std::optional<Refinement> allowed(const BuildNode& leaf) const;
   /// Returns false once the limit of refinement steps or of bytes is reached.
   bool mayStep() const;
+
+  /// Returns a polynomial that stands for the triangles near a cell, if there is one.
+  std::optional<Fit> smoothFit(const Box& cell) const;
+  /// Returns the first fit of a cell that exact leaves near the surface have left without one.
+  Fit firstFit(const Box& cell) const;
+
+  /// Decides between a higher degree and a split (paper, eqs. 7 to 9), with errors weighted by nearness to the surface.
+  /// Returns true if a higher degree reduces the error more per additional coefficient. If only one refinement was
+  /// tried, or is allowed, the decision is for that one.
+  bool raises(const BuildNode& leaf, const Trial& trial) const;
 
   /// Computes the fit without error of a leaf or, if there is none, the fits of its allowed refinements. Thread-safe.
   Trial attempt(const BuildNode& leaf, Refinement allowed) const;
@@ -95,11 +113,14 @@ struct Refiner {
   void requireMemory(double leastFactor = 1, double likelyFactor = 1) const;
 };
 
-/// Decides between a higher degree and a split (paper, eqs. 7 to 9), with errors weighted by nearness to the
-/// surface. Returns true if a higher degree reduces the error more per additional coefficient. If only one
-/// refinement was tried, the decision is for that one. For `Estimator::checked`, the errors are those of the embedded
-/// estimate where that sees the error of the current fit.
-bool prefersDegree(const Fit& current, const Trial& trial, Estimator estimator);
+/// The weighted error that a refinement removes per additional coefficient; empty for one that was not tried.
+struct Gains {
+  std::optional<double> degree, octree;
+};
+
+/// Returns the gains of a trial (μ and ν; paper, eqs. 7 to 9). For `Estimator::checked`, the errors are those of the
+/// embedded estimate where that sees the error of the current fit.
+Gains gainsOf(const Fit& current, const Trial& trial, Estimator estimator);
 
 ErrorTotals sumOfErrors(const BuildTree& tree);
 
@@ -107,6 +128,17 @@ ErrorTotals sumOfErrors(const BuildTree& tree);
 /// Algorithm 1). Continues with the next step if the state was restored. Ends early if the limit of steps or
 /// bytes is reached.
 void growByErrors(Refiner& refiner);
+
+/// What the pass for a maximum error makes of a leaf: the leaf's greatest error and, if that error is too great, the
+/// fits of its possible refinements.
+struct Probed {
+  double worst = 0;  ///< greatest error, from `worstError`
+  std::optional<Trial> trial;
+  bool raises = false;  ///< the choice between the refinements of `trial`
+};
+
+/// Measures the error of a leaf at probe points and, if it exceeds `BuildOptions::maxError`, chooses a refinement.
+Probed probe(const Refiner& refiner, const BuildNode& leaf);
 
 /// Measures the error of every leaf at probe points, and refines the leaf while its greatest error exceeds
 /// `BuildOptions::maxError`. If a limit ends this early, the state stores the greatest error that remains.

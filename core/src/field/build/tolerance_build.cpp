@@ -19,6 +19,21 @@
 namespace hpsdf::detail {
 namespace {
 
+std::optional<ExactCells> exactCellsWithin(const DistanceFunction& distance, const BuildOptions& options,
+                                           double length) {
+  constexpr double kShareOfPlanes = 0.01;  // of the tolerance, for planes that stand for triangles
+  if (!mayHaveExactLeaves(distance, length)) return std::nullopt;
+  return ExactCells(*distance.triangleSearch(), 0, static_cast<std::size_t>(options.exactTriangles), options.blend,
+                    kShareOfPlanes * options.tolerance);
+}
+
+std::uint32_t greatestDepth(const BuildOptions& options) {
+  const auto across = std::uint64_t(*std::ranges::max_element(options.grid));
+  std::uint32_t depth = 0;
+  while (depth < std::uint32_t(kMaxDepth) && across << (depth + 1) <= std::uint64_t{1} << 32) ++depth;
+  return depth;
+}
+
 using Clock = std::chrono::steady_clock;
 
 /// One construction within a tolerance. The cells of the first few depths are looked at depth by depth. Those that are
@@ -31,12 +46,9 @@ class ToleranceBuild {
       : distance_(distance),
         options_(options),
         progress_(progress),
-        length_(referenceLength(distance.source(), domain)),
-        tree_{.domain = domain, .grid = options.grid, .nodes = {}},
-        fitter_(distance, allowedError(options, length_), domain, options.blend, options.certified, progress),
-        budget_(options),
-        exact_(exactCells(distance, options, length_)),
-        cells_(tree_, fitter_, exact_, greatestDepth(), budget_,
+        setup_(distance, domain, options, progress),
+        tree_(setup_.tree),
+        cells_(setup_.tree, setup_.fitter, setup_.exact, setup_.maxDepth, setup_.budget,
                [this](std::uint64_t cells) { requireRoom(double(cells), 0); }) {}
 
   FieldData run() {
@@ -61,28 +73,12 @@ class ToleranceBuild {
     double ratioAbove;
   };
 
-  static std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options,
-                                              double length) {
-    constexpr double kShareOfPlanes = 0.01;  // of the tolerance, for planes that stand for triangles
-    if (!mayHaveExactLeaves(distance, length)) return std::nullopt;
-    return ExactCells(*distance.triangleSearch(), 0, static_cast<std::size_t>(options.exactTriangles), options.blend,
-                      kShareOfPlanes * options.tolerance);
-  }
-
-  /// Returns the greatest depth at which cell indices are whole numbers of 32 bits.
-  std::uint32_t greatestDepth() const {
-    const auto across = std::uint64_t(*std::ranges::max_element(options_.grid));
-    std::uint32_t depth = 0;
-    while (depth < std::uint32_t(kMaxDepth) && across << (depth + 1) <= std::uint64_t{1} << 32) ++depth;
-    return depth;
-  }
-
   /// Makes leaves of the cells of a depth, and divides those whose children may take fewer bytes, until there are
   /// enough cells that are not divided yet for tasks.
   void lookAtFirstDepths() {
     constexpr std::size_t kEnough = 500;
     for (std::uint32_t n = 0; n < roots_.size(); ++n) tasks_.push_back({&roots_[n], {0, tree_.nodes[n].cellIndex}, 0});
-    while (!tasks_.empty() && tasks_.size() < kEnough && firstDepths_ < int(greatestDepth())) {
+    while (!tasks_.empty() && tasks_.size() < kEnough && firstDepths_ < int(setup_.maxDepth)) {
       progress_.update("fitting first cells", 0);
       std::vector<std::uint8_t> divides(tasks_.size());
       tbb::parallel_for(std::size_t{0}, tasks_.size(), [&](std::size_t t) {
@@ -148,7 +144,7 @@ class ToleranceBuild {
   double firstBytesOf(const CheapCell& cell, int depth) const {
     if (depth == firstDepths_) return 0;
     if (!cell.children) return cell.bytes;
-    double bytes = budget_.nodeBytes();
+    double bytes = setup_.budget.nodeBytes();
     for (const CheapCell& child : *cell.children) bytes += firstBytesOf(child, depth + 1);
     return std::min(bytes, cell.bytes);
   }
@@ -179,15 +175,15 @@ class ToleranceBuild {
   FieldMetadata metadata(double greatestRatio) const {
     FieldMetadata metadata;
     metadata.source = distance_.source();
-    metadata.settings.strategy = exact_ ? Strategy::hpx : Strategy::hp;
+    metadata.settings.strategy = setup_.exact ? Strategy::hpx : Strategy::hp;
     metadata.settings.maxDegree = CellLattice::kMostDegree;
-    metadata.settings.maxDepth = static_cast<int>(greatestDepth());
+    metadata.settings.maxDepth = static_cast<int>(setup_.maxDepth);
     metadata.settings.tolerance = options_.tolerance;
-    metadata.settings.within = fitter_.allowed().within;
+    metadata.settings.within = setup_.fitter.allowed().within;
     metadata.settings.certified = options_.certified;
-    metadata.referenceLength = length_;
+    metadata.referenceLength = setup_.referenceLength;
     metadata.measuredError = greatestRatio * options_.tolerance;
-    metadata.exactEvaluations = fitter_.evaluations();
+    metadata.exactEvaluations = setup_.fitter.evaluations();
     return metadata;
   }
 
@@ -203,11 +199,8 @@ class ToleranceBuild {
   const BuildOptions& options_;
   const Progress& progress_;
   Clock::time_point began_ = Clock::now(), tasksBegan_ = began_;
-  double length_;
+  ToleranceSetup setup_;
   BuildTree tree_;
-  ToleranceFitter fitter_;
-  ByteBudget budget_;
-  std::optional<ExactCells> exact_;
   LeastBytes cells_;
   std::vector<CheapCell> roots_;
   std::vector<Task> tasks_;
@@ -219,6 +212,15 @@ class ToleranceBuild {
 };
 
 }  // namespace
+
+ToleranceSetup::ToleranceSetup(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+                               const Progress& progress)
+    : referenceLength(detail::referenceLength(distance.source(), domain)),
+      tree{.domain = domain, .grid = options.grid, .nodes = {}},
+      fitter(distance, allowedError(options, referenceLength), domain, options.blend, options.certified, progress),
+      budget(options),
+      exact(exactCellsWithin(distance, options, referenceLength)),
+      maxDepth(greatestDepth(options)) {}
 
 FieldData buildWithinTolerance(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                                const Progress& progress) {

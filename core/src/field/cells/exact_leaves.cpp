@@ -126,9 +126,7 @@ enum class Choice : std::uint8_t { leave, keep, split };
 /// Decides what becomes of a cell without a fit, and fits it if it stays whole.
 Choice chooseForCell(BuildNode& node, const Box& box, const ExactCells& cells, const SmoothFit& smoothFit,
                      bool isDivisible) {
-  if (!cells.mustBeExact(box)) return Choice::leave;
-  ExactCells::Outcome outcome{smoothFit(box), false};
-  if (!outcome.fit) outcome = cells.makeExact(box, isDivisible);
+  ExactCells::Outcome outcome = chooseExact(box, cells, smoothFit, isDivisible);
   if (outcome.divides) return Choice::split;
   if (!outcome.fit) return Choice::leave;
   node.fit = std::move(*outcome.fit);
@@ -189,6 +187,13 @@ double takeLists(BuildTree& tree, std::span<const std::uint32_t> level) {
 }
 
 }  // namespace
+
+ExactCells::Outcome chooseExact(const Box& cell, const ExactCells& cells, const SmoothFit& smoothFit,
+                                bool isDivisible) {
+  if (!cells.mustBeExact(cell)) return {};
+  if (std::optional<Fit> smooth = smoothFit(cell)) return {std::move(smooth), false};
+  return cells.makeExact(cell, isDivisible);
+}
 
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
                       const Progress& progress, const std::function<void(const ExactEstimate&)>& afterDepth) {

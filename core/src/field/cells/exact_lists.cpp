@@ -6,6 +6,15 @@
 
 namespace hpsdf::detail {
 
+std::size_t packedWords(const TriangleList& list, const LeafSign& sign) {
+  const std::vector<std::uint32_t>& triangles = list.triangles;
+  std::size_t words = TriangleListView::runsAt(static_cast<std::uint32_t>(triangles.size()));
+  for (std::size_t begin = 0, length = 0; begin < triangles.size(); begin += length, ++words)
+    for (length = 1; length < triangle_run::kMostLength && begin + length < triangles.size(); ++length)
+      if (triangles[begin + length] != triangles[begin] + length) break;
+  return words + (sign.rule == ExactSign::winding ? TriangleListView::kReferenceWords : 0);
+}
+
 void ExactListPacker::mark(const TriangleList& list) {
   for (const std::uint32_t triangle : list.triangles) numbers_[triangle] = 0;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -36,6 +37,17 @@ class ExactListPacker {
   std::vector<std::uint32_t> lists_;
   std::map<std::vector<std::uint32_t>, std::uint32_t> offsets_;  ///< offsets by packed list
 };
+
+/// Returns the number of words that a list takes in `ExactTriangles::lists`, if the packer's numbers follow each other
+/// where those of the search do.
+std::size_t packedWords(const TriangleList& list, const LeafSign& sign);
+
+/// Returns the bytes of a list with so many words and of the triangles that count in its leaf. A triangle is stored once,
+/// however many leaves refer to it; its bytes count in the leaf that contains its first corner.
+inline double listBytesOf(std::size_t words, std::size_t ownedTriangles) {
+  constexpr double kWord = 4, kTriangle = 12 + 12 / 2.0;  // a closed mesh has half as many vertices as triangles
+  return kWord * double(words) + kTriangle * double(ownedTriangles);
+}
 
 /// Returns the box in which a leaf has a weight in a field whose blend zones are `blend` edges wide. The list of an
 /// exact leaf must give the right distance there.

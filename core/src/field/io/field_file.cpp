@@ -22,9 +22,9 @@ namespace {
 // the file was transferred as text.
 constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
-// and criteria; version 4 the inside test; version 7 exact leaves, the tolerance and the measurement.
-// Versions 5 and 6 were never released.
-constexpr std::uint32_t kFieldVersion = 7;
+// and criteria; version 4 the inside test; version 8 exact leaves, the tolerance, the measurement and
+// the settings that a replay of the construction needs. Versions 5 to 7 were never released.
+constexpr std::uint32_t kFieldVersion = 8;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 
 constexpr detail::FileKind kFieldFile{"field file", "a .hpsdf file", "build or copy it again"};
@@ -71,17 +71,20 @@ template <typename Stored, typename Stream>
 void wholeItem(Stream& stream, double& number) {
   auto stored = static_cast<Stored>(static_cast<std::int64_t>(number));
   stream.item(stored);
-  number = stored;
+  number = static_cast<double>(stored);
 }
 
-/// Writes or reads one setting. A number is stored as f64, a whole number as u32, and the index of a word or a
-/// flag as u8. `Settings` is const for writing.
+/// Writes or reads one setting. A number is stored as f64, a whole number as u32 or, if it may be greater than that, as
+/// u64, and the index of a word or a flag as u8. `Settings` is const for writing.
 template <typename Stream, typename Settings>
 void settingItem(Stream& stream, const BuildSetting& setting, Settings& settings) {
   const std::vector<double> numbers = setting.get(settings);
   double number = numbers.empty() ? 0 : numbers[0];
   if (setting.type == BuildSetting::Type::number) {
     stream.item(number);
+  } else if (setting.type == BuildSetting::Type::wholeNumber && setting.maximum > 0xffffffffu) {
+    wholeItem<std::uint64_t>(stream, number);
+    stream.require(number <= setting.maximum, ("its " + std::string(setting.name) + " is out of range").c_str());
   } else if (setting.type == BuildSetting::Type::wholeNumber) {
     wholeItem<std::uint32_t>(stream, number);
   } else {
@@ -160,7 +163,7 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(m.source.insideTest);
   stream.item(m.source.thickness);
   if (version < kFieldVersion) return;
-  settingItems(stream, m.settings, 14, 19);
+  settingItems(stream, m.settings, 14, 22);
   stream.item(sizes.vertexBytes);
   stream.item(sizes.vertices);
   stream.item(sizes.triangles);
