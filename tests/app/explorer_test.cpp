@@ -183,6 +183,24 @@ TEST(Explorer, aPointStaysUnderTheMouseThatDragsIt) {
   }
 }
 
+TEST(Explorer, aClickExplainsTheCell) {
+  Bench bench;
+  bench.run("build builtin:torus,segments=24,sides=12 target-error=1e-5; show cpu=true size=900x600; show slice");
+  bench.run("ui hover canvas");
+  bench.explorer().frame();
+  const render::Image before = bench.explorer().frame();
+  bench.run("ui click canvas");
+  ASSERT_TRUE(bench.session.explanation());
+  const Vector3 point = bench.session.explanation()->point;
+  const Cell cell = bench.session.current().field.cellAt(point);
+  EXPECT_THAT(bench.session.explanation()->lines.front(), HasSubstr("cell " + std::to_string(cell.id)));
+  EXPECT_THAT(bench.out.str(), HasSubstr("How the construction arrived at this cell"));
+  EXPECT_FALSE(same(before, bench.explorer().frame())) << "the picture shows the reasons";
+  bench.run("ui drag canvas 40,0");
+  EXPECT_FALSE(bench.session.explanation()) << "a drag shows something else, and explains nothing";
+  EXPECT_EQ(bench.failure("why point=0.7,0,0; expect why(0.7,0,0).agrees == 1"), "nothing failed");
+}
+
 TEST(Explorer, eachKindOfWidgetRunsItsCommand) {
   Bench bench;
   bench.run(kTorus);

@@ -78,6 +78,7 @@ TEST(Registry, keepsPublishedNames) {
       {"info", {"json"}},
       {"query", {"json"}},
       {"slice", {"axis", "offset", "plane", "color", "size", "cpu", "gl"}},
+      {"why", {"point", "mesh", "json"}},
       {"probe", {"from", "to", "output", "samples", "mesh", "size"}},
       {"render", {"color", "camera", "up", "offset", "size", "cpu", "gl"}},
   };

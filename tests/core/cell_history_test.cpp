@@ -71,24 +71,27 @@ TEST_P(DecisionsTest, areThoseOfTheConstruction) {
   EXPECT_GT(decisions, kPlaces.size());
 }
 
-INSTANTIATE_TEST_SUITE_P(Refinements, DecisionsTest,
-                         testing::Values(Case{"default", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                                              {.targetError = 1e-7, .grid = {3, 3, 3}}},
-                                         Case{"paper", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                                              [] {
-                                                BuildOptions options = paperOptions();
-                                                options.targetError = 1e-5;
-                                                options.grid = {2, 2, 2};
-                                                return options;
-                                              }()},
-                                         Case{"exact", "builtin:gear,teeth=5,segments=2",
-                                              {.targetError = 1e-9, .grid = {2, 2, 2}, .strategy = Strategy::hpx}},
-                                         Case{"depthLimit", "builtin:box",
-                                              {.targetError = 1e-9, .grid = {2, 2, 2}, .maxDegree = 4, .maxDepth = 2,
-                                               .strategy = Strategy::hp}},
-                                         Case{"h2", "builtin:box",
-                                              {.targetError = 1e-4, .grid = {2, 2, 2}, .strategy = Strategy::h2}}),
-                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Refinements, DecisionsTest,
+    testing::Values(
+        Case{"default",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-7, .grid = {3, 3, 3}}},
+        Case{"paper", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             [] {
+               BuildOptions options = paperOptions();
+               options.targetError = 1e-5;
+               options.grid = {2, 2, 2};
+               return options;
+             }()},
+        Case{"exact",
+             "builtin:gear,teeth=5,segments=2",
+             {.targetError = 1e-9, .grid = {2, 2, 2}, .strategy = Strategy::hpx}},
+        Case{"depthLimit",
+             "builtin:box",
+             {.targetError = 1e-9, .grid = {2, 2, 2}, .maxDegree = 4, .maxDepth = 2, .strategy = Strategy::hp}},
+        Case{"h2", "builtin:box", {.targetError = 1e-4, .grid = {2, 2, 2}, .strategy = Strategy::h2}}),
+    [](const auto& test) { return test.param.name; });
 
 class ReplayTest : public testing::TestWithParam<Case> {};
 
@@ -106,26 +109,35 @@ TEST_P(ReplayTest, arrivesAtTheLeavesOfTheField) {
 
 INSTANTIATE_TEST_SUITE_P(
     Fields, ReplayTest,
-    testing::Values(Case{"optimal", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                         {.targetError = 1e-7, .grid = {3, 3, 3}, .criterion = Criterion::optimal}},
-                    Case{"maxError", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                         {.targetError = 1e-4, .grid = {2, 2, 2}, .maxError = 5e-3, .maxDepth = 4}},
-                    Case{"maxErrorAlone", "builtin:box",
-                         {.targetError = 0, .grid = {2, 2, 2}, .maxError = 1e-2, .maxDepth = 4,
-                          .strategy = Strategy::hp}},
-                    Case{"enriched", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                         {.targetError = 1e-6, .grid = {3, 3, 3}, .enrich = true}},
-                    Case{"limitOfBytes", "builtin:box",
-                         {.targetError = 0, .grid = {2, 2, 2}, .maxBytes = 40'000, .strategy = Strategy::hpx}},
-                    Case{"nearAndFar", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                         {.targetError = NearFarError{.near = 1e-3, .far = 1e-2}, .grid = {3, 3, 3}}},
-                    Case{"band", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                         {.targetError = 1e-7, .grid = {3, 3, 3}, .band = 0.1}},
-                    Case{"blended", "builtin:box",
-                         {.targetError = 1e-8, .grid = {3, 3, 3}, .strategy = Strategy::hpx, .blend = 0.04}},
-                    Case{"tolerance", "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
-                         {.grid = {3, 3, 3}, .tolerance = 5e-3}},
-                    Case{"toleranceOfBox", "builtin:box", {.grid = {3, 3, 3}, .tolerance = 1e-3}}),
+    testing::Values(
+        Case{"optimal",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-7, .grid = {3, 3, 3}, .criterion = Criterion::optimal}},
+        Case{"maxError",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-4, .grid = {2, 2, 2}, .maxError = 5e-3, .maxDepth = 4}},
+        Case{"maxErrorAlone",
+             "builtin:box",
+             {.targetError = 0, .grid = {2, 2, 2}, .maxError = 1e-2, .maxDepth = 4, .strategy = Strategy::hp}},
+        Case{"enriched",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-6, .grid = {3, 3, 3}, .enrich = true}},
+        Case{"limitOfBytes",
+             "builtin:box",
+             {.targetError = 0, .grid = {2, 2, 2}, .maxBytes = 40'000, .strategy = Strategy::hpx}},
+        Case{"nearAndFar",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = NearFarError{.near = 1e-3, .far = 1e-2}, .grid = {3, 3, 3}}},
+        Case{"band",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-7, .grid = {3, 3, 3}, .band = 0.1}},
+        Case{"blended",
+             "builtin:box",
+             {.targetError = 1e-8, .grid = {3, 3, 3}, .strategy = Strategy::hpx, .blend = 0.04}},
+        Case{"tolerance",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.grid = {3, 3, 3}, .tolerance = 5e-3}},
+        Case{"toleranceOfBox", "builtin:box", {.grid = {3, 3, 3}, .tolerance = 1e-3}}),
     [](const auto& test) { return test.param.name; });
 
 TEST(CellHistory, tellsThatTheDistanceIsAnother) {

@@ -20,6 +20,7 @@ Registry makeRegistry() {
   addMotionCommands(registry);
   addFigureCommands(registry);
   addProbeCommand(registry);
+  addWhyCommand(registry);
   addExportCommand(registry);
   addExplorerCommands(registry);
   addUiCommand(registry);

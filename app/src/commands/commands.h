@@ -14,6 +14,7 @@ void addJumpsCommand(Registry& registry);
 void addProbeCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, shapes, doctor, set, include, help and docs
 void addVerifyCommand(Registry& registry);
+void addWhyCommand(Registry& registry);
 
 /// Adds the command `mesh`. The registry must already hold `render`, because `mesh` takes over its camera parameters.
 void addMeshCommand(Registry& registry);

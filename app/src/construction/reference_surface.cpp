@@ -69,6 +69,7 @@ ReferenceSurface meshReference(const Console& console, PreparedSurface&& prepare
   reference.report = prepared.report;
   const auto exact = distanceTo(console, prepared.mesh, distanceOptions(source));
   reference.distance = withNormalization(exact, prepared.normalization);
+  reference.closest = [exact](const Vector3& x) { return exact->closestPoint(x); };
   reference.mesh = source.insideTest == InsideTest::outerHull ? exact->surface() : std::move(prepared.mesh);
   reference.normal = [exact](const Vector3& x, double signedDistance) {
     return exactNormal(*exact, x, signedDistance);

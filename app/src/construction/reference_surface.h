@@ -17,6 +17,7 @@ namespace hpsdf::app {
 struct ReferenceSurface {
   std::shared_ptr<const DistanceFunction> distance;
   std::function<Vector3(const Vector3& x, double signedDistance)> normal;  ///< returns ∇Φ at x, or zero if unknown
+  std::function<ClosestPoint(const Vector3& x)> closest;                   ///< empty for an analytic shape
   TriangleMesh mesh;
   std::optional<MeshReport> report;  ///< empty for an analytic shape
   bool fieldIsMadeFromIt = false;

@@ -95,6 +95,7 @@ void Explorer::change(ViewState next) {
   undone_.resize(before_.undone);
   redone_ = before_.redone;
   view_ = std::move(next);
+  session_.setExplanation({});  // it belongs to what was shown
   if (withFrameOf(view_, before_.view) == view_) return;
   undone_.push_back(before_.view);
   redone_.clear();
@@ -317,10 +318,23 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
     dragFrom_ = {x, y};
     viewAtPress_ = view_;
   }
-  if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
+  if (event.kind == Input::Kind::release && dragged_ == event.button) {
+    dragged_.reset();
+    constexpr double kClick = 3;  // pixels by which the pointer may move during a click
+    const bool isClick = std::hypot(x - dragFrom_[0], y - dragFrom_[1]) < kClick;
+    if (event.button == 0 && isClick && layout.canvas.contains(x, y)) return clickCommand();
+  }
   if (event.kind == Input::Kind::wheel && overPicture) return wheelCommand(event.turn);
   if (event.kind != Input::Kind::move || !dragged_) return std::nullopt;
   return dragCommand(x - dragFrom_[0], y - dragFrom_[1]);
+}
+
+/// Returns the command that explains the cell at the pointer. Returns std::nullopt if the pointer is not over the
+/// field.
+std::optional<std::string> Explorer::clickCommand() {
+  const std::optional<Readout> at = readout();
+  if (!at || !session_.current().field.domain().contains(at->pick.position)) return std::nullopt;
+  return "why point=" + vectorWord(at->pick.position);
 }
 
 std::string Explorer::pictureKey() const {

@@ -127,6 +127,7 @@ class Explorer final : public SessionExtension {
   void settlePanels();
   void inputWhileWorking(const Input& event);
   std::optional<std::string> canvasCommand(const Input& event);
+  std::optional<std::string> clickCommand();
   std::string wheelCommand(double notches) const;
   std::string dragCommand(double dx, double dy) const;
   render::Drawn drawBeside(const Field& other, render::ReferenceData reference, const render::ScaleOptions& scale,

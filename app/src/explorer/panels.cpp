@@ -94,12 +94,14 @@ void drawScaleBar(ImDrawList& list, const UiRect& rect, double pixelSize) {
 /// Draws a ring around the marked point and a scale bar into each half of the picture.
 void drawMark(const Explorer& explorer, const Layout& layout) {
   const ViewState& view = explorer.view();
-  if (!view.mark || !explorer.picture()) return;
+  const auto& explained = explorer.session().explanation();
+  const std::optional<Vector3> mark = explained ? std::optional(explained->point) : view.mark;
+  if (!mark || !explorer.picture()) return;
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   for (const UiRect& rect : {layout.canvas, layout.beside}) {
     const int width = int(rect.width()), height = int(rect.height());
     if (width < 16 || height < 16) continue;
-    const auto spot = spotAt(view, explorer.session().current().field, *view.mark, width, height);
+    const auto spot = spotAt(view, explorer.session().current().field, *mark, width, height);
     if (!spot) continue;
     const ImVec2 at(float(rect.x0) + spot->x, float(rect.y0) + spot->y);
     list.PushClipRect({float(rect.x0), float(rect.y0)}, {float(rect.x1), float(rect.y1)});
@@ -136,7 +138,29 @@ void drawReadout(Ui& ui, Explorer& explorer) {
   if (explorer.pictureBeside())
     describe(explorer.view().beside, *explorer.pictureBeside());
   else
-    ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there", true);
+    ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there   click: why",
+            true);
+}
+
+/// Writes what `why` said into the lower left corner of the picture, above the axes.
+void drawExplanation(const Explorer& explorer, const Layout& layout) {
+  const auto& explained = explorer.session().explanation();
+  if (!explained || layout.canvas.width() < 16) return;
+  constexpr float kPad = 8, kAxes = 74;
+  const float lineHeight = ImGui::GetTextLineHeightWithSpacing();
+  float width = 0;
+  for (const std::string& line : explained->lines) width = std::max(width, widthOf(line));
+  const float x = float(layout.canvas.x0) + kPad + 4;
+  const float bottom = float(layout.canvas.y1) - kAxes;
+  const float top = bottom - lineHeight * float(explained->lines.size());
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  list.PushClipRect({float(layout.canvas.x0), float(layout.canvas.y0)},
+                    {float(layout.canvas.x1), float(layout.canvas.y1)});
+  list.AddRectFilled({x - kPad, top - kPad}, {x + width + kPad, bottom + kPad}, IM_COL32(250, 250, 248, 235), 3);
+  list.AddRect({x - kPad, top - kPad}, {x + width + kPad, bottom + kPad}, kSoftInk, 3);
+  for (std::size_t i = 0; i < explained->lines.size(); ++i)
+    list.AddText({x, top + lineHeight * float(i)}, kInk, explained->lines[i].c_str());
+  list.PopClipRect();
 }
 
 }  // namespace
@@ -169,6 +193,7 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
   if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
   drawMark(explorer, layout);
   drawFieldNames(explorer, layout);
+  drawExplanation(explorer, layout);
   ui.addArea("canvas", layout.canvas);
   if (layout.beside.width() > 0) ui.addArea("beside", layout.beside);
 }

@@ -20,7 +20,8 @@ struct DataSource {
   std::string_view arguments;  ///< accepted arguments, as a user writes them
   std::size_t count;
 };
-constexpr DataSource kSources[] = {{"stats", "", 0}, {"jumps", "", 0}, {"pick", "(x,y)", 2}, {"at", "(x,y,z)", 3}};
+constexpr DataSource kSources[] = {
+    {"stats", "", 0}, {"jumps", "", 0}, {"pick", "(x,y)", 2}, {"at", "(x,y,z)", 3}, {"why", "(x,y,z)", 3}};
 
 /// Parses the text of an expectation, such as "stats.leaves < 60000", from left to right.
 class Reader {

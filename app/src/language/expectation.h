@@ -10,7 +10,7 @@ namespace hpsdf::app {
 
 /// An expectation, written as SOURCE[(NUMBER,…)][.KEY]… OPERATOR NUMBER|exact [within NUMBER].
 struct Expectation {
-  std::string source;             ///< one of stats, jumps, pick and at
+  std::string source;             ///< one of stats, jumps, pick, at and why
   std::vector<double> arguments;  ///< the numbers in parentheses after the source
   std::vector<std::string> path;  ///< JSON keys and array indices that lead to the number
   std::string comparison;         ///< operator: == != < <= > >=

@@ -8,6 +8,7 @@
 #include "pictures/readout.h"
 #include "session/field_summary.h"
 #include "session/session.h"
+#include "session/why_report.h"
 #include "text/json.h"
 
 namespace hpsdf::app {
@@ -68,6 +69,7 @@ Json figuresOf(Session& session, const Expectation& expectation) {
     const bool withExact = expectation.path[0] == "exact" || expectation.path[0] == "error";
     return pointJson(session, {n[0], n[1], n[2]}, withExact);
   }
+  if (expectation.source == "why") return whyJson(whyAt(session, "", {n[0], n[1], n[2]}));
   const std::string& figure = expectation.path[0];
   const bool withAll = figure == "jump" || figure == "exact" || figure == "error";
   Json pick = pickJson(session, static_cast<int>(n[0]), static_cast<int>(n[1]), withAll);
@@ -154,11 +156,15 @@ jumps.NAME: interfaces, hanging, area, max, rms, gradient_max, gradient_rms;
 pick(x,y).NAME: what the last picture shows at a pixel: position.0, value, cell, degree, depth, gradient.0, slope; exact
 and error where the exact distance is known; jump.value and jump.gradient at the nearest face of its cell;
 
-at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is known.
+at(x,y,z).NAME: the same at a point of the field, also exact and error where the exact distance is known;
+
+why(x,y,z).NAME: what 'why --json' says of the cell at a point: degree, depth, estimated_rms, measured_rms, measured_max,
+raised and divided (how often), agrees (1 or 0), nearest.triangle, sign.winding_number, steps.0.degree.
 
 The degree of an exact cell is written as exact, and counts as 31, which is greater than every other degree.)"),
       .examples = {"expect stats.leaves < 60000", "expect jumps.max < 1e-2", "expect pick(640,360).degree == 4",
-                   "expect pick(640,360).degree == exact", "expect at(0,0,0.5).value == 0.1 within 1e-5"},
+                   "expect pick(640,360).degree == exact", "expect at(0,0,0.5).value == 0.1 within 1e-5",
+                   "expect why(0,0,0.5).measured_max < 1e-4"},
       .parameters = {{"expression", text("EXPRESSION").positional().repeatable().required(), "What should hold."}},
       .action = runExpect,
       .check = [](const Arguments& arguments) { parseExpectation(expressionOf(arguments)); },

@@ -240,7 +240,8 @@ std::string settingsText(const BuildOptions& settings, bool ofWords) {
   for (const BuildSetting& setting : buildSettings()) {
     const bool isWord = setting.type == BuildSetting::Type::choice || setting.type == BuildSetting::Type::flag;
     const std::string text = settingText(setting, settings);
-    const bool isShown = setting.storedAt > 0 && setting.isOffered && setting.ending != BuildSetting::Ending::target && !text.empty();
+    const bool isShown =
+        setting.storedAt > 0 && setting.isOffered && setting.ending != BuildSetting::Ending::target && !text.empty();
     if (isShown && isWord == ofWords) parts.push_back(fmt::format("{} {}", setting.name, text));
   }
   return fmt::format("{}", fmt::join(parts, ", "));

@@ -13,7 +13,8 @@ namespace hpsdf::app {
 /// Returns the parameter `mesh`, which all commands that compare a field with its surface have.
 Parameter surfaceParameter();
 
-/// Returns the mesh file or shape from which the current field was made. If it is unknown, throws `Error`;
+/// Returns the mesh file or shape from which the current field was made. If the field was loaded from a file, looks for
+/// a mesh of the stored name beside it and in the current folder. If the surface is unknown, throws `Error`;
 /// the message then asks the user for the argument `asked`.
 std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
 

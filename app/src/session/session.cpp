@@ -30,7 +30,9 @@ void Session::setField(CurrentField field) {
   jumps_.reset();
   exact_.reset();
   exactOfArgument_.reset();
+  reference_.reset();
   picture_.reset();
+  explanation_.reset();
   field_ = std::make_unique<CurrentField>(std::move(field));
   if (extension_) extension_->fieldChanged();
 }
@@ -70,6 +72,18 @@ const DistanceFunction& Session::exact(const std::string& surface) {
     surfaceArgument_ = surface;
   }
   return *exactOfArgument_;
+}
+
+const ReferenceSurface& Session::referenceSurface(const std::string& surface) {
+  const std::string name = surface.empty() ? surfaceOf(current(), "mesh") : surface;
+  if (!reference_ || name != referenceName_) {
+    auto reference = std::make_unique<const ReferenceSurface>(
+        app::referenceSurface(console_, name, current().field.metadata().source));
+    refuseForeign(current(), *reference, name);
+    reference_ = std::move(reference);
+    referenceName_ = name;
+  }
+  return *reference_;
 }
 
 const render::Drawn& Session::picture() const {

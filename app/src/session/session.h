@@ -19,6 +19,8 @@
 
 namespace hpsdf::app {
 
+struct ReferenceSurface;
+
 /// An object that lives as long as the session. It is notified each time another field becomes the current
 /// field.
 class SessionExtension {
@@ -67,6 +69,9 @@ class Session {
   /// from which the field was made, provided that it is a shape or that the field was built in this session. If neither
   /// holds, takes the surface of the previous call. Throws `Error` if no surface is known or if it cannot be read.
   const DistanceFunction& exact(const std::string& surface);
+  /// Returns the surface from which the current field was made, and keeps it for later calls. If `surface` is empty,
+  /// finds it as `surfaceOf` does. Throws `Error` for another surface, and if it cannot be read.
+  const ReferenceSurface& referenceSurface(const std::string& surface);
   /// True if `exact` can be called with an empty `surface`.
   bool knowsExact() const;
   void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }
@@ -84,6 +89,14 @@ class Session {
     if (!extension_) extension_ = std::make_unique<Extension>(*this);
     return static_cast<Extension&>(*extension_);
   }
+
+  /// What `why` said last of the current field. The explorer shows it.
+  struct Explanation {
+    Vector3 point;
+    std::vector<std::string> lines;
+  };
+  const std::optional<Explanation>& explanation() const { return explanation_; }
+  void setExplanation(std::optional<Explanation> explanation) { explanation_ = std::move(explanation); }
 
   /// A second field, with which the current field is compared. It is read from its file at first use. The two most
   /// recently used second fields are kept: one may be drawn beside the current field, one subtracted from it.
@@ -127,12 +140,15 @@ class Session {
   std::unique_ptr<CurrentField> field_;  // on the heap: the renderer keeps a reference to it
   std::optional<Jumps> jumps_;           // jumps of the current field
   std::optional<render::Drawn> picture_;
+  std::optional<Explanation> explanation_;
   std::optional<MeshDefects> defects_;
   std::string defectsOf_;                                    // surface argument of the call that computed `defects_`
   std::vector<std::unique_ptr<Other>> others_;               // most recently used first; renderers keep references
   std::shared_ptr<const DistanceFunction> exact_;            // distance to the field's own surface
   std::shared_ptr<const DistanceFunction> exactOfArgument_;  // distance to `surfaceArgument_`
   std::string surfaceArgument_;
+  std::unique_ptr<const ReferenceSurface> reference_;  // surface of the current field
+  std::string referenceName_;
   std::unique_ptr<render::Renderer> renderer_;
   Backend backend_;
   std::string lastRenderer_;

@@ -31,11 +31,11 @@ enum class CellChoice : std::uint8_t {
 
 /// What the construction could have done with a cell.
 struct CellAlternative {
-  /// Algorithm 1: bytes of coefficients and nodes that the refinement adds. Within a tolerance: bytes of the leaf, or of
-  /// all descendants.
+  /// Algorithm 1: bytes of coefficients and nodes that the refinement adds. Within a tolerance: bytes of the leaf, or
+  /// of all descendants.
   double bytes = 0;
-  /// Algorithm 1: weighted error ε of the cell that remains, at the scale of the target error τ. Within a tolerance: the
-  /// greatest error that was found over the allowed error.
+  /// Algorithm 1: weighted error ε of the cell that remains, at the scale of the target error τ. Within a tolerance:
+  /// the greatest error that was found over the allowed error.
   double error = 0;
   /// Algorithm 1: the reduction of ε per byte of added coefficients (μ and ν; paper, eqs. 7 and 8), by which the
   /// construction decides. It is missing for exact leaves and within a tolerance, where no gains are compared.
@@ -55,6 +55,7 @@ struct CellStep {
   /// RMS and greatest error of that leaf at 1000 random points of the cell.
   std::optional<double> measuredRms = {}, measuredMax = {};
   double weighted = 0;          ///< weighted error ε of that leaf, at the scale of the target error τ
+  bool isWithoutError = false;  ///< the leaf is exact, or the plane in which all nearest triangles lie
   std::size_t triangles = 0;    ///< triangles in the list of an exact leaf
   bool listIsTooLong = false;   ///< more triangles can be nearest to points of the cell than a list may have
   /// The alternatives that the construction compared: the degree that is one higher (within a tolerance: the polynomial
@@ -65,7 +66,7 @@ struct CellStep {
 
 /// The history of the leaf that holds a point.
 struct CellHistory {
-  Cell cell;                    ///< the leaf of the field
+  Cell cell;                         ///< the leaf of the field
   std::vector<CellStep> steps = {};  ///< from the base cell to the leaf
   /// The replayed construction arrived at a leaf with the box and the degree of `cell` and, unless the field was
   /// smoothed afterwards, with the same polynomial or as many triangles.
@@ -75,8 +76,8 @@ struct CellHistory {
 };
 
 /// Repeats the construction of `field` for the one leaf that holds x: the decisions about a cell do not depend on other
-/// cells. When a refinement ends does depend on them; the replay therefore ends at the leaf of the field. `distance` must
-/// be the Φ from which the field was made. Throws `Error` if x lies outside the domain or is not finite, and
+/// cells. When a refinement ends does depend on them; the replay therefore ends at the leaf of the field. `distance`
+/// must be the Φ from which the field was made. Throws `Error` if x lies outside the domain or is not finite, and
 /// `Cancelled` when `progress` says so.
 CellHistory cellHistory(const Field& field, const DistanceFunction& distance, const Vector3& x,
                         const Progress& progress = {});

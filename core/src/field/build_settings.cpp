@@ -276,7 +276,8 @@ const std::vector<Row> kRows = {
     {"cubature", kMethod, choice({"compact", "product"}).stored(20).advanced(), member<&BuildOptions::cubature>,
      "Rule by which cells are sampled: compact needs half the points for the same order where such rules are known "
      "(orders up to 13); product takes Gauss points along each axis, as the paper does."},
-    {"trial-samples", kMethod, choice({"children", "own"}).stored(21).hidden(), member<&BuildOptions::trialSamples>, ""},
+    {"trial-samples", kMethod, choice({"children", "own"}).stored(21).hidden(), member<&BuildOptions::trialSamples>,
+     ""},
     {"band", kResult, number().atLeast(0).in("world units").stored(7).advanced(), member<&BuildOptions::band>,
      "Width of a narrow band: cells farther from the surface than this are not refined and do not count. 0: no band."},
     // settings for changes to the finished octree and for the number of threads

@@ -177,8 +177,7 @@ class RefinementReplay {
     if (int(node.depth) != cell.depth) return false;
     if (node.fit.isExact() || target_.isExact()) return node.fit.isExact() && target_.isExact();
     // A pruned leaf has any degree up to that of the projection from which its last fit was made.
-    if (isPruned() && !node.fit.isFinal)
-      return budget_.finalDegree(node.fit.cached.degree) >= cell.degree;
+    if (isPruned() && !node.fit.isFinal) return budget_.finalDegree(node.fit.cached.degree) >= cell.degree;
     return budget_.finalDegree(node.fit.degree) == cell.degree;
   }
   bool isBeyond(const BuildNode& node) const {
@@ -187,8 +186,8 @@ class RefinementReplay {
     return !target_.isExact() && node.fit.degree > cell.degree;
   }
 
-  /// Makes the leaf after a refinement of `visited`. Returns std::nullopt if there is none on the way to the leaf of the
-  /// field.
+  /// Makes the leaf after a refinement of `visited`. Returns std::nullopt if there is none on the way to the leaf of
+  /// the field.
   std::optional<BuildNode> next(Visited& visited) const {
     const int depth = int(visited.node.depth);
     Trial& trial = *visited.trial;
@@ -303,6 +302,7 @@ class RefinementReplay {
     setPlace(step, node);
     step.degree = node.fit.degree;
     step.triangles = node.fit.list.triangles.size();
+    step.isWithoutError = node.fit.isExact() || (node.fit.isFinal && !(options_.exactTolerance > 0));
     step.weighted = node.fit.error.weighted / scale_;
     if (node.fit.isExact()) {
       step.estimatedRms = step.measuredRms = step.measuredMax = 0;
@@ -339,15 +339,15 @@ class RefinementReplay {
       step.trialDegree = fit.degree + 1;
       const double added = double(budget_.finalCoefficients(fit.degree + 1)) - double(budget_.finalCoefficients(fit));
       step.degreeTrial = CellAlternative{.bytes = budget_.bytes(0, added),
-                          .error = trial.raised->error.weighted / scale_,
-                          .gain = *gains.degree / coefficientBytes / scale_};
+                                         .error = trial.raised->error.weighted / scale_,
+                                         .gain = *gains.degree / coefficientBytes / scale_};
     }
     if (trial.children) {
       double error = 0;
       for (const Fit& child : *trial.children) error += child.error.weighted;
       step.octreeTrial = CellAlternative{.bytes = budget_.bytes(8, 7 * double(budget_.finalCoefficients(fit))),
-                          .error = error / scale_,
-                          .gain = *gains.octree / coefficientBytes / scale_};
+                                         .error = error / scale_,
+                                         .gain = *gains.octree / coefficientBytes / scale_};
     }
   }
 
@@ -392,6 +392,7 @@ class ToleranceReplay {
       if (isLeaf && cell.bytes < std::numeric_limits<double>::infinity()) {
         step.degree = cell.fit.degree;
         step.triangles = cell.fit.list.triangles.size();
+        step.isWithoutError = cell.leafRatio == 0;
         if (cell.fit.isExact())
           step.measuredRms = step.measuredMax = 0;
         else
@@ -417,7 +418,9 @@ class ToleranceReplay {
     CellStep step{.stage = CellStage::tolerance, .depth = int(place.depth), .box = setup_.tree.boxOf(place)};
     for (const LeafTrial& trial : trials) {
       const CellAlternative alternative{.bytes = trial.bytes, .error = trial.ratio};
-      if (trial.degree == kExactDegree) {
+      if (trial.bytes == std::numeric_limits<double>::infinity()) {
+        step.listIsTooLong = true;
+      } else if (trial.degree == kExactDegree) {
         step.exactTrial = alternative;
         step.triangles = trial.triangles;
       } else {
@@ -425,7 +428,6 @@ class ToleranceReplay {
         step.trialDegree = trial.degree;
       }
     }
-    step.listIsTooLong = setup_.exact && !step.exactTrial && !(step.degreeTrial && step.degreeTrial->error <= 1);
     return step;
   }
 
@@ -462,7 +464,8 @@ class ToleranceReplay {
     std::size_t owned = 0;
     forEachTriangle(exact, leaf, [&](std::uint32_t triangle) {
       const std::uint32_t corner = exact.triangles[triangle][0];
-      owned += std::visit([&](const auto& v) { return box.contains(v[corner].template cast<double>()); }, exact.vertices);
+      owned +=
+          std::visit([&](const auto& v) { return box.contains(v[corner].template cast<double>()); }, exact.vertices);
     });
     return listBytesOf(words, owned);
   }

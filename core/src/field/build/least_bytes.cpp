@@ -82,6 +82,8 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
     if (std::optional<Fit> fit = exact_->fitOfFarCell(box, kMostTriangles)) {
       const double bytes = exactBytes(*fit, box);
       consider(cell, std::move(*fit), bytes, 0, trials);
+    } else if (trials) {
+      trials->push_back({.degree = kExactDegree, .bytes = kNone});
     }
   }
   if (cell.bytes <= leastOfChildren) return false;

@@ -30,9 +30,9 @@ struct CheapCell {
 
 /// A leaf that was considered for a cell.
 struct LeafTrial {
-  int degree = 0;  ///< `kExactDegree` for a list of triangles
-  double bytes = 0;
-  double ratio = 0;           ///< error over the allowed error, 0 without error
+  int degree = 0;    ///< `kExactDegree` for a list of triangles
+  double bytes = 0;  ///< infinite if there is no such leaf, because its list would be too long or would have no sign
+  double ratio = 0;  ///< error over the allowed error, 0 without error
   std::size_t triangles = 0;  ///< length of the list
   bool isTaken = false;       ///< it takes the fewest bytes so far
 };

@@ -16,8 +16,7 @@ namespace {
 
 class MaxErrorPass {
  public:
-  explicit MaxErrorPass(Refiner& refiner)
-      : setup_(refiner.setup), state_(refiner.state), refiner_(refiner) {}
+  explicit MaxErrorPass(Refiner& refiner) : setup_(refiner.setup), state_(refiner.state), refiner_(refiner) {}
 
   void run() {
     constexpr std::size_t kRound = 256;
@@ -30,10 +29,8 @@ class MaxErrorPass {
     while (state_.processed < pending.size()) {
       refiner_.requireMemory();
       setup_.progress.update("probing the maximum error", double(state_.processed) / double(pending.size()));
-      std::vector<Probed> probed =
-          probeLeaves(std::min<std::size_t>(kRound, pending.size() - state_.processed));
-      for (std::size_t i = 0; i < probed.size(); ++i)
-        apply(pending[state_.processed + i], std::move(probed[i]));
+      std::vector<Probed> probed = probeLeaves(std::min<std::size_t>(kRound, pending.size() - state_.processed));
+      for (std::size_t i = 0; i < probed.size(); ++i) apply(pending[state_.processed + i], std::move(probed[i]));
       state_.processed += probed.size();
       refiner_.observer.atWholeState();
     }
@@ -95,8 +92,7 @@ Probed probe(const Refiner& refiner, const BuildNode& leaf) {
   const Box box = refiner.state.tree.boxOf(leaf);
   const std::vector<double> exact = refiner.fitter.distances(box, probePoints());
   const double band = refiner.setup.options.band;
-  const double farthest =
-      band > 0 ? band + probeSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();
+  const double farthest = band > 0 ? band + probeSpacing(box.sizes().norm()) : std::numeric_limits<double>::infinity();
   probed.worst = worstError(leaf.fit, exact, farthest);
   if (probed.worst <= most || !mayRefine) return probed;
 
@@ -105,7 +101,7 @@ Probed probe(const Refiner& refiner, const BuildNode& leaf) {
   probed.trial = refiner.attempt(leaf, allowed);
   const std::optional<Fit>& raised = probed.trial->raised;
   probed.raises = (raised && allowed != Refinement::octree && worstError(*raised, exact, farthest) <= most) ||
-                     refiner.raises(leaf, *probed.trial);
+                  refiner.raises(leaf, *probed.trial);
   return probed;
 }
 

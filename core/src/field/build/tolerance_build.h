@@ -14,8 +14,8 @@
 
 namespace hpsdf::detail {
 
-/// The objects that decide about the cells of a construction within a tolerance. It keeps references to the arguments of
-/// its constructor.
+/// The objects that decide about the cells of a construction within a tolerance. It keeps references to the arguments
+/// of its constructor.
 struct ToleranceSetup {
   ToleranceSetup(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                  const Progress& progress);

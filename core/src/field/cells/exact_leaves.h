@@ -71,8 +71,8 @@ class ExactCells {
 /// Tries to make a polynomial that stands for the triangles of a cell.
 using SmoothFit = std::function<std::optional<Fit>(const Box& cell)>;
 
-/// Decides what becomes of a cell that has no fit yet: it gets a fit without error, is divided or, far from the surface,
-/// remains without a fit.
+/// Decides what becomes of a cell that has no fit yet: it gets a fit without error, is divided or, far from the
+/// surface, remains without a fit.
 ExactCells::Outcome chooseExact(const Box& cell, const ExactCells& cells, const SmoothFit& smoothFit, bool isDivisible);
 
 /// The size of an octree with exact leaves, counted or estimated.

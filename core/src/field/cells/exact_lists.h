@@ -42,8 +42,8 @@ class ExactListPacker {
 /// where those of the search do.
 std::size_t packedWords(const TriangleList& list, const LeafSign& sign);
 
-/// Returns the bytes of a list with so many words and of the triangles that count in its leaf. A triangle is stored once,
-/// however many leaves refer to it; its bytes count in the leaf that contains its first corner.
+/// Returns the bytes of a list with so many words and of the triangles that count in its leaf. A triangle is stored
+/// once, however many leaves refer to it; its bytes count in the leaf that contains its first corner.
 inline double listBytesOf(std::size_t words, std::size_t ownedTriangles) {
   constexpr double kWord = 4, kTriangle = 12 + 12 / 2.0;  // a closed mesh has half as many vertices as triangles
   return kWord * double(words) + kTriangle * double(ownedTriangles);
