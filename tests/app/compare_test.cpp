@@ -409,6 +409,32 @@ TEST_F(Tradeoff, theRangeIsMeasured) {
   EXPECT_THAT(html, Not(HasSubstr("class=\"chosen\"")));
 }
 
+TEST_F(Tradeoff, tolerancesAreMeasured) {
+  const auto study = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words = {"study",   "tradeoff", "builtin:torus,segments=24,sides=12",
+                                      "-o",      at("out"),  "--tolerances",
+                                      "4%,0.04", "--points", "20000",
+                                      "--json"};
+    words.insert(words.end(), options.begin(), options.end());
+    const Outcome outcome = runHere(words);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.status == 0 ? Json::parse(outcome.out)["meshes"][0] : Json();
+  };
+  const Json points = study({})["points"];
+  ASSERT_EQ(points.size(), 2u);
+  EXPECT_EQ(points[0]["tolerance"], "4%");
+  EXPECT_EQ(points[1]["tolerance"], "0.04");
+  EXPECT_LE(points[0]["near_max"], 0.08);
+  EXPECT_GT(points[0]["near_max"], 0.01) << "the tolerance is made use of";
+  EXPECT_LE(points[1]["near_max"], 0.04);
+  EXPECT_GT(points[1]["bytes"], points[0]["bytes"]);
+  EXPECT_THAT(readTextFile(at("out/tradeoff.csv")), HasSubstr("mesh,tolerance,bytes"));
+  EXPECT_THAT(readTextFile(at("out/index.html")), HasSubstr("for a range of tolerances"));
+  const Json recommended = study({"--budget", points[0]["bytes"].dump()})["recommended"];
+  EXPECT_EQ(recommended["tolerance"], "4%");
+  EXPECT_THAT(recommended["command"].get<std::string>(), HasSubstr("--tolerance=4%"));
+}
+
 TEST_F(Tradeoff, theRecommendationRespectsTheBudget) {
   const Json points = studied({})["points"];
   const auto bytes = [&](int n) { return points[n]["bytes"].get<std::size_t>(); };
@@ -443,6 +469,8 @@ TEST_F(Tradeoff, mistakesAreRefused) {
     expectRefused(words, message);
   };
   refused({"--target-errors", "1e-3,0"}, "target-errors");
+  refused({"--tolerances", "1%,much"}, "tolerance");
+  refused({"--tolerances", ""}, "tolerance");
   refused({"--target-error", "1e-3"}, "target-error: is for");
   refused({"--max-bytes", "1000"}, "max-bytes: is for");
   refused({"--budget", "0"}, "budget");

@@ -1,10 +1,11 @@
-// `study tradeoff`: bytes, time and errors of the fields of a mesh for a range of target errors.
+// `study tradeoff`: bytes, time and errors of the fields of a mesh for a range of tolerances or of target errors.
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <sstream>
 #include <tuple>
 
 #include "console/long_work.h"
@@ -26,9 +27,22 @@
 namespace hpsdf::app {
 namespace {
 
+/// What ends the constructions of a range: the option of `build`, and its values as a user writes them.
+struct TradeoffRange {
+  std::string option;
+  std::vector<std::string> values;
+
+  bool isOfTolerances() const { return option == "tolerance"; }
+  const char* key() const { return isOfTolerances() ? "tolerance" : "target_error"; }
+  const char* head() const { return isOfTolerances() ? "tolerance" : "τ"; }
+  std::string named(const std::string& value) const {
+    return fmt::format("{} {}", isOfTolerances() ? "tolerance" : "τ =", value);
+  }
+};
+
 /// One field of the range.
 struct TradeoffPoint {
-  double target;
+  std::string end;      ///< value of the range's option
   std::string command;  ///< command line that builds the field
   FieldStatistics counts;
   double seconds;  ///< time to set up the exact distance and to build the field
@@ -38,6 +52,7 @@ struct TradeoffPoint {
 
 struct Tradeoff {
   std::string mesh, name;
+  TradeoffRange range;
   std::vector<TradeoffPoint> points = {};
   std::string recommendation = {};              ///< "" if no limit was given
   std::optional<std::size_t> recommended = {};  ///< index of the recommended point
@@ -51,14 +66,33 @@ std::string exactText(double number) {
   return parseNumber(text) == number ? text : fmt::format("{}", number);
 }
 
-/// Returns the arguments of `build` for one point of the range. To study another range, such as one of tolerances,
-/// replace the option here.
-Arguments pointArguments(const Session& session, const Arguments& arguments, std::size_t mesh, double target) {
-  return buildArguments(session, arguments, mesh, {"--target-error=" + exactText(target)});
+/// Returns the parts of a text between commas.
+std::vector<std::string> partsOf(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  return parts;
+}
+
+/// Returns the range of target errors, the greatest first, or else the range of tolerances in their given order.
+TradeoffRange rangeOf(const Arguments& arguments) {
+  if (!arguments.has("target-errors")) return {"tolerance", partsOf(arguments.text("tolerances"))};
+  std::vector<double> targets = arguments.numbers("target-errors");
+  std::ranges::sort(targets, std::greater());
+  targets.erase(std::unique(targets.begin(), targets.end()), targets.end());
+  TradeoffRange range{"target-error", {}};
+  for (const double target : targets) range.values.push_back(exactText(target));
+  return range;
+}
+
+/// Returns the arguments of `build` for one point of the range.
+Arguments pointArguments(const Session& session, const Arguments& arguments, std::size_t mesh,
+                         const TradeoffRange& range, const std::string& value) {
+  return buildArguments(session, arguments, mesh, {fmt::format("--{}={}", range.option, value)});
 }
 
 TradeoffPoint tradeoffPoint(const Console& console, const BuildInput& input, const Arguments& buildArguments,
-                            const Arguments& arguments, double target) {
+                            const Arguments& arguments, const std::string& end) {
   const auto start = std::chrono::steady_clock::now();
   const BuildOptions options = buildOptions(buildArguments, input.exact->source().box.sizes().maxCoeff());
   return withProgress(console, [&](const Progress& progress) {
@@ -67,21 +101,13 @@ TradeoffPoint tradeoffPoint(const Console& console, const BuildInput& input, con
     const MeasureOptions measuring{.points = static_cast<std::size_t>(arguments.number("points")),
                                    .seed = static_cast<std::uint64_t>(arguments.number("seed")),
                                    .threads = options.threads};
-    return TradeoffPoint{.target = target,
+    return TradeoffPoint{.end = end,
                          .command = {},
                          .counts = statistics(field),
                          .seconds = seconds,
                          .measured = measure(field, *input.exact, measuring, progress),
                          .leastError = 1e-6 * field.metadata().referenceLength};
   });
-}
-
-/// Returns the target errors of the range, the greatest first.
-std::vector<double> targetsOf(const Arguments& arguments) {
-  std::vector<double> targets = arguments.numbers("target-errors");
-  std::ranges::sort(targets, std::greater());
-  targets.erase(std::unique(targets.begin(), targets.end()), targets.end());
-  return targets;
 }
 
 /// Orders fields by exactness: by the RMS error near the surface, and by that over the domain where both fields equal
@@ -108,70 +134,82 @@ void recommend(Tradeoff& tradeoff, const Arguments& arguments) {
                   hasTime ? fmt::format("{} s", shortNumber(arguments.number("within-seconds"))) : "");
   if (const TradeoffPoint* best = tradeoff.best()) {
     tradeoff.recommendation = fmt::format(
-        "Within {}, the most exact field of the range is that of τ = {}: it takes {} and {} s, and its RMS error is {} "
-        "near the surface and {} over the domain.",
-        limits, exactText(best->target), bytesText(double(best->counts.bytes)), shortNumber(best->seconds),
+        "Within {}, the most exact field of the range is that of {}: it takes {} and {} s, and its RMS error is {} "
+        "near "
+        "the surface and {} over the domain.",
+        limits, tradeoff.range.named(best->end), bytesText(double(best->counts.bytes)), shortNumber(best->seconds),
         shortNumber(best->measured.near.rms), shortNumber(best->measured.domain.rms));
     return;
   }
   const TradeoffPoint& smallest =
       *std::ranges::min_element(tradeoff.points, {}, [](const TradeoffPoint& point) { return point.counts.bytes; });
   tradeoff.recommendation = fmt::format(
-      "No field of the range keeps within {}: the smallest, that of τ = {}, takes {} and {} s. Give greater target "
-      "errors or wider limits.",
-      limits, exactText(smallest.target), bytesText(double(smallest.counts.bytes)), shortNumber(smallest.seconds));
+      "No field of the range keeps within {}: the smallest, that of {}, takes {} and {} s. Give greater {} or wider "
+      "limits.",
+      limits, tradeoff.range.named(smallest.end), bytesText(double(smallest.counts.bytes)),
+      shortNumber(smallest.seconds), tradeoff.range.isOfTolerances() ? "tolerances" : "target errors");
 }
 
 Tradeoff tradeoffOf(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
-  Tradeoff tradeoff{arguments.texts("mesh")[mesh], name};
+  Tradeoff tradeoff{arguments.texts("mesh")[mesh], name, rangeOf(arguments)};
   Console console = session.console();
-  const std::vector<double> targets = targetsOf(arguments);
+  const TradeoffRange& range = tradeoff.range;
   const BuildInput input =
-      buildInput(console, tradeoff.mesh, pointArguments(session, arguments, mesh, targets.front()));
-  for (const double target : targets) {
-    const Arguments point = pointArguments(session, arguments, mesh, target);
-    console.work = fmt::format("{} of {}, τ = {}: ", tradeoff.points.size() + 1, targets.size(), exactText(target));
+      buildInput(console, tradeoff.mesh, pointArguments(session, arguments, mesh, range, range.values.front()));
+  for (const std::string& value : range.values) {
+    const Arguments point = pointArguments(session, arguments, mesh, range, value);
+    console.work = fmt::format("{} of {}, {}: ", tradeoff.points.size() + 1, range.values.size(), range.named(value));
     tradeoff.points.push_back(
-        namingSurface(tradeoff.mesh, [&] { return tradeoffPoint(console, input, point, arguments, target); }));
+        namingSurface(tradeoff.mesh, [&] { return tradeoffPoint(console, input, point, arguments, value); }));
     tradeoff.points.back().command = buildCommandLine(tradeoff.mesh, name + ".hpsdf", point);
   }
   recommend(tradeoff, arguments);
   return tradeoff;
 }
 
-Json pointJson(const TradeoffPoint& point) {
+Json endJson(const TradeoffRange& range, const TradeoffPoint& point) {
+  return range.isOfTolerances() ? Json(point.end) : Json(*parseNumber(point.end));
+}
+
+Json pointJson(const TradeoffRange& range, const TradeoffPoint& point) {
   const Measurement& m = point.measured;
-  return {{"target_error", point.target},  {"bytes", point.counts.bytes},
-          {"leaves", point.counts.leaves}, {"exact_leaves", point.counts.exact.leaves},
-          {"seconds", point.seconds},      {"near_rms", m.near.rms},
-          {"near_max", m.near.max},        {"domain_rms", m.domain.rms},
-          {"domain_max", m.domain.max},    {"wrong_signs", m.wrongSigns},
+  return {{range.key(), endJson(range, point)},
+          {"bytes", point.counts.bytes},
+          {"leaves", point.counts.leaves},
+          {"exact_leaves", point.counts.exact.leaves},
+          {"seconds", point.seconds},
+          {"near_rms", m.near.rms},
+          {"near_max", m.near.max},
+          {"domain_rms", m.domain.rms},
+          {"domain_max", m.domain.max},
+          {"wrong_signs", m.wrongSigns},
           {"torn_share", m.tornShare}};
 }
 
 Json tradeoffJson(const Tradeoff& tradeoff) {
   Json points = Json::array();
-  for (const TradeoffPoint& point : tradeoff.points) points.push_back(pointJson(point));
+  for (const TradeoffPoint& point : tradeoff.points) points.push_back(pointJson(tradeoff.range, point));
   Json json = {{"mesh", tradeoff.mesh}, {"name", tradeoff.name}, {"points", points}, {"recommended", Json()}};
   if (const TradeoffPoint* best = tradeoff.best())
-    json["recommended"] = {{"target_error", best->target}, {"command", best->command}};
+    json["recommended"] = {{tradeoff.range.key(), endJson(tradeoff.range, *best)}, {"command", best->command}};
   return json;
 }
 
 std::string tradeoffCsv(const std::vector<Tradeoff>& tradeoffs) {
-  std::string text =
-      "mesh,target_error,bytes,leaves,exact_leaves,seconds,near_rms,near_max,domain_rms,domain_max,wrong_signs,"
-      "torn_share\n";
+  std::string text = fmt::format(
+      "mesh,{},bytes,leaves,exact_leaves,seconds,near_rms,near_max,domain_rms,domain_max,wrong_signs,"
+      "torn_share\n",
+      tradeoffs.front().range.key());
   for (const Tradeoff& tradeoff : tradeoffs)
     for (const TradeoffPoint& point : tradeoff.points)
-      text += fmt::format("{},{}\n", tradeoff.name, rowText(pointJson(point)));
+      text += fmt::format("{},{}\n", tradeoff.name, rowText(pointJson(tradeoff.range, point)));
   return text;
 }
 
-/// Returns the figures of a point as text, in the order of `kTradeoffHeads`.
+/// Returns the figures of a point as text, in the order of `tradeoffHeads`.
 std::vector<std::string> tradeoffCells(const TradeoffPoint& point) {
   const Measurement& m = point.measured;
-  return {exactText(point.target),
+  return {point.end,
           bytesText(double(point.counts.bytes)),
           grouped(point.counts.leaves),
           shortNumber(point.seconds) + " s",
@@ -182,12 +220,14 @@ std::vector<std::string> tradeoffCells(const TradeoffPoint& point) {
           shortNumber(100 * m.tornShare) + " %"};
 }
 
-constexpr const char* kTradeoffHeads[] = {"τ",        "memory",     "leaves",     "time", "near RMS",
-                                          "near max", "domain RMS", "domain max", "torn"};
+std::vector<std::string> tradeoffHeads(const Tradeoff& tradeoff) {
+  return {tradeoff.range.head(), "memory",     "leaves", "time", "near RMS", "near max",
+          "domain RMS",          "domain max", "torn"};
+}
 
 std::string tradeoffText(const Tradeoff& tradeoff) {
   std::string text = tradeoff.mesh + "\n ";
-  for (const char* head : kTradeoffHeads) text += fmt::format(" {:>11}", head);
+  for (const std::string& head : tradeoffHeads(tradeoff)) text += fmt::format(" {:>11}", head);
   text += "\n";
   for (const TradeoffPoint& point : tradeoff.points) {
     text += " ";
@@ -230,13 +270,9 @@ tr.chosen td { font-weight: 700; }
 svg.chart { display: block; max-width: 100%; height: auto; margin: 1rem 0; }
 )";
 
-constexpr const char* kTradeoffNote =
-    "Errors are measured at random points, half of them within a hundredth of the mesh's longest side of the surface, "
-    "and are in the units of the field. Time is that of the construction on this machine.";
-
 std::string tradeoffSection(const Tradeoff& tradeoff) {
   std::string html = fmt::format("<h2>{}</h2>\n<table>\n<tr>", htmlEscaped(tradeoff.mesh));
-  for (const char* head : kTradeoffHeads) html += fmt::format("<th>{}</th>", head);
+  for (const std::string& head : tradeoffHeads(tradeoff)) html += fmt::format("<th>{}</th>", head);
   html += "</tr>\n";
   for (const TradeoffPoint& point : tradeoff.points) {
     html += &point == tradeoff.best() ? "<tr class=\"chosen\">" : "<tr>";
@@ -244,6 +280,10 @@ std::string tradeoffSection(const Tradeoff& tradeoff) {
     html += "</tr>\n";
   }
   html += "</table>\n";
+  html += fmt::format(
+      "<p>Errors are measured at random points, half of them within {} of the surface, and are in the units of the "
+      "field. Time is that of the construction on this machine.</p>\n",
+      shortNumber(tradeoff.points.front().measured.nearDistance));
   if (!tradeoff.recommendation.empty()) html += fmt::format("<p>{}</p>\n", htmlEscaped(tradeoff.recommendation));
   if (tradeoff.recommended) html += fmt::format("<code>{}</code>\n", htmlEscaped(tradeoff.best()->command));
   html += tradeoffChart(tradeoff, "memory [bytes]", [](const TradeoffPoint& p) { return double(p.counts.bytes); });
@@ -252,10 +292,12 @@ std::string tradeoffSection(const Tradeoff& tradeoff) {
 }
 
 std::string tradeoffHtml(const std::vector<Tradeoff>& tradeoffs) {
-  std::string html =
-      htmlHead("Size, time and accuracy", "Fields of the same mesh for a range of target errors τ", kTradeoffStyle);
+  std::string html = htmlHead("Size, time and accuracy",
+                              fmt::format("Fields of the same mesh for a range of {}",
+                                          tradeoffs.front().range.isOfTolerances() ? "tolerances" : "target errors τ"),
+                              kTradeoffStyle);
   for (const Tradeoff& tradeoff : tradeoffs) html += tradeoffSection(tradeoff);
-  return html + fmt::format("<p>{}</p>\n", htmlEscaped(kTradeoffNote)) + htmlFoot(versionText());
+  return html + htmlFoot(versionText());
 }
 
 void runTradeoff(Session& session, const Arguments& arguments) {
@@ -301,15 +343,18 @@ Study tradeoffStudy() {
   return {
       .name = "tradeoff",
       .help = paragraphs(R"(
-bytes, time and measured errors of a mesh's fields for a range of target errors. Use it to choose the target error of
-'hpsdf build' for a mesh. With --budget or --within-seconds it names the most exact field of the range that keeps them, and
+bytes, time and measured errors of a mesh's fields for a range of tolerances, or of target errors. Use it to choose the
+--tolerance, or the --target-error, of 'hpsdf build' for a mesh. With --budget or --within-seconds it names the most exact field of the range that keeps them, and
 the command that builds it; the field with the least RMS error near the surface is the most exact. Half of the points at
 which errors are measured lie near the surface. Writes index.html with the table and the curves, tradeoff.csv and
 tradeoff.json.)"),
       .parameters = joined(
-          {{{"target-errors", numbers("τ,τ,…", countsFrom(1, 20)).above(0).byDefault("1e-4,3e-5,1e-5,3e-6,1e-6,3e-7"),
-             "The target errors of the range. Each makes a field of its own, so that the smallest one takes most "
-             "of the time."},
+          {{{"tolerances", text("TOLERANCE,…").byDefault("2%,1%,0.5%,0.2%,0.1%"),
+             "The tolerances of the range, as lengths or as percentages of the mesh's longest side. Each makes a field "
+             "of "
+             "its own, so that the smallest one takes most of the time."},
+            {"target-errors", numbers("τ,τ,…", countsFrom(1, 20)).above(0),
+             "A range of target errors τ in place of tolerances, such as 1e-4,1e-5,1e-6."},
             {"budget", number().above(0).in("bytes"),
              "Recommends the most exact field that takes at most this memory. To build for a budget without a study, "
              "use 'build --max-bytes'."},
