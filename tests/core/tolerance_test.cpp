@@ -67,6 +67,21 @@ TEST(Tolerance, isKept) {
   }
 }
 
+TEST(Tolerance, seesKinksThatPassBetweenThePoints) {
+  const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
+  for (const double at : {1.0, 0.714}) {
+    SCOPED_TRACE(at);
+    const auto ridge = [&](const Vector3& x) { return 0.5 - std::abs(x.y() + x.z() - at) / std::sqrt(2.0); };
+    const double tolerance = 0.1373;
+    const Field field = build(ridge, domain, {.grid = {1, 1, 1}, .tolerance = tolerance, .within = 10});
+    double worst = 0;
+    for (double y = -1; y <= 1; y += 0.01)
+      for (double z = -1; z <= 1; z += 0.01)
+        worst = std::max(worst, std::abs(field.value({0.1, y, z}) - ridge({0.1, y, z})));
+    EXPECT_LE(worst, tolerance);
+  }
+}
+
 TEST(Tolerance, isKeptAtAnyScale) {
   const TriangleMesh mesh = shapes::mesh("gear,teeth=5");
   const TriangleMesh large = support::moved(mesh, {1e4, 0, 0}, 1000);

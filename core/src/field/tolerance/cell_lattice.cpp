@@ -28,18 +28,54 @@ std::vector<double> product(const Eigen::MatrixXd& matrix, std::span<const doubl
   return result;
 }
 
+/// The indices of the points of a lattice by their positions along the axes.
+class LatticeIndices {
+ public:
+  explicit LatticeIndices(int across) : across_(across), indices_(std::size_t(across) * across * across) {}
+
+  std::uint32_t& at(int x, int y, int z) { return indices_[(std::size_t(z) * across_ + y) * across_ + x]; }
+
+  /// Returns all rows of four points along an axis whose positions on this axis are `first` to `last`.
+  std::vector<CellLattice::Row> rows(int first, int last) {
+    std::vector<CellLattice::Row> rows;
+    for (int from = first; from + 3 <= last; ++from)
+      for (int a = 0; a < across_; ++a)
+        for (int b = 0; b < across_; ++b) {
+          std::array<CellLattice::Row, 3> along;
+          for (int i = 0; i < 4; ++i) {
+            along[0][i] = at(from + i, a, b);
+            along[1][i] = at(a, from + i, b);
+            along[2][i] = at(a, b, from + i);
+          }
+          rows.insert(rows.end(), along.begin(), along.end());
+        }
+    return rows;
+  }
+
+ private:
+  int across_;
+  std::vector<std::uint32_t> indices_;
+};
+
 }  // namespace
 
 CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (ProbeLattice::kAcross - 1)) {
   constexpr int kAcross = ProbeLattice::kAcross;
   for (const Vector3& point : probePoints()) points_.push_back(reach * point);
+  LatticeIndices indices(kAcross);
+  std::uint32_t next = 0;
+  forEachInBlocks(kAcross, [&](int x, int y, int z) { indices.at(x, y, z) = next++; });
+  rows_ = indices.rows(0, kAcross - 1);
 
   // Along each axis there are the two ends and the middles of all intervals.
   const auto between = [&](int n) { return n == 0 ? 0.0 : n == kAcross ? double(kAcross - 1) : n - 0.5; };
+  LatticeIndices indicesBetween(kAcross + 1);
   forEachInBlocks(kAcross + 2, [&](int x, int y, int z) {
-    if (std::max({x, y, z}) <= kAcross)
-      between_.push_back(spacing_ * Vector3(between(x), between(y), between(z)) - Vector3::Constant(reach));
+    if (std::max({x, y, z}) > kAcross) return;
+    indicesBetween.at(x, y, z) = static_cast<std::uint32_t>(between_.size());
+    between_.push_back(spacing_ * Vector3(between(x), between(y), between(z)) - Vector3::Constant(reach));
   });
+  rowsBetween_ = indicesBetween.rows(1, kAcross - 1);
 
   for (int degree = 1; degree <= kMostDegree; ++degree) {
     Matrices& matrices = matrices_[degree];

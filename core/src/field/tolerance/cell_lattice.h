@@ -18,6 +18,9 @@ namespace hpsdf::detail {
 /// coordinates of the cell.
 class CellLattice {
  public:
+  /// The indices of four successive points along an axis, at equal distances.
+  using Row = std::array<std::uint32_t, 4>;
+
   static constexpr int kMostDegree = 5;  ///< 56 coefficients; with more of them, errors between the points grow
 
   /// The lattice reaches from −`reach` to `reach` along each axis.
@@ -29,6 +32,9 @@ class CellLattice {
   std::span<const Vector3> pointsBetween() const { return between_; }
   /// Pairs of neighbours in `points()`.
   std::span<const std::pair<std::uint32_t, std::uint32_t>> neighbours() const { return probeLattice().neighbours; }
+  /// All rows of four in `points()`, and in `pointsBetween()`.
+  std::span<const Row> rows() const { return rows_; }
+  std::span<const Row> rowsBetween() const { return rowsBetween_; }
   /// Distance between two neighbours along an axis.
   double spacing() const { return spacing_; }
   double reach() const { return reach_; }
@@ -46,6 +52,7 @@ class CellLattice {
 
   double reach_, spacing_;
   std::vector<Vector3> points_, between_;
+  std::vector<Row> rows_, rowsBetween_;
   std::array<Matrices, kMostDegree + 1> matrices_;  ///< by degree; there are none for degree 0
 };
 

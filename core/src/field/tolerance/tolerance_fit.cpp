@@ -30,6 +30,30 @@ bool hasJump(const CellLattice& lattice, const Box& cell, std::span<const double
   });
 }
 
+/// Where the error would be greatest, and its ratio to the allowed error there, if it rose between the middle ones of
+/// four points as steeply as beside them.
+struct Peak {
+  double ratio = 0;
+  Vector3 local = Vector3::Zero();
+};
+
+/// Appends the peaks of rows of four points. At a kink of the distance, the error has a peak that is as narrow as the
+/// kink is sharp. The points on either side tell its height, which is at least a part of the true one: the error is
+/// often steeper near the kink. Kinks are often planes that pass diagonally between the points.
+template <typename Points>
+void findPeaks(const Points& points, std::span<const CellLattice::Row> rows, std::vector<Peak>& peaks) {
+  constexpr double kLeast = 0.7;  // lower peaks are not within reach of the greatest allowed ratio
+  for (const CellLattice::Row& row : rows)
+    for (const int sign : {1, -1}) {
+      const auto at = [&](int i) { return sign * points[row[i]].signedRatio; };
+      const double rise = at(1) - at(0), fall = at(2) - at(3);
+      if (rise <= 0 || fall <= 0) continue;
+      const double t = (at(2) + fall - at(1)) / (rise + fall), ratio = at(1) + rise * t;
+      if (t <= 0 || t >= 1 || ratio <= kLeast) continue;
+      peaks.push_back({ratio, points[row[1]].local + t * (points[row[2]].local - points[row[1]].local)});
+    }
+}
+
 Fit polynomial(std::vector<double> coefficients, int degree, const Box& cell) {
   Fit fit;
   fit.degree = degree;
@@ -74,7 +98,7 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::check(const Fit& fit
   const std::vector<double> exact = distances(cell, local);
   std::vector<CheckedPoint> points(local.size());
   for (std::size_t i = 0; i < local.size(); ++i)
-    points[i] = {local[i], std::abs(fit.valueAt(local[i]) - exact[i]) / allowed_.at(exact[i])};
+    points[i] = {local[i], (fit.valueAt(local[i]) - exact[i]) / allowed_.at(exact[i])};
   return points;
 }
 
@@ -82,7 +106,7 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::check(const Fit& fit
 std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::vector<CheckedPoint> points) const {
   constexpr std::size_t kMost = 16;
   constexpr double kLeast = 0.5, kApart = 0.8;  // ratio of the error, and distance in spacings of the lattice
-  std::erase_if(points, [](const CheckedPoint& point) { return point.ratio < kLeast; });
+  std::erase_if(points, [](const CheckedPoint& point) { return point.ratio() < kLeast; });
   std::ranges::stable_sort(points, std::greater(), &CheckedPoint::ratio);
   std::vector<CheckedPoint> tops;
   for (const CheckedPoint& point : points) {
@@ -101,7 +125,7 @@ double ToleranceFitter::climb(const Fit& fit, const Box& cell, std::vector<Check
   constexpr int kDirections = 6;
   std::vector<double> steps(tops.size(), lattice_.spacing() / 2);
   double greatest = 0;
-  for (const CheckedPoint& top : tops) greatest = std::max(greatest, top.ratio);
+  for (const CheckedPoint& top : tops) greatest = std::max(greatest, top.ratio());
   for (int round = 0; round < kRounds && !tops.empty() && greatest <= kMostRatio; ++round) {
     std::vector<Vector3> around;
     for (std::size_t t = 0; t < tops.size(); ++t)
@@ -115,11 +139,11 @@ double ToleranceFitter::climb(const Fit& fit, const Box& cell, std::vector<Check
     for (std::size_t t = 0; t < tops.size(); ++t) {
       const auto own = std::span(checked).subspan(kDirections * t, kDirections);
       const auto best = std::ranges::max_element(own, {}, &CheckedPoint::ratio);
-      if (best->ratio > tops[t].ratio)
+      if (best->ratio() > tops[t].ratio())
         tops[t] = *best;
       else
         steps[t] /= 2;
-      greatest = std::max(greatest, tops[t].ratio);
+      greatest = std::max(greatest, tops[t].ratio());
     }
   }
   return greatest;
@@ -132,16 +156,35 @@ void ToleranceFitter::addSurfacePoints(const Fit& fit, const Box& cell, std::vec
   const Vector3 half = cell.sizes() / 2;
   surface_->forEachIn(cell, [&](const Vector3& point) {
     const Vector3 local = (point - cell.center()).cwiseQuotient(half);
-    points.push_back({local, std::abs(fit.valueAt(local) + surface_->offset()) / allowed_.at(surface_->offset())});
+    points.push_back({local, (fit.valueAt(local) + surface_->offset()) / allowed_.at(surface_->offset())});
   });
+}
+
+/// Adds the highest peaks that the errors at the lattice and between its points suggest.
+void ToleranceFitter::addPeaks(const Fit& fit, const Box& cell, std::span<const CheckedPoint> lattice,
+                               std::span<const CheckedPoint> between, std::vector<CheckedPoint>& points) const {
+  constexpr std::size_t kMost = 96;
+  std::vector<Peak> peaks;
+  findPeaks(lattice, lattice_.rows(), peaks);
+  findPeaks(between, lattice_.rowsBetween(), peaks);
+  if (peaks.empty()) return;
+  std::ranges::stable_sort(peaks, std::greater(), &Peak::ratio);
+  std::vector<Vector3> local(std::min(kMost, peaks.size()));
+  for (std::size_t i = 0; i < local.size(); ++i) local[i] = peaks[i].local;
+  const std::vector<CheckedPoint> checked = check(fit, cell, local);
+  points.insert(points.end(), checked.begin(), checked.end());
 }
 
 /// Returns the greatest ratio found in a cell, or one that is too great. `points` are the points of the lattice.
 double ToleranceFitter::greatestRatio(const Fit& fit, const Box& cell, std::vector<CheckedPoint> points) const {
+  const std::size_t latticePoints = points.size();
   const std::vector<CheckedPoint> between = check(fit, cell, lattice_.pointsBetween());
   points.insert(points.end(), between.begin(), between.end());
+  std::vector<CheckedPoint> peaks;
+  addPeaks(fit, cell, std::span(points).first(latticePoints), between, peaks);
+  points.insert(points.end(), peaks.begin(), peaks.end());
   addSurfacePoints(fit, cell, points);
-  const double greatest = std::ranges::max_element(points, {}, &CheckedPoint::ratio)->ratio;
+  const double greatest = std::ranges::max_element(points, {}, &CheckedPoint::ratio)->ratio();
   return greatest > kMostRatio ? greatest : std::max(greatest, climb(fit, cell, topsOf(std::move(points))));
 }
 
@@ -180,8 +223,7 @@ ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {
     double ratio = latticeRatio(errors, allowed);
     if (ratio <= kMostRatio) {
       std::vector<CheckedPoint> points(exact.size());
-      for (std::size_t i = 0; i < exact.size(); ++i)
-        points[i] = {lattice_.points()[i], std::abs(errors[i]) / allowed[i]};
+      for (std::size_t i = 0; i < exact.size(); ++i) points[i] = {lattice_.points()[i], errors[i] / allowed[i]};
       ratio = greatestRatio(fit, cell, std::move(points));
       if (ratio <= kMostRatio && (!certified_ || isProven(fit, cell))) {
         result.ratio = ratio;
