@@ -171,9 +171,9 @@ const std::vector<Row> kRows = {
      positive<&BuildOptions::tolerance>,
      "Greatest error of the distance near the surface: 0.01, or 0.02% of the mesh's longest side. It holds within "
      "--within of the surface; beyond it, 1 % of the further distance is allowed in addition, so that the sign is "
-     "right "
-     "wherever the distance exceeds the tolerance. Polynomials, exact cells and precision follow: those that take the "
-     "fewest bytes. The error is checked in every cell and measured at the end."},
+     "right wherever the distance exceeds the tolerance. Polynomials, exact cells and precision follow: the "
+     "construction seeks those that take the fewest bytes. The error is checked in every cell and measured at the "
+     "end."},
     {"within", kAsked,
      number()
          .above(0)
