@@ -43,6 +43,10 @@ TEST_F(HelpCommand, usageMistakesAreRefused) {
   expectRefused({{"bild"}}, "unknown command 'bild'; did you mean 'build'?");
   expectRefused({{"part.stl"}}, "part.stl: no such file, and no command either");
   expectRefused({{"part.hpsdf"}}, "part.hpsdf: no such file, and no command either");
+  writeFile(at("notes.txt"), "no field, no mesh");
+  expectRefused({{at("notes.txt")}},
+                "notes.txt: this is neither a field nor a mesh, which are the files that hpsdf opens");
+  expectRefused({{at("missing.txt")}}, "unknown command");
   expectRefused({{"--halp"}}, "unknown command '--halp'");
   expectRefused({{"help", "slcie"}}, "did you mean 'slice'?");
   expectRefused({{"save", "-o", at("x.hpsdf")}}, "'save' is a command of scripts");

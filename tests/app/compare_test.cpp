@@ -315,8 +315,8 @@ TEST_F(Compare, canBeCancelledWhileErrorsAreMeasured) {
     CancelsAfter listener(questions);
     std::istringstream in;
     std::ostringstream out, err;
-    const std::vector<std::string> words = {"compare", field("coarse"), field("coarse"), "--points", "200000",
-                                            "--no-times"};
+    const std::vector<std::string> words = {"compare",  field("coarse"), field("coarse"),
+                                            "--points", "200000",        "--no-times"};
     EXPECT_EQ(runProgram(words, Console{in, out, err, false, &listener}), 130) << questions;
     EXPECT_EQ(listener.reports(), 1) << "the second field was begun";
   }
