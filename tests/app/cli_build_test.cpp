@@ -304,7 +304,8 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   refused({"--certified"}, "certified belongs to tolerance");
   refused({"--tolerance", "0.1", "--strategy", "hp"}, "strategy has no effect with tolerance");
   refused({"--tolerance", "0.1", "--target-error", "1e-3"}, "target-error and tolerance exclude each other");
-  refused({"--tolerance", "0.1", "--checkpoint"}, "no checkpoint");
+  refused({"--tolerance", "0.1", "--strategy", "hp"}, "leave out strategy or tolerance");
+  refused({"--tolerance", "0.1", "--checkpoint"}, "no checkpoint: leave out the checkpoint or the tolerance");
   refused({"--tolerance", "0.1x"}, "expected a number above 0, or a percentage, found '0.1x'");
   for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--tolerance=1%"})
     expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");

@@ -85,8 +85,10 @@ void requireEffect(const Arguments& arguments) {
   for (const BuildSetting& setting : buildSettings())
     if (setting.isOffered && arguments.given(setting.name) && !setting.hasEffectWithTolerance &&
         setting.ending != BuildSetting::Ending::target)
-      throw Error(fmt::format("{} has no effect with tolerance, which decides how the field is built: leave one out",
-                              setting.name));
+      throw Error(
+          fmt::format("{0} has no effect with tolerance, which decides how the field is built: leave out {0} or "
+                      "tolerance",
+                      setting.name));
   if (arguments.flag("paper")) throw Error("paper and tolerance exclude each other: give one of them");
 }
 

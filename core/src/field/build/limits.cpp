@@ -78,6 +78,18 @@ bool hasEnd(const BuildOptions& options) {
   });
 }
 
+/// Throws `Error` if a setting changes the field after its tolerance or its maximum error was reached.
+void checkOutlived(const BuildOptions& options) {
+  const char* reached = options.tolerance > 0 ? "tolerance" : options.maxError > 0 ? "maximum error" : nullptr;
+  if (reached == nullptr) return;
+  for (const char* later :
+       {options.continuityWeight ? "weak continuity" : nullptr, options.enrich ? "enrich" : nullptr})
+    if (later != nullptr)
+      refuse("a ", reached, " does not outlive ", later, ": leave out ", later, " or the ", reached);
+  if (options.tolerance > 0 && options.band > 0)
+    refuse("a tolerance is kept in the whole domain: leave out the band or the tolerance");
+}
+
 /// Throws `Error` if the settings that determine when the construction ends contradict each other.
 void checkEnds(const BuildOptions& options) {
   const NearFarError byDistance = options.targetError.byDistance();
@@ -90,12 +102,9 @@ void checkEnds(const BuildOptions& options) {
         "target error 0: expected a number above 0, or another end: near and far error, maximum error, bytes, steps");
   if (options.tolerance > 0 && (options.maxError > 0 || options.maxBytes || options.targetError.isByDistance()))
     refuse("a tolerance decides alone: leave out maximum error, bytes, near and far error");
-  if (options.tolerance > 0 && (options.continuityWeight || options.enrich || options.band > 0))
-    refuse("a tolerance does not outlive weak continuity, and needs no band: leave out one of them");
+  checkOutlived(options);
   if (options.certified && options.blend > 0)
     refuse("blending changes what is certified: leave out blending or the certificate");
-  if (options.maxError > 0 && (options.continuityWeight || options.enrich))
-    refuse("a maximum error does not outlive weak continuity or one degree more: leave out one of them");
   if (options.estimator == Estimator::checked && options.trialSamples == TrialSamples::own)
     refuse("the checked estimator needs trials by the children's samples: take the estimator embedded or residual");
   if (options.criterion != Criterion::optimal) return;
