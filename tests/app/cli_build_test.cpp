@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "cli_fixture.h"
 #include "console/failed.h"
+#include "hpsdf/detail/memory.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_file.h"
@@ -171,15 +173,19 @@ TEST_F(BuildCommand, memoryIsLimitedWithoutATarget) {
 }
 
 TEST_F(BuildCommand, memoryLimitsThatMessagesNameSuffice) {
-  for (const std::vector<std::string>& options :
-       std::vector<std::vector<std::string>>{{"analytic:torus", "--target-error", "1e-7", "--memory-limit", "1e6"},
-                                             {"analytic:torus", "--grid", "40", "--memory-limit", "1e6"},
-                                             {"builtin:torus", "--target-error", "1e-5", "--memory-limit", "1e5"},
-                                             {"builtin:gear", "--strategy", "hpx", "--memory-limit", "2e6"}}) {
+  for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
+           {"analytic:torus", "--target-error", "1e-7", "--memory-limit", "1e6"},
+           {"analytic:torus", "--grid", "40", "--memory-limit", "1e6"},
+           {"builtin:torus,segments=24,sides=12", "--tolerance", "1", "--grid", "20", "--memory-limit", "2.7e6"},
+           {"builtin:torus", "--target-error", "1e-5", "--memory-limit", "1e5"},
+           {"builtin:gear", "--strategy", "hpx", "--memory-limit", "2e6"}}) {
     std::vector<std::string> words = {"build", "-o", at("f.hpsdf")};
     words.insert(words.end(), options.begin(), options.end());
     const Outcome refused = run({words});
     EXPECT_EQ(refused.status, 2);
+    if (words.back() == "2.7e6") {
+      EXPECT_THAT(refused.err, HasSubstr("take a coarser grid, or allow")) << "no cell is divided";
+    }
     const std::string name = "--memory-limit ";
     const std::size_t found = refused.err.find(name);
     ASSERT_NE(found, std::string::npos) << refused.err;
@@ -191,7 +197,13 @@ TEST_F(BuildCommand, memoryLimitsThatMessagesNameSuffice) {
   const Outcome huge =
       run({{"build", "analytic:torus", "-o", at("f.hpsdf"), "--grid", "1000", "--memory-limit", "1e6"}});
   EXPECT_EQ(huge.status, 2);
-  EXPECT_THAT(huge.err, HasSubstr("take at most 14 an axis; this machine has not enough memory"));
+  EXPECT_THAT(huge.err, HasSubstr("take a coarser grid, at most 14 an axis; this machine does not allow more memory"));
+  // A grid that needs more than half of the machine's memory fits all the same.
+  const double fitting = std::min(0.6 * allowedMemory() / 330, 4e8);  // cells; one needs 330 bytes
+  const Outcome large = run({{"build", "analytic:torus", "-o", at("f.hpsdf"), "--memory-limit", "1e6", "--grid",
+                              std::to_string(int(std::cbrt(fitting)))}});
+  EXPECT_EQ(large.status, 2);
+  EXPECT_THAT(large.err, ContainsRegex("at most 14 an axis, or allow more memory: --memory-limit .* is likely"));
 }
 
 TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {

@@ -236,7 +236,7 @@ Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& argument
   std::string text = error.shortage();
   text += error.enough() > 0 ? fmt::format(", or allow more memory: --memory-limit {} is likely to suffice",
                                            shortNumber(double(error.enough())))
-                             : "; this machine has not enough memory";
+                             : "; this machine does not allow more memory";
   if (hasDefaultMemoryLimit(arguments))
     text += fmt::format(" (where no target is given either, {} GB are allowed besides the mesh's distance)",
                         double(kDefaultMemory) / 1e9);
