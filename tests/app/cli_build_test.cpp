@@ -117,6 +117,21 @@ TEST_F(BuildCommand, tolerancesAreLengthsOrPercentages) {
   EXPECT_EQ(measured.at("beyond_tolerance"), 0);
 }
 
+/// A changed field is neither within the tolerance nor has an estimate of its error, so that texts speak of neither.
+TEST_F(BuildCommand, changedFieldsHaveNoToleranceAndNoEstimate) {
+  ASSERT_EQ(run({{"build", "builtin:box", "-o", at("t.hpsdf"), "--tolerance", "5%", "--grid", "2"}}).status, 0);
+  for (const std::string command : {"smooth", "blend"}) {
+    const Outcome changed = run({{command, at("t.hpsdf"), "-o", at("c.hpsdf")}});
+    ASSERT_EQ(changed.status, 0) << changed.err;
+    EXPECT_THAT(changed.out, Not(HasSubstr("estimate")));
+    EXPECT_THAT(run({{"info", at("c.hpsdf")}}).out,
+                AllOf(Not(HasSubstr("tolerance")), Not(HasSubstr("estimate")), Not(HasSubstr("error, target"))));
+    const Json info = Json::parse(run({{"info", at("c.hpsdf"), "--json"}}).out);
+    for (const char* key : {"tolerance", "total_error", "rms_estimate", "target_error", "measured", "measured_error"})
+      EXPECT_TRUE(info.at(key).is_null()) << command << " " << key;
+  }
+}
+
 TEST_F(BuildCommand, analyticShapesAreNormalizedToo) {
   const Outcome built = run({{"build", "analytic:sphere,radius=0.25", "-o", at("s.hpsdf"), "--normalize",
                               "--target-error", "1e-5", "--grid", "3"}});

@@ -208,13 +208,14 @@ void runSmooth(Session& session, const Arguments& arguments) {
                             arguments.whole("threads"), progress);
   });
   const double seconds = secondsSince(start);
-  changeCurrent(session, arguments, std::move(made.field),
-                {{"change", made.change}, {"iterations", made.iterations}, {"seconds", seconds}},
-                [&](const Field& field) {
-                  return fmt::format("changed by {} RMS in {} iterations, {:.1f} s; weighted estimate {}",
-                                     shortNumber(made.change), made.iterations, seconds,
-                                     shortNumber(field.metadata().rmsEstimate(field.domain())));
-                });
+  changeCurrent(
+      session, arguments, std::move(made.field),
+      {{"change", made.change}, {"iterations", made.iterations}, {"seconds", seconds}}, [&](const Field& field) {
+        const FieldMetadata& metadata = field.metadata();
+        return fmt::format(
+            "changed by {} RMS in {} iterations, {:.1f} s{}", shortNumber(made.change), made.iterations, seconds,
+            metadata.hasEstimate() ? "; weighted estimate " + shortNumber(metadata.rmsEstimate(field.domain())) : "");
+      });
 }
 
 void runBlend(Session& session, const Arguments& arguments) {
@@ -317,8 +318,9 @@ unit. Cells, degrees and size stay. 'build --continuity weak' does the same duri
 once, this command a second time.
 
 Use it where jumps between cells disturb more than a small error. The polynomials of cells have too few coefficients to
-agree along whole faces, so that smaller jumps cost accuracy; 'hpsdf study continuity' shows how much. Bounds are
-removed. A field can be smoothed once.)"),
+agree along whole faces, so that smaller jumps cost accuracy; 'hpsdf study continuity' shows how much. Bounds and
+measured errors are removed, and so is the tolerance of a field that was built within one. A field can be smoothed
+once.)"),
       .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
                    "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
       .parameters = {fieldParameter(), kFieldOutput, settingParameter("continuity-weight"),
@@ -333,8 +335,9 @@ Blends neighbouring cells by smooth weights in a zone along their faces, so that
 anywhere in the domain. Outside of the zones the field stays the same to the bit. No coefficient changes: the file
 stores the width of the zones, and queries and pictures blend. 'build --continuity exact' does the same.
 
-Use it for collision response and shading, which need continuous gradients. Queries take up to twice as long, and bounds
-are removed.)"),
+Use it for collision response and shading, which need continuous gradients. Queries take up to twice as long. Bounds and
+measured errors are removed, and so is the tolerance of a field that was built within one: 'build --tolerance
+--continuity exact' keeps the tolerance with blending.)"),
       .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
       .parameters = {fieldParameter(),
                      kFieldOutput,
