@@ -8,12 +8,14 @@
 #include <cmath>
 
 #include "cli_fixture.h"
+#include "commands/commands.h"
 #include "console/failed.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/verify.h"
+#include "session/asked_errors.h"
 
 namespace hpsdf::app {
 namespace cli_build_test {
@@ -115,6 +117,29 @@ TEST_F(BuildCommand, tolerancesAreLengthsOrPercentages) {
   const Json measured = Json::parse(larger.out).at("measured");
   EXPECT_LE(measured.at("tolerance_ratio"), 1);
   EXPECT_EQ(measured.at("beyond_tolerance"), 0);
+}
+
+TEST_F(BuildCommand, aMissedToleranceIsToldWithAdvice) {
+  const Registry registry = makeRegistry();
+  const std::vector<Word> words = {{.text = "builtin:torus"}, {.text = "--tolerance=0.01"}};
+  const Arguments arguments = parseArguments(registry.command("build"), words, Origin::script);
+  const auto missed = [&](double measuredError, std::uint64_t beyond) {
+    FieldData data = load(field()).data();
+    data.metadata.settings.tolerance = 0.01;
+    data.metadata.settings.within = 0.1;
+    data.metadata.measuredError = measuredError;
+    data.metadata.measurement->beyondTolerance = beyond;
+    data.metadata.measurement->toleranceRatio = 2.5;
+    return missedErrors(arguments, Field(std::move(data)));
+  };
+  const std::string advice =
+      ": take a larger tolerance; where the distance jumps because the mesh has holes or intersects itself, repair the "
+      "mesh first ('hpsdf mesh --help')";
+  const std::string tolerance = "tolerance: 0.01 within 0.1 of the surface, and 1 % of the distance beyond; ";
+  EXPECT_EQ(missed(0.009, 0), "");
+  EXPECT_EQ(missed(0.03, 0), tolerance + "missed in some cells, where the error is up to 3 times as great" + advice);
+  EXPECT_EQ(missed(0.01001, 0), tolerance + "missed in some cells" + advice) << "not 1 times as great";
+  EXPECT_THAT(missed(0.009, 7), AllOf(StartsWith(tolerance + "missed at 7 of "), EndsWith(advice)));
 }
 
 /// A changed field is neither within the tolerance nor has an estimate of its error, so that texts speak of neither.

@@ -19,6 +19,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/safe_distance.h"
+#include "session/asked_errors.h"
 #include "session/field_argument.h"
 #include "session/field_summary.h"
 #include "session/field_surface.h"
@@ -101,28 +102,23 @@ void removeLeftovers(const std::filesystem::path& checkpoint, const std::filesys
   OutputFile::removeAbandoned(output);
 }
 
-/// Throws `Failed` if a measured error exceeds what the arguments ask for. The field is kept all the same.
-void requireAskedErrors(const Arguments& arguments, const Field& field) {
-  const std::optional<Measurement>& m = field.metadata().measurement;
-  if (!m) return;
-  const auto require = [&](const char* name, const char* kind, double measured) {
-    if (!arguments.given(name) || measured <= arguments.number(name)) return;
-    throw Failed(
-        fmt::format("{}: {} of {} was measured, more than the {} that was asked for: ask for less than that, or "
-                    "allow a higher degree, a greater depth or more bytes",
-                    name, kind, shortNumber(measured), shortNumber(arguments.number(name))));
-  };
-  require("near-error", "an RMS error near the surface", m->near.rms);
-  require("far-error", "an RMS error over the domain", m->domain.rms);
-  const FieldMetadata& metadata = field.metadata();
-  const double tolerance = metadata.settings.tolerance;
-  if (tolerance > 0 && metadata.measuredError > tolerance)
-    throw Failed(
-        fmt::format("tolerance: missed in some cells, where the error is {:.3g} times as great as allowed: the "
-                    "distance jumps there, or changes faster than the smallest cells can follow",
-                    metadata.measuredError / tolerance));
-  if (m->beyondTolerance > 0) throw Failed("tolerance: " + toleranceText(field));
-  require("max-error", "an error", std::max(m->near.max, m->domain.max));
+/// Reports the current field, which was just built. `missed` is what it misses of the errors that were asked for.
+void reportBuilt(const Session& session, const Arguments& arguments, const BuiltField& built,
+                 const std::string& missed) {
+  const std::string surface = arguments.text("mesh");
+  std::ostream& out = session.console().out;
+  if (session.wantsJson(arguments)) {
+    Json json = madeJson(session, arguments);
+    json["build_seconds"] = built.seconds;
+    json["missed"] = missed.empty() ? Json() : Json(missed);
+    if (built.mesh) json["mesh_report"] = meshJson(surface, *built.mesh);
+    return printJson(out, json);
+  }
+  if (built.mesh) out << meshText(surface, *built.mesh);
+  const Field& field = session.current().field;
+  out << fmt::format("{}{} in {:.1f} s\nmeasured: {}\n", arguments.has("output") ? arguments.text("output") + ": " : "",
+                     fieldLine(field), built.seconds, measuredText(field));
+  if (hasTolerance(field) && !missesTolerance(field)) out << fmt::format("tolerance: {}\n", toleranceText(field));
 }
 
 void runBuild(Session& session, const Arguments& arguments) {
@@ -137,20 +133,9 @@ void runBuild(Session& session, const Arguments& arguments) {
   session.setExact(std::move(built.exact));
   saveMade(session, arguments);
   if (!checkpoint.empty()) removeLeftovers(checkpoint, arguments.text("output"));
-  if (session.wantsJson(arguments)) {
-    Json json = madeJson(session, arguments);
-    json["build_seconds"] = built.seconds;
-    if (built.mesh) json["mesh_report"] = meshJson(surface, *built.mesh);
-    printJson(console.out, json);
-    return requireAskedErrors(arguments, session.current().field);
-  }
-  if (built.mesh) console.out << meshText(surface, *built.mesh);
-  const Field& field = session.current().field;
-  console.out << fmt::format("{}{} in {:.1f} s\nmeasured: {}\n",
-                             arguments.has("output") ? arguments.text("output") + ": " : "", fieldLine(field),
-                             built.seconds, measuredText(field));
-  if (hasTolerance(field)) console.out << fmt::format("tolerance: {}\n", toleranceText(field));
-  requireAskedErrors(arguments, field);
+  const std::string missed = missedErrors(arguments, session.current().field);
+  reportBuilt(session, arguments, built, missed);
+  if (!missed.empty()) throw Failed(missed);
 }
 
 void runLoad(Session& session, const Arguments& arguments) {
@@ -293,7 +278,8 @@ reports which inside test was chosen (see --sign). Ctrl-C stops the construction
 left out.
 
 With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, and one line of JSON on standard output reports its
-result. A mesh that fails does not stop the others; the exit status is 3 then. Fields that exist already, made from the
+result. A mesh that fails does not stop the others; the exit status is 3 then. It is 1 if none fails and a field misses its
+tolerance or an error that was asked for, which its line tells. Fields that exist already, made from the
 same contents with the same options, are skipped. Any number of processes may share one list and one folder: each mesh
 is built by one of them. docs/batch.md shows how, also with GNU parallel and Slurm.)"),
       .examples = {"hpsdf build part.stl -o part.hpsdf --tolerance 0.02%", "hpsdf build bunny.obj -o bunny.hpsdf",

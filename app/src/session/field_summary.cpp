@@ -16,6 +16,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr int kHistogramColumns = 40;
+constexpr double kVisiblyMissed = 1.005;  // errors over the allowed ones that three digits distinguish from 1
 
 /// Returns a table with one row for each level (a degree or a depth). A row shows the level's share of the volume, its
 /// number of leaves, and a bar proportional to the share.
@@ -153,12 +154,21 @@ std::string wrongSignsText(const Measurement& m) {
 
 bool hasTolerance(const Field& field) { return field.metadata().settings.tolerance > 0; }
 
+bool missesTolerance(const Field& field) {
+  const FieldMetadata& metadata = field.metadata();
+  if (!hasTolerance(field)) return false;
+  return metadata.measuredError > metadata.settings.tolerance ||
+         (metadata.measurement && metadata.measurement->beyondTolerance > 0);
+}
+
 std::string toleranceText(const Field& field) {
   const BuildOptions& settings = field.metadata().settings;
   const std::optional<Measurement>& m = field.metadata().measurement;
   std::string text = fmt::format("{} within {} of the surface, and 1 % of the distance beyond",
                                  shortNumber(settings.tolerance), shortNumber(settings.within));
-  if (field.metadata().measuredError > settings.tolerance) return text + "; missed in some cells";
+  if (const double ratio = field.metadata().measuredError / settings.tolerance; ratio > 1)
+    return text + "; missed in some cells" +
+           (ratio > kVisiblyMissed ? fmt::format(", where the error is up to {:.3g} times as great", ratio) : "");
   if (!m) return text + "; not measured";
   if (m->beyondTolerance > 0)
     return text + fmt::format("; missed at {} of {} points, where the error is up to {:.3g} times as great",
