@@ -354,6 +354,7 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   // `hpsdf study` refuses options that would have no effect or another meaning than in `hpsdf build`.
   refused({"--within", "0.1"}, "within belongs to tolerance");
   refused({"--certified"}, "certified belongs to tolerance");
+  refused({"--tolerance", "0.1", "--certified", "--sign", "pseudonormal"}, "certified: nothing is proven where");
   refused({"--tolerance", "0.1", "--strategy", "hp"}, "strategy has no effect with tolerance");
   refused({"--tolerance", "0.1", "--target-error", "1e-3"}, "target-error and tolerance exclude each other");
   refused({"--tolerance", "0.1", "--strategy", "hp"}, "leave out strategy or tolerance");

@@ -197,6 +197,10 @@ DistanceOptions distanceOptions(const Arguments& arguments) {
       throw Error(fmt::format("hull: goes by winding number: leave out sign {}", arguments.text("sign")));
     options.insideTest = InsideTest::outerHull;
   }
+  if (options.insideTest == InsideTest::pseudonormal && arguments.flag("certified"))
+    throw Error(
+        "certified: nothing is proven where sign pseudonormal is forced upon a mesh: leave out sign; auto takes "
+        "pseudonormals wherever they are certain to be right");
   if (options.insideTest == InsideTest::shell && !arguments.given("thickness"))
     throw Error("sign unsigned-shell: give the wall a thickness, such as a hundredth of the mesh's size");
   requireOwner(arguments, "thickness", "sign unsigned-shell", options.insideTest == InsideTest::shell);

@@ -21,8 +21,9 @@ std::string missedErrors(const Arguments& arguments, const Field& field) {
   std::string missed;
   const auto compare = [&](const char* name, const char* kind, double measured) {
     if (!arguments.given(name) || measured <= arguments.number(name)) return;
-    missed += fmt::format("{}{}: {} of {} was measured, more than the {} that was asked for", missed.empty() ? "" : "; ",
-                          name, kind, shortNumber(measured), shortNumber(arguments.number(name)));
+    missed +=
+        fmt::format("{}{}: {} of {} was measured, more than the {} that was asked for", missed.empty() ? "" : "; ",
+                    name, kind, shortNumber(measured), shortNumber(arguments.number(name)));
   };
   compare("near-error", "an RMS error near the surface", m->near.rms);
   compare("far-error", "an RMS error over the domain", m->domain.rms);
