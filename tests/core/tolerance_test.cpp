@@ -78,6 +78,16 @@ TEST(Tolerance, isKeptAtAnyScale) {
   EXPECT_LE(greatestRatio(fieldOfLarge, distanceOfLarge, large), 1);
 }
 
+/// Single-precision coordinates would be 1e-3 apart there, a fifth of the tolerance.
+TEST(Tolerance, isKeptFarFromTheOrigin) {
+  const TriangleMesh mesh = support::moved(shapes::mesh("gear,teeth=5"), {1e4, -1e4, 1e4}, 0.5);
+  const ExactDistance distance(mesh);
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 0.005});
+  EXPECT_LE(greatestRatio(field, distance, mesh), 1);
+  EXPECT_LE(field.metadata().measuredError, 0.005);
+  EXPECT_EQ(measure(field, distance).beyondTolerance, 0U);
+}
+
 TEST(Tolerance, takesExactLeavesWhereTheseAreSmaller) {
   const TriangleMesh mesh = support::boxOfTwo();
   const ExactDistance distance(mesh);
