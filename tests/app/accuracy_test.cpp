@@ -299,6 +299,18 @@ TEST_F(Accuracy, convergenceNamesTheWeightedEstimate) {
   EXPECT_THAT(outcome.out, HasSubstr("weighted estimate  measured RMS"));
 }
 
+/// The default limit of the memory belongs to constructions that a target error ends.
+TEST_F(Accuracy, convergenceIsLimitedByItsCoefficientsAlone) {
+  const std::vector<std::string> words = {"study",    "convergence", "analytic:torus",     "-o",
+                                          at("out"),  "--no-plot",   "--points",           "1000",
+                                          "--stages", "1",           "--max-coefficients", "1800000"};
+  const Outcome outcome = runHere(words);
+  EXPECT_EQ(outcome.status, kExitDone) << outcome.err;
+  std::vector<std::string> limited = words;
+  limited.insert(limited.end(), {"--memory-limit", "1e6"});
+  EXPECT_EQ(runHere(limited).status, kExitBadInput);
+}
+
 /// The curves are the same for a torus of any size.
 TEST_F(Accuracy, convergenceOfASmallTorusIsThatOfALargeOne) {
   const auto curves = [&](const std::string& torus) {

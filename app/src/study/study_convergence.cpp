@@ -69,7 +69,10 @@ Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& sam
   BuildOptions options = input.options;
   options.strategy = strategy;
   options.coefficients = CoefficientType::float64;
-  options.targetError = 0;  // none, at any scale: the number of coefficients ends the construction
+  // The number of coefficients ends the construction: there is no target error, and no default limit of the memory
+  // for want of one.
+  options.targetError = 0;
+  if (!arguments.given("memory-limit")) options.memoryLimit.reset();
   Json stages = Json::array();
   const auto inspect = [&](const Field& field) {
     const std::size_t coefficients = statistics(field).coefficients;
