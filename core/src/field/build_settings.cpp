@@ -187,9 +187,8 @@ const std::vector<Row> kRows = {
     {"certified", kAsked, flag().of("tolerance", isTolerant).suitsTolerance().stored(19),
      member<&BuildOptions::certified>,
      "Takes only polynomials whose errors are proven to be within the tolerance at every point, not only at those that "
-     "are checked. It takes longer and gives a larger field. It needs a mesh without holes, and an inside test other "
-     "than "
-     "--sign pseudonormal, which --sign auto takes where it is certain."},
+     "are checked. It takes longer and gives a larger field. It needs a mesh without holes, and excludes "
+     "--sign pseudonormal: auto takes it where it is certain."},
     {"target-error", kAsked, number().above(0).in("units^5 at that scale").ends(Ending::target).stored(1),
      kWeightedError,
      "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, where L is "
