@@ -26,11 +26,17 @@ bool asksForAllHelp(const std::string& word) { return word == "--help-all"; }
 bool asksForHelp(const std::string& word) { return word == "--help" || word == "-h" || asksForAllHelp(word); }
 
 /// Returns the words of the command line, with the command `view` before the name of a field or a mesh that stands in
-/// place of a command. Throws `Error` if there is no file of this name.
+/// place of a command. Throws `Error` if there is no file of this name, or if the word is neither a command nor a file
+/// that the program opens.
 std::vector<std::string> withCommand(std::span<const std::string> words, const Registry& registry) {
   std::vector<std::string> all(words.begin(), words.end());
   const bool isCommand = std::ranges::find(registry.commands(), words[0], &Command::name) != registry.commands().end();
-  if (isCommand || kindOfFile(words[0]) == FileKind::unknown) return all;
+  if (isCommand) return all;
+  if (kindOfFile(words[0]) == FileKind::unknown) {
+    std::error_code missing;
+    if (std::filesystem::is_regular_file(words[0], missing)) throw unknownKind(words[0]);
+    return all;
+  }
   if (!isShape(words[0]) && !std::filesystem::exists(words[0]))
     throw Error(fmt::format("{}: no such file, and no command either; check the path", words[0]));
   all.insert(all.begin(), "view");

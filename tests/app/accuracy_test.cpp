@@ -280,6 +280,37 @@ TEST_F(Accuracy, convergenceOfATorusFallsAndHpIsAhead) {
   EXPECT_EQ(readTextFile(at("again/convergence.csv")), readTextFile(at("out/convergence.csv")));
 }
 
+TEST_F(Accuracy, tablesHaveNoEstimateWithinATolerance) {
+  const Outcome outcome = runHere({"study", "table", "builtin:box", "-o", at("out"), "--tolerance", "5%", "--grid", "2",
+                                   "--points", "1000", "--cpu"});
+  ASSERT_EQ(outcome.status, kExitDone) << outcome.err;
+  EXPECT_THAT(outcome.out, testing::ContainsRegex("weighted estimate \\(τ\\) –"));
+  EXPECT_THAT(readTextFile(at("out/index.html")), HasSubstr("<td class=\"figure\">–</td>"));
+  const Json row = Json::parse(readTextFile(at("out/table.json")))["meshes"][0];
+  EXPECT_TRUE(row.at("estimated_rms").is_null());
+  EXPECT_TRUE(row.at("target_error").is_null());
+  EXPECT_GT(row.at("tolerance"), 0);
+}
+
+TEST_F(Accuracy, convergenceNamesTheWeightedEstimate) {
+  const Outcome outcome = runHere({"study", "convergence", "analytic:torus", "-o", at("out"), "--no-plot",
+                                   "--max-coefficients", "5000", "--points", "1000"});
+  ASSERT_EQ(outcome.status, kExitDone) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("weighted estimate  measured RMS"));
+}
+
+/// The default limit of the memory belongs to constructions that a target error ends.
+TEST_F(Accuracy, convergenceIsLimitedByItsCoefficientsAlone) {
+  const std::vector<std::string> words = {"study",    "convergence", "analytic:torus",     "-o",
+                                          at("out"),  "--no-plot",   "--points",           "1000",
+                                          "--stages", "1",           "--max-coefficients", "1800000"};
+  const Outcome outcome = runHere(words);
+  EXPECT_EQ(outcome.status, kExitDone) << outcome.err;
+  std::vector<std::string> limited = words;
+  limited.insert(limited.end(), {"--memory-limit", "1e6"});
+  EXPECT_EQ(runHere(limited).status, kExitBadInput);
+}
+
 /// The curves are the same for a torus of any size.
 TEST_F(Accuracy, convergenceOfASmallTorusIsThatOfALargeOne) {
   const auto curves = [&](const std::string& torus) {

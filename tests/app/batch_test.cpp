@@ -183,6 +183,39 @@ TEST_F(Batches, badMeshDoesNotStopTheOthers) {
     EXPECT_TRUE(readFile(fieldOf(surface)) == loneBytes(surface, kCoarse)) << surface;
 }
 
+/// The cells of the larger sphere may not be divided often enough for the maximum error, which is a length.
+TEST_F(Batches, fieldsThatMissTheErrorsAskedForAreTold) {
+  const std::vector<std::string> options = {"--max-error",  "0.01", "--target-error", "1e-2", "--strategy", "hp",
+                                            "--max-degree", "2",    "--max-depth",    "1",    "--grid",     "2"};
+  const char* small = "analytic:sphere,radius=0.01";
+  const Call call = batch("analytic:sphere\nanalytic:sphere,radius=0.01\n", options);
+  const Outcome outcome = run(call);
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  const std::vector<Json> lines = linesOf(outcome);
+  ASSERT_THAT(statusesOf(outcome), ElementsAre("built", "built"));
+  EXPECT_THAT(lines[0].at("missed").get<std::string>(), StartsWith("max-error: an error of "));
+  EXPECT_TRUE(lines[1].at("missed").is_null());
+  EXPECT_TRUE(lines[0].at("error").is_null());
+  EXPECT_THAT(outcome.err, HasSubstr("\nhpsdf: warning: 1 of 2: analytic:sphere: max-error: an error of "));
+  EXPECT_THAT(outcome.err,
+              EndsWith("list: 1 of 2 fields miss the errors that were asked for; the lines above say by how "
+                       "much\n"));
+  EXPECT_TRUE(readFile(fieldOf(small)) == loneBytes(small, options));
+  EXPECT_TRUE(fs::exists(fieldOf("analytic:sphere")));
+  const Outcome again = run(call);
+  EXPECT_EQ(again.status, 1) << "skipped fields miss it as before";
+  EXPECT_EQ(linesOf(again)[0].at("missed"), lines[0].at("missed"));
+  EXPECT_EQ(run(batch("analytic:sphere\nbuiltin:tours\n", options)).status, 3) << "failures are worse";
+}
+
+TEST_F(Batches, fieldsWithinAToleranceHaveNoEstimate) {
+  const Outcome outcome = run(batch("builtin:box\n", {"--tolerance", "5%", "--grid", "2"}));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const Json line = linesOf(outcome).at(0);
+  EXPECT_TRUE(line.at("missed").is_null());
+  EXPECT_TRUE(line.at("rms_estimate").is_null());
+}
+
 TEST_F(Batches, finishedFieldsAreSkipped) {
   writeFile(folder_ / "t.obj", tetrahedron(1));
   const Call call = batch("t.obj\nbuiltin:box\nanalytic:box\n", coarseAnd({"--normalize"}));

@@ -5,13 +5,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "cli_fixture.h"
+#include "commands/commands.h"
 #include "console/failed.h"
+#include "hpsdf/detail/memory.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/verify.h"
+#include "session/asked_errors.h"
 
 namespace hpsdf::app {
 namespace cli_build_test {
@@ -115,6 +119,44 @@ TEST_F(BuildCommand, tolerancesAreLengthsOrPercentages) {
   EXPECT_EQ(measured.at("beyond_tolerance"), 0);
 }
 
+TEST_F(BuildCommand, aMissedToleranceIsToldWithAdvice) {
+  const Registry registry = makeRegistry();
+  const std::vector<Word> words = {{.text = "builtin:torus"}, {.text = "--tolerance=0.01"}};
+  const Arguments arguments = parseArguments(registry.command("build"), words, Origin::script);
+  const auto missed = [&](double measuredError, std::uint64_t beyond) {
+    FieldData data = load(field()).data();
+    data.metadata.settings.tolerance = 0.01;
+    data.metadata.settings.within = 0.1;
+    data.metadata.measuredError = measuredError;
+    data.metadata.measurement->beyondTolerance = beyond;
+    data.metadata.measurement->toleranceRatio = 2.5;
+    return missedErrors(arguments, Field(std::move(data)));
+  };
+  const std::string advice =
+      ": take a larger tolerance; where the distance jumps because the mesh has holes or intersects itself, repair the "
+      "mesh first ('hpsdf mesh --help')";
+  const std::string tolerance = "tolerance: 0.01 within 0.1 of the surface, and 1 % of the distance beyond; ";
+  EXPECT_EQ(missed(0.009, 0), "");
+  EXPECT_EQ(missed(0.03, 0), tolerance + "missed in some cells, where the error is up to 3 times as great" + advice);
+  EXPECT_EQ(missed(0.01001, 0), tolerance + "missed in some cells" + advice) << "not 1 times as great";
+  EXPECT_THAT(missed(0.009, 7), AllOf(StartsWith(tolerance + "missed at 7 of "), EndsWith(advice)));
+}
+
+/// A changed field is neither within the tolerance nor has an estimate of its error, so that texts speak of neither.
+TEST_F(BuildCommand, changedFieldsHaveNoToleranceAndNoEstimate) {
+  ASSERT_EQ(run({{"build", "builtin:box", "-o", at("t.hpsdf"), "--tolerance", "5%", "--grid", "2"}}).status, 0);
+  for (const std::string command : {"smooth", "blend"}) {
+    const Outcome changed = run({{command, at("t.hpsdf"), "-o", at("c.hpsdf")}});
+    ASSERT_EQ(changed.status, 0) << changed.err;
+    EXPECT_THAT(changed.out, Not(HasSubstr("estimate")));
+    EXPECT_THAT(run({{"info", at("c.hpsdf")}}).out,
+                AllOf(Not(HasSubstr("tolerance")), Not(HasSubstr("estimate")), Not(HasSubstr("error, target"))));
+    const Json info = Json::parse(run({{"info", at("c.hpsdf"), "--json"}}).out);
+    for (const char* key : {"tolerance", "total_error", "rms_estimate", "target_error", "measured", "measured_error"})
+      EXPECT_TRUE(info.at(key).is_null()) << command << " " << key;
+  }
+}
+
 TEST_F(BuildCommand, analyticShapesAreNormalizedToo) {
   const Outcome built = run({{"build", "analytic:sphere,radius=0.25", "-o", at("s.hpsdf"), "--normalize",
                               "--target-error", "1e-5", "--grid", "3"}});
@@ -171,15 +213,19 @@ TEST_F(BuildCommand, memoryIsLimitedWithoutATarget) {
 }
 
 TEST_F(BuildCommand, memoryLimitsThatMessagesNameSuffice) {
-  for (const std::vector<std::string>& options :
-       std::vector<std::vector<std::string>>{{"analytic:torus", "--target-error", "1e-7", "--memory-limit", "1e6"},
-                                             {"analytic:torus", "--grid", "40", "--memory-limit", "1e6"},
-                                             {"builtin:torus", "--target-error", "1e-5", "--memory-limit", "1e5"},
-                                             {"builtin:gear", "--strategy", "hpx", "--memory-limit", "2e6"}}) {
+  for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
+           {"analytic:torus", "--target-error", "1e-7", "--memory-limit", "1e6"},
+           {"analytic:torus", "--grid", "40", "--memory-limit", "1e6"},
+           {"builtin:torus,segments=24,sides=12", "--tolerance", "1", "--grid", "20", "--memory-limit", "2.7e6"},
+           {"builtin:torus", "--target-error", "1e-5", "--memory-limit", "1e5"},
+           {"builtin:gear", "--strategy", "hpx", "--memory-limit", "2e6"}}) {
     std::vector<std::string> words = {"build", "-o", at("f.hpsdf")};
     words.insert(words.end(), options.begin(), options.end());
     const Outcome refused = run({words});
     EXPECT_EQ(refused.status, 2);
+    if (words.back() == "2.7e6") {
+      EXPECT_THAT(refused.err, HasSubstr("take a coarser grid, or allow")) << "no cell is divided";
+    }
     const std::string name = "--memory-limit ";
     const std::size_t found = refused.err.find(name);
     ASSERT_NE(found, std::string::npos) << refused.err;
@@ -191,7 +237,13 @@ TEST_F(BuildCommand, memoryLimitsThatMessagesNameSuffice) {
   const Outcome huge =
       run({{"build", "analytic:torus", "-o", at("f.hpsdf"), "--grid", "1000", "--memory-limit", "1e6"}});
   EXPECT_EQ(huge.status, 2);
-  EXPECT_THAT(huge.err, HasSubstr("take at most 14 an axis; this machine has not enough memory"));
+  EXPECT_THAT(huge.err, HasSubstr("take a coarser grid, at most 14 an axis; this machine does not allow more memory"));
+  // A grid that needs more than half of the machine's memory fits all the same.
+  const double fitting = std::min(0.6 * allowedMemory() / 330, 4e8);  // cells; one needs 330 bytes
+  const Outcome large = run({{"build", "analytic:torus", "-o", at("f.hpsdf"), "--memory-limit", "1e6", "--grid",
+                              std::to_string(int(std::cbrt(fitting)))}});
+  EXPECT_EQ(large.status, 2);
+  EXPECT_THAT(large.err, ContainsRegex("at most 14 an axis, or allow more memory: --memory-limit .* is likely"));
 }
 
 TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
@@ -302,9 +354,11 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   // `hpsdf study` refuses options that would have no effect or another meaning than in `hpsdf build`.
   refused({"--within", "0.1"}, "within belongs to tolerance");
   refused({"--certified"}, "certified belongs to tolerance");
+  refused({"--tolerance", "0.1", "--certified", "--sign", "pseudonormal"}, "certified: nothing is proven where");
   refused({"--tolerance", "0.1", "--strategy", "hp"}, "strategy has no effect with tolerance");
   refused({"--tolerance", "0.1", "--target-error", "1e-3"}, "target-error and tolerance exclude each other");
-  refused({"--tolerance", "0.1", "--checkpoint"}, "no checkpoint");
+  refused({"--tolerance", "0.1", "--strategy", "hp"}, "leave out strategy or tolerance");
+  refused({"--tolerance", "0.1", "--checkpoint"}, "no checkpoint: leave out the checkpoint or the tolerance");
   refused({"--tolerance", "0.1x"}, "expected a number above 0, or a percentage, found '0.1x'");
   for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--tolerance=1%"})
     expectRefused({{"study", "continuity", "builtin:torus", "-o", at("study"), option}}, "not for 'study continuity'");

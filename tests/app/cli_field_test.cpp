@@ -206,6 +206,9 @@ TEST_F(FieldFile, aMeshAloneIsNotTakenForAField) {
       EXPECT_EQ(outcome.status, isKnown ? 0 : 2) << command << " " << words << outcome.err;
       EXPECT_EQ(outcome.err.find("give MESH, t.obj") == std::string::npos, isKnown) << outcome.err;
     }
+    const Outcome named = script(command + " field=" + at("t.obj") + points);
+    EXPECT_EQ(named.status, 2);
+    EXPECT_THAT(named.err, HasSubstr("t.obj: this is a mesh or a shape, not a field"));
     const Outcome neither = script(command + " " + at("notes.txt") + points);
     EXPECT_EQ(neither.status, 2);
     EXPECT_THAT(neither.err, HasSubstr("notes.txt: this is neither a field nor a mesh"));

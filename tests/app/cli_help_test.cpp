@@ -43,6 +43,10 @@ TEST_F(HelpCommand, usageMistakesAreRefused) {
   expectRefused({{"bild"}}, "unknown command 'bild'; did you mean 'build'?");
   expectRefused({{"part.stl"}}, "part.stl: no such file, and no command either");
   expectRefused({{"part.hpsdf"}}, "part.hpsdf: no such file, and no command either");
+  writeFile(at("notes.txt"), "no field, no mesh");
+  expectRefused({{at("notes.txt")}},
+                "notes.txt: this is neither a field nor a mesh, which are the files that hpsdf opens");
+  expectRefused({{at("missing.txt")}}, "unknown command");
   expectRefused({{"--halp"}}, "unknown command '--halp'");
   expectRefused({{"help", "slcie"}}, "did you mean 'slice'?");
   expectRefused({{"save", "-o", at("x.hpsdf")}}, "'save' is a command of scripts");
@@ -82,8 +86,8 @@ TEST_F(HelpCommand, badOptionsAreRefused) {
   expectRefused(build({"--grid", "2000000000"}), "base grid");
   expectRefused(
       build({"--grid", "100", "--memory-limit", "1e8"}),
-      "1e+06 cells and would need 330.00 MB, more than the 100.00 MB allowed: take at most 67 an axis, or allow more "
-      "memory");
+      "1e+06 cells and would need 330.00 MB, more than the 100.00 MB allowed: take a coarser grid, at most 67 an "
+      "axis, or allow more memory");
   expectRefused(build({"--grid", "800", "--memory-limit", "1e15"}), "base grid 800");
   expectRefused(build({"--max-degree", "31"}), "--max-degree: expected a whole number from 1 to 30");
   expectRefused(build({"--domain", "1,1,1,0,0,0"}), "expected lower corner");

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
@@ -291,6 +292,34 @@ TEST_F(Compare, coloursMeanTheSameInAllPictures) {
   const std::vector<render::Image> alike = pictures(page({field("fine"), field("fine")}, "alike.html"));
   for (std::size_t n = 0; n < alike.size(); n += 2) EXPECT_EQ(alike[n].pixels, alike[n + 1].pixels);
   EXPECT_NE(render::problem(render::compare(alike[2], found[3]), render::kPixelBudget), "");
+}
+
+/// A listener that cancels the work after some questions whether it wants to, counted from the first report of the task
+/// "comparing".
+class CancelsAfter : public WorkListener {
+ public:
+  explicit CancelsAfter(int questions) : left_(questions) {}
+  void report(std::string_view task, double) override { reports_ += task == "comparing" ? 1 : 0; }
+  bool wantsCancel() override { return reports_ > 0 && --left_ < 0; }
+  void ended() override {}
+  int reports() const { return reports_; }
+
+ private:
+  std::atomic<int> reports_ = 0;
+  std::atomic<int> left_;
+};
+
+/// The evaluation of a field at these points asks four times, its errors and their worst places eight times more.
+TEST_F(Compare, canBeCancelledWhileErrorsAreMeasured) {
+  for (const int questions : {5, 8, 11}) {
+    CancelsAfter listener(questions);
+    std::istringstream in;
+    std::ostringstream out, err;
+    const std::vector<std::string> words = {"compare",  field("coarse"), field("coarse"),
+                                            "--points", "200000",        "--no-times"};
+    EXPECT_EQ(runProgram(words, Console{in, out, err, false, &listener}), 130) << questions;
+    EXPECT_EQ(listener.reports(), 1) << "the second field was begun";
+  }
 }
 
 TEST_F(Compare, scriptsCompareToo) {

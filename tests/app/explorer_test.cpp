@@ -454,6 +454,22 @@ TEST(Explorer, rebuildsWithinATolerance) {
   EXPECT_EQ(settings().tolerance, 2 * tolerance);
 }
 
+TEST(Explorer, rebuildsWhatWasSmoothedAfterATolerance) {
+  Bench bench;
+  bench.run("build builtin:gear,teeth=3 tolerance=2% grid=3 ; smooth ; show size=900x1100 ; panel view=false");
+  const auto field = [&]() -> const Field& { return bench.session.current().field; };
+  EXPECT_FALSE(bench.explorer().widgets().contains("build/tolerance"));
+  EXPECT_TRUE(bench.explorer().widgets().contains("build/target-error"));
+  bench.run("settings tolerance=2% ; rebuild");
+  EXPECT_GT(field().metadata().settings.tolerance, 0);
+  EXPECT_EQ(field().metadata().settings.continuityWeight, std::nullopt);
+  bench.run("smooth ; settings target-error=1e-3 ; rebuild");
+  EXPECT_EQ(field().metadata().settings.targetError.weighted(), 1e-3);
+  EXPECT_TRUE(field().metadata().settings.continuityWeight);
+  EXPECT_EQ(field().metadata().settings.quadrature, BuildOptions().quadrature);
+  EXPECT_EQ(field().grid()[0], 3U);
+}
+
 TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
   Bench bench;
   bench.run("build analytic:torus target-error=1e-2 ; show size=900x1100 ; panel view=false");

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "console/console.h"
 #include "started_program.h"
 #include "text/text.h"
 
@@ -73,6 +74,18 @@ TEST(Progress, durationsAreReadable) {
   EXPECT_EQ(durationText(0.2), "0 s");
   EXPECT_EQ(durationText(187), "3 min 07 s");
   EXPECT_EQ(durationText(7500), "2 h 05 min");
+}
+
+TEST(Progress, forecastsOfShortWorkHaveNoZero) {
+  const auto noted = [](double seconds) {
+    std::istringstream in;
+    std::ostringstream out, err;
+    noteForecast(Console{in, out, err}, {.bytes = 2e6, .seconds = seconds});
+    return err.str();
+  };
+  EXPECT_EQ(noted(0.2), "hpsdf: note: the field will take about 2.00 MB and less than a second\n");
+  EXPECT_EQ(noted(0.8), noted(0.2));
+  EXPECT_EQ(noted(187), "hpsdf: note: the field will take about 2.00 MB and about 3 min 07 s\n");
 }
 
 TEST(Summaries, numbersAreReadable) {

@@ -210,7 +210,7 @@ TEST(BuildArguments, errorsOfMemoryNameTheOption) {
   EXPECT_EQ(text("", 210'000'000),
             "much is needed: take less, or allow more memory: --memory-limit 2.1e8 is likely to suffice (where no "
             "target is given either, 0.1 GB are allowed besides the mesh's distance)");
-  EXPECT_EQ(text(" --memory-limit 3e9", 0), "much is needed: take less; this machine has not enough memory");
+  EXPECT_EQ(text(" --memory-limit 3e9", 0), "much is needed: take less; this machine does not allow more memory");
 }
 
 TEST(BuildArguments, readContinuity) {

@@ -500,6 +500,10 @@ TEST(Build, refusesBadOptions) {
   refuses({.band = -1}, "band");
   refuses({.threads = -1}, "threads");
   refuses({.grid = {16384, 1, 1}, .maxDepth = 20}, "2^32 cells an axis");
+  refuses({.tolerance = 0.1, .continuityWeight = 1}, "leave out weak continuity or the tolerance");
+  refuses({.tolerance = 0.1, .enrich = true}, "leave out enrich or the tolerance");
+  refuses({.tolerance = 0.1, .band = 1}, "leave out the band or the tolerance");
+  refuses({.maxError = 0.1, .continuityWeight = 1}, "leave out weak continuity or the maximum error");
   refuses({.targetError = 1e-300}, "beyond double precision", cube(1e-5));
   refuses({.targetError = 1e300}, "beyond double precision", cube(1e5));
   refuses({}, "domain", Box(Vector3(0, 0, 0), Vector3(1, 1, 0)));

@@ -13,6 +13,7 @@
 #include "field/cells/surface_points.h"
 #include "field/tolerance/cell_lattice.h"
 #include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/detail/exact_samples.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
@@ -92,6 +93,16 @@ TEST(Tolerance, isKeptAtAnyScale) {
   EXPECT_LE(greatestRatio(fieldOfLarge, distanceOfLarge, large), 1);
 }
 
+/// Single-precision coordinates would be 1e-3 apart there, a fifth of the tolerance.
+TEST(Tolerance, isKeptFarFromTheOrigin) {
+  const TriangleMesh mesh = support::moved(shapes::mesh("gear,teeth=5"), {1e4, -1e4, 1e4}, 0.5);
+  const ExactDistance distance(mesh);
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 0.005});
+  EXPECT_LE(greatestRatio(field, distance, mesh), 1);
+  EXPECT_LE(field.metadata().measuredError, 0.005);
+  EXPECT_EQ(measure(field, distance).beyondTolerance, 0U);
+}
+
 TEST(Tolerance, takesExactLeavesWhereTheseAreSmaller) {
   const TriangleMesh mesh = support::boxOfTwo();
   const ExactDistance distance(mesh);
@@ -135,6 +146,27 @@ TEST(Tolerance, includesBlending) {
   const Field field = build(distance, domainAround(mesh), {.tolerance = 0.01, .blend = 0.04});
   EXPECT_EQ(field.data().blend, 0.04);
   EXPECT_LE(greatestRatio(field, distance, mesh), 1);
+}
+
+/// What was checked during the construction does not hold for a field that was changed afterwards.
+TEST(Tolerance, isForgottenWhenTheFieldIsChanged) {
+  const TriangleMesh mesh = support::boxOfTwo();
+  const ExactDistance distance(mesh);
+  Field field = build(distance, domainAround(mesh), {.grid = {2, 2, 2}, .tolerance = 0.1, .certified = true});
+  field = withMeasurement(field, measure(field, distance, {.points = 100}));
+  EXPECT_FALSE(field.metadata().hasEstimate());
+  const Field smooth = weaklyContinuous(field).field;
+  for (const Field& changed : {smooth, blended(field), blended(smooth), weaklyContinuous(blended(field)).field}) {
+    const FieldMetadata& metadata = changed.metadata();
+    EXPECT_EQ(metadata.settings.tolerance, 0);
+    EXPECT_EQ(metadata.settings.within, 0);
+    EXPECT_FALSE(metadata.settings.certified);
+    EXPECT_EQ(metadata.measuredError, 0);
+    EXPECT_FALSE(metadata.measurement);
+    EXPECT_FALSE(metadata.hasEstimate());
+    EXPECT_EQ(metadata.totalError, 0) << "the change alone is no estimate of the error";
+  }
+  EXPECT_TRUE(build(distance, domainAround(mesh), {.grid = {2, 2, 2}, .maxSteps = 0}).metadata().hasEstimate());
 }
 
 TEST(Tolerance, takesDoubleWhereFloatIsTooCoarse) {

@@ -33,6 +33,7 @@
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
+#include "session/asked_errors.h"
 #include "session/field_summary.h"
 #include "text/json.h"
 #include "text/text.h"
@@ -201,6 +202,10 @@ class Batch {
       throw Failed(fmt::format("{}: {} of {} meshes failed; the lines above say why", arguments_.text("batch"), failed,
                                meshes_.size()),
                    kExitPartlyFailed);
+    if (missed_ > 0)
+      throw Failed(
+          fmt::format("{}: {} of {} fields miss the errors that were asked for; the lines above say by how much",
+                      arguments_.text("batch"), missed_, meshes_.size()));
   }
 
  private:
@@ -209,6 +214,7 @@ class Batch {
     std::optional<CurrentField> field = {};
     std::string error = {};
     bool errorNamesMesh = false;
+    std::string missed = {};  ///< what the field misses of the errors that were asked for
   };
 
   fs::path outputOf(const BatchMesh& mesh) const { return folder_ / (mesh.name + ".hpsdf"); }
@@ -238,9 +244,11 @@ class Batch {
     if (!locks_.take(mesh.number)) return false;
     console_.work = fmt::format("{} of {}, {}: ", done_ + 1, meshes_.size(), printable(mesh.surface));
     const auto start = std::chrono::steady_clock::now();
-    const Made made = make(mesh, again);
+    Made made = make(mesh, again);
     ++done_;
     ++counts_[std::size_t(made.status)];
+    if (made.field) made.missed = missedErrors(arguments_, made.field->field);
+    missed_ += made.missed.empty() ? 0 : 1;
     report(mesh, made, secondsSince(start));
     locks_.release(mesh.number);
     return true;
@@ -333,6 +341,8 @@ class Batch {
     } else {
       console_.err << fmt::format("{}: {}: {}, {} in {:.1f} s\n", position, name, statusName(made.status),
                                   fieldLine(made.field->field), seconds);
+      if (!made.missed.empty())
+        console_.err << fmt::format("hpsdf: warning: {}: {}: {}\n", position, name, made.missed);
     }
     console_.err << std::flush;
     // Each line of the output is written in one call, so that the lines of several processes do not mix.
@@ -353,6 +363,7 @@ class Batch {
                  {"file_bytes", value("file_bytes")},
                  {"rms_estimate", value("rms_estimate")},
                  {"measured", value("measured")},
+                 {"missed", made.missed.empty() ? Json() : Json(made.missed)},
                  {"sign", made.field ? field.at("mesh").at("sign") : Json()},
                  {"error", made.status == Status::failed ? Json(made.error) : Json()}};
     if (field.contains("exact_leaves")) line["exact_leaves"] = field["exact_leaves"];
@@ -367,6 +378,7 @@ class Batch {
   FileLocks locks_;
   std::size_t done_ = 0;
   std::array<std::size_t, 4> counts_{};  // number of meshes for each `Status`
+  std::size_t missed_ = 0;               // number of fields that miss the errors that were asked for
 };
 
 std::vector<BatchMesh> readList(const Console& console, const std::string& list) {

@@ -19,6 +19,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/safe_distance.h"
+#include "session/asked_errors.h"
 #include "session/field_argument.h"
 #include "session/field_summary.h"
 #include "session/field_surface.h"
@@ -101,28 +102,23 @@ void removeLeftovers(const std::filesystem::path& checkpoint, const std::filesys
   OutputFile::removeAbandoned(output);
 }
 
-/// Throws `Failed` if a measured error exceeds what the arguments ask for. The field is kept all the same.
-void requireAskedErrors(const Arguments& arguments, const Field& field) {
-  const std::optional<Measurement>& m = field.metadata().measurement;
-  if (!m) return;
-  const auto require = [&](const char* name, const char* kind, double measured) {
-    if (!arguments.given(name) || measured <= arguments.number(name)) return;
-    throw Failed(
-        fmt::format("{}: {} of {} was measured, more than the {} that was asked for: ask for less than that, or "
-                    "allow a higher degree, a greater depth or more bytes",
-                    name, kind, shortNumber(measured), shortNumber(arguments.number(name))));
-  };
-  require("near-error", "an RMS error near the surface", m->near.rms);
-  require("far-error", "an RMS error over the domain", m->domain.rms);
-  const FieldMetadata& metadata = field.metadata();
-  const double tolerance = metadata.settings.tolerance;
-  if (tolerance > 0 && metadata.measuredError > tolerance)
-    throw Failed(
-        fmt::format("tolerance: missed in some cells, where the error is {:.3g} times as great as allowed: the "
-                    "distance jumps there, or changes faster than the smallest cells can follow",
-                    metadata.measuredError / tolerance));
-  if (m->beyondTolerance > 0) throw Failed("tolerance: " + toleranceText(field));
-  require("max-error", "an error", std::max(m->near.max, m->domain.max));
+/// Reports the current field, which was just built. `missed` is what it misses of the errors that were asked for.
+void reportBuilt(const Session& session, const Arguments& arguments, const BuiltField& built,
+                 const std::string& missed) {
+  const std::string surface = arguments.text("mesh");
+  std::ostream& out = session.console().out;
+  if (session.wantsJson(arguments)) {
+    Json json = madeJson(session, arguments);
+    json["build_seconds"] = built.seconds;
+    json["missed"] = missed.empty() ? Json() : Json(missed);
+    if (built.mesh) json["mesh_report"] = meshJson(surface, *built.mesh);
+    return printJson(out, json);
+  }
+  if (built.mesh) out << meshText(surface, *built.mesh);
+  const Field& field = session.current().field;
+  out << fmt::format("{}{} in {:.1f} s\nmeasured: {}\n", arguments.has("output") ? arguments.text("output") + ": " : "",
+                     fieldLine(field), built.seconds, measuredText(field));
+  if (hasTolerance(field) && !missesTolerance(field)) out << fmt::format("tolerance: {}\n", toleranceText(field));
 }
 
 void runBuild(Session& session, const Arguments& arguments) {
@@ -137,20 +133,9 @@ void runBuild(Session& session, const Arguments& arguments) {
   session.setExact(std::move(built.exact));
   saveMade(session, arguments);
   if (!checkpoint.empty()) removeLeftovers(checkpoint, arguments.text("output"));
-  if (session.wantsJson(arguments)) {
-    Json json = madeJson(session, arguments);
-    json["build_seconds"] = built.seconds;
-    if (built.mesh) json["mesh_report"] = meshJson(surface, *built.mesh);
-    printJson(console.out, json);
-    return requireAskedErrors(arguments, session.current().field);
-  }
-  if (built.mesh) console.out << meshText(surface, *built.mesh);
-  const Field& field = session.current().field;
-  console.out << fmt::format("{}{} in {:.1f} s\nmeasured: {}\n",
-                             arguments.has("output") ? arguments.text("output") + ": " : "", fieldLine(field),
-                             built.seconds, measuredText(field));
-  if (hasTolerance(field)) console.out << fmt::format("tolerance: {}\n", toleranceText(field));
-  requireAskedErrors(arguments, field);
+  const std::string missed = missedErrors(arguments, session.current().field);
+  reportBuilt(session, arguments, built, missed);
+  if (!missed.empty()) throw Failed(missed);
 }
 
 void runLoad(Session& session, const Arguments& arguments) {
@@ -208,13 +193,14 @@ void runSmooth(Session& session, const Arguments& arguments) {
                             arguments.whole("threads"), progress);
   });
   const double seconds = secondsSince(start);
-  changeCurrent(session, arguments, std::move(made.field),
-                {{"change", made.change}, {"iterations", made.iterations}, {"seconds", seconds}},
-                [&](const Field& field) {
-                  return fmt::format("changed by {} RMS in {} iterations, {:.1f} s; weighted estimate {}",
-                                     shortNumber(made.change), made.iterations, seconds,
-                                     shortNumber(field.metadata().rmsEstimate(field.domain())));
-                });
+  changeCurrent(
+      session, arguments, std::move(made.field),
+      {{"change", made.change}, {"iterations", made.iterations}, {"seconds", seconds}}, [&](const Field& field) {
+        const FieldMetadata& metadata = field.metadata();
+        return fmt::format(
+            "changed by {} RMS in {} iterations, {:.1f} s{}", shortNumber(made.change), made.iterations, seconds,
+            metadata.hasEstimate() ? "; weighted estimate " + shortNumber(metadata.rmsEstimate(field.domain())) : "");
+      });
 }
 
 void runBlend(Session& session, const Arguments& arguments) {
@@ -292,7 +278,8 @@ reports which inside test was chosen (see --sign). Ctrl-C stops the construction
 left out.
 
 With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, and one line of JSON on standard output reports its
-result. A mesh that fails does not stop the others; the exit status is 3 then. Fields that exist already, made from the
+result. A mesh that fails does not stop the others; the exit status is 3 then. It is 1 if none fails and a field misses its
+tolerance or an error that was asked for, which its line tells. Fields that exist already, made from the
 same contents with the same options, are skipped. Any number of processes may share one list and one folder: each mesh
 is built by one of them. docs/batch.md shows how, also with GNU parallel and Slurm.)"),
       .examples = {"hpsdf build part.stl -o part.hpsdf --tolerance 0.02%", "hpsdf build bunny.obj -o bunny.hpsdf",
@@ -317,8 +304,9 @@ unit. Cells, degrees and size stay. 'build --continuity weak' does the same duri
 once, this command a second time.
 
 Use it where jumps between cells disturb more than a small error. The polynomials of cells have too few coefficients to
-agree along whole faces, so that smaller jumps cost accuracy; 'hpsdf study continuity' shows how much. Bounds are
-removed. A field can be smoothed once.)"),
+agree along whole faces, so that smaller jumps cost accuracy; 'hpsdf study continuity' shows how much. Bounds and
+measured errors are removed, and so is the tolerance of a field that was built within one. A field can be smoothed
+once.)"),
       .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
                    "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
       .parameters = {fieldParameter(), kFieldOutput, settingParameter("continuity-weight"),
@@ -333,8 +321,9 @@ Blends neighbouring cells by smooth weights in a zone along their faces, so that
 anywhere in the domain. Outside of the zones the field stays the same to the bit. No coefficient changes: the file
 stores the width of the zones, and queries and pictures blend. 'build --continuity exact' does the same.
 
-Use it for collision response and shading, which need continuous gradients. Queries take up to twice as long, and bounds
-are removed.)"),
+Use it for collision response and shading, which need continuous gradients. Queries take up to twice as long. Bounds and
+measured errors are removed, and so is the tolerance of a field that was built within one: 'build --tolerance
+--continuity exact' keeps the tolerance with blending.)"),
       .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
       .parameters = {fieldParameter(),
                      kFieldOutput,

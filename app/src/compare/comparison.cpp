@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
-#include <set>
 #include <span>
-#include <tuple>
 #include <utility>
 
 #include "console/long_work.h"
@@ -14,6 +13,8 @@
 
 namespace hpsdf::app {
 namespace {
+
+constexpr std::size_t kPointsPerCheck = 65536;  // number of points between two checks for cancellation
 
 /// The points of a comparison: uniform ones and ones near the surface.
 using PointSets = std::array<ExactSamples, 2>;
@@ -38,7 +39,6 @@ PointSets drawPoints(const ReferenceSurface& reference, const Box& domain, const
 }
 
 std::array<std::vector<double>, 2> valuesAt(const Field& field, const PointSets& sets, const Progress& progress) {
-  constexpr std::size_t kPointsPerCheck = 65536;
   std::array<std::vector<double>, 2> values;
   for (std::size_t k = 0; k < sets.size(); ++k) {
     const std::span<const Vector3> points = sets[k].points;
@@ -85,42 +85,59 @@ std::vector<ErrorBin> binsOf(const PointSets& sets, const std::array<std::vector
   return bins;
 }
 
+/// A point with a great error, and the cell of the field in which it lies.
+struct WorstOfCell {
+  double error;
+  std::size_t set, index;
+  std::uint32_t cell;
+};
+
+/// Adds a point to the greatest errors of different cells, of which `worst` keeps `count`, the greatest first. Of equal
+/// errors the one that was added first stays first.
+void keepIfWorst(std::vector<WorstOfCell>& worst, std::size_t count, const WorstOfCell& point) {
+  const auto ofCell = std::ranges::find(worst, point.cell, &WorstOfCell::cell);
+  if (ofCell != worst.end()) {
+    if (ofCell->error >= point.error) return;
+    worst.erase(ofCell);
+  }
+  worst.insert(std::ranges::upper_bound(worst, point.error, std::greater(), &WorstOfCell::error), point);
+  if (worst.size() > count) worst.pop_back();
+}
+
 /// Returns the points with the greatest errors, the greatest first, at most one of each cell.
 std::vector<WorstPlace> worstPlaces(std::size_t number, const std::vector<CurrentField>& fields, const PointSets& sets,
-                                    const std::array<std::vector<double>, 2>& values, std::size_t count) {
-  struct Candidate {
-    double error, exact;
-    std::size_t set, index;
-  };
-  std::vector<Candidate> candidates;
+                                    const std::array<std::vector<double>, 2>& values, std::size_t count,
+                                    const Progress& progress) {
+  std::vector<WorstOfCell> worst;
   for (std::size_t k = 0; k < sets.size(); ++k)
-    for (std::size_t n = 0; n < values[k].size(); ++n)
-      candidates.push_back({std::abs(values[k][n] - sets[k].distances[n]), sets[k].distances[n], k, n});
-  std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
-    return std::tuple(b.error, a.set, a.index) < std::tuple(a.error, b.set, b.index);
-  });
-  std::vector<WorstPlace> worst;
-  std::set<std::uint32_t> seen;
-  for (const Candidate& candidate : candidates) {
-    if (worst.size() == count) break;
-    const Vector3& point = sets[candidate.set].points[candidate.index];
-    if (!seen.insert(fields[number].field.cellAt(point).id).second) continue;
-    WorstPlace place{number, point, candidate.exact, {}};
+    for (std::size_t n = 0; n < values[k].size(); ++n) {
+      if (n % kPointsPerCheck == 0) progress.throwIfCancelled();
+      const double error = std::abs(values[k][n] - sets[k].distances[n]);
+      const bool mayCount = worst.size() < count || (count > 0 && error > worst.back().error);
+      if (mayCount) keepIfWorst(worst, count, {error, k, n, fields[number].field.cellAt(sets[k].points[n]).id});
+    }
+  std::vector<WorstPlace> places;
+  for (const WorstOfCell& found : worst) {
+    const Vector3& point = sets[found.set].points[found.index];
+    WorstPlace place{number, point, sets[found.set].distances[found.index], {}};
     for (const CurrentField& other : fields) place.values.push_back(other.field.value(point));
-    worst.push_back(std::move(place));
+    places.push_back(std::move(place));
   }
-  return worst;
+  return places;
 }
 
 FieldFigures figuresOf(std::size_t number, const CurrentField& current, const PointSets& sets,
-                       const std::array<std::vector<double>, 2>& values, int threads) {
+                       const std::array<std::vector<double>, 2>& values, int threads, const Progress& progress) {
   FieldFigures figures{.letter = std::string(1, char('A' + number)),
                        .file = printable(current.name),
                        .fileBytes = current.fileBytes.value_or(0),
-                       .counts = statistics(current.field),
-                       .near = measureError(values[1], sets[1].distances, threads),
-                       .domain = measureError(values[0], sets[0].distances, threads),
-                       .bins = binsOf(sets, values)};
+                       .counts = statistics(current.field)};
+  figures.near = measureError(values[1], sets[1].distances, threads);
+  progress.throwIfCancelled();
+  figures.domain = measureError(values[0], sets[0].distances, threads);
+  progress.throwIfCancelled();
+  figures.bins = binsOf(sets, values);
+  progress.throwIfCancelled();
   forEachPoint(sets, values, [&](const Vector3&, double exact, double value) {
     if (!(value < 0 && exact > 0) && !(value > 0 && exact < 0)) return;
     ++figures.wrongSigns;
@@ -160,11 +177,12 @@ FieldComparison compareFields(const Console& console, const std::vector<CurrentF
     for (std::size_t n = 0; n < fields.size(); ++n) {
       progress.update("comparing", double(n) / double(fields.size()));
       const auto values = valuesAt(fields[n].field, sets, progress);
-      result.fields.push_back(figuresOf(n, fields[n], sets, values, used.threads));
+      result.fields.push_back(figuresOf(n, fields[n], sets, values, used.threads, progress));
+      progress.throwIfCancelled();
       result.fields.back().tornShare =
           tornShare(fields[n].field, reference.mesh,
                     {.count = std::max<std::size_t>(1, used.points / 2), .seed = used.seed, .threads = used.threads});
-      for (WorstPlace& place : worstPlaces(n, fields, sets, values, used.worst))
+      for (WorstPlace& place : worstPlaces(n, fields, sets, values, used.worst, progress))
         result.worst.push_back(std::move(place));
     }
     if (used.times) {

@@ -52,11 +52,11 @@ struct FieldFigures {
   std::string file;
   std::size_t fileBytes;
   FieldStatistics counts;
-  ErrorFigures near, domain;
+  ErrorFigures near = {}, domain = {};
   std::size_t wrongSigns = 0;    ///< number of points, of both kinds, at which f and Φ have different signs
   double farthestWrongSign = 0;  ///< greatest |Φ| of these points
   double tornShare = 0;          ///< share of the surface that jumps tear (`tornShare`)
-  std::vector<ErrorBin> bins;
+  std::vector<ErrorBin> bins = {};
   std::optional<QueryTimes> times = {};
 };
 

@@ -21,8 +21,8 @@ void warn(const Console& console, std::string_view text) {
 
 void noteForecast(const Console& console, const Forecast& forecast) {
   if (console.redrawsProgress) console.err << kEraseLine;
-  note(console,
-       fmt::format("the field will take about {} and {}", bytesText(forecast.bytes), durationText(forecast.seconds)));
+  const std::string seconds = forecast.seconds < 1 ? "less than a second" : "about " + durationText(forecast.seconds);
+  note(console, fmt::format("the field will take about {} and {}", bytesText(forecast.bytes), seconds));
 }
 
 void requireWritten(const std::ostream& out) {

@@ -85,8 +85,10 @@ void requireEffect(const Arguments& arguments) {
   for (const BuildSetting& setting : buildSettings())
     if (setting.isOffered && arguments.given(setting.name) && !setting.hasEffectWithTolerance &&
         setting.ending != BuildSetting::Ending::target)
-      throw Error(fmt::format("{} has no effect with tolerance, which decides how the field is built: leave one out",
-                              setting.name));
+      throw Error(
+          fmt::format("{0} has no effect with tolerance, which decides how the field is built: leave out {0} or "
+                      "tolerance",
+                      setting.name));
   if (arguments.flag("paper")) throw Error("paper and tolerance exclude each other: give one of them");
 }
 
@@ -195,6 +197,10 @@ DistanceOptions distanceOptions(const Arguments& arguments) {
       throw Error(fmt::format("hull: goes by winding number: leave out sign {}", arguments.text("sign")));
     options.insideTest = InsideTest::outerHull;
   }
+  if (options.insideTest == InsideTest::pseudonormal && arguments.flag("certified"))
+    throw Error(
+        "certified: nothing is proven where sign pseudonormal is forced upon a mesh: leave out sign; auto takes "
+        "pseudonormals wherever they are certain to be right");
   if (options.insideTest == InsideTest::shell && !arguments.given("thickness"))
     throw Error("sign unsigned-shell: give the wall a thickness, such as a hundredth of the mesh's size");
   requireOwner(arguments, "thickness", "sign unsigned-shell", options.insideTest == InsideTest::shell);
@@ -234,7 +240,7 @@ Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& argument
   std::string text = error.shortage();
   text += error.enough() > 0 ? fmt::format(", or allow more memory: --memory-limit {} is likely to suffice",
                                            shortNumber(double(error.enough())))
-                             : "; this machine has not enough memory";
+                             : "; this machine does not allow more memory";
   if (hasDefaultMemoryLimit(arguments))
     text += fmt::format(" (where no target is given either, {} GB are allowed besides the mesh's distance)",
                         double(kDefaultMemory) / 1e9);

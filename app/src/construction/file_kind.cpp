@@ -17,4 +17,10 @@ FileKind kindOfFile(const std::string& name) {
   return lowerExtension(name) == ".hpsdf" ? FileKind::field : FileKind::unknown;
 }
 
+Error unknownKind(const std::string& name) {
+  return Error(ErrorKind::file, name,
+               "this is neither a field nor a mesh, which are the files that hpsdf opens: it does not begin as field "
+               "files do (*.hpsdf), and its name does not end as those of meshes do (OBJ, PLY, STL, OFF, 3DS, glTF)");
+}
+
 }  // namespace hpsdf::app

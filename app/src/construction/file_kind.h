@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "hpsdf/error.h"
+
 namespace hpsdf::app {
 
 enum class FileKind : std::uint8_t { field, surface, unknown };
@@ -12,5 +14,9 @@ enum class FileKind : std::uint8_t { field, surface, unknown };
 /// field if it begins as field files do. All other names, also those of files that do not exist yet, are told apart by
 /// their ends.
 FileKind kindOfFile(const std::string& name);
+
+/// Returns the error for an existing file of the kind `FileKind::unknown`. It names the kinds of files that the program
+/// opens.
+Error unknownKind(const std::string& name);
 
 }  // namespace hpsdf::app

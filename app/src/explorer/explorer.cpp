@@ -108,14 +108,28 @@ bool Explorer::goBack(std::vector<ViewState>& from, std::vector<ViewState>& to) 
   return true;
 }
 
+BuildOptions rebuildOptions(const Field& field) {
+  BuildOptions built = settingsOf(field.data());
+  const FieldMetadata& metadata = field.metadata();
+  if (metadata.hasEstimate()) {
+    // If the construction had no target error, use the error that the field reached as the target.
+    if (built.targetError.isNone() && !(built.maxError > 0) && !built.maxBytes) built.targetError = metadata.totalError;
+    return built;
+  }
+  if (hasTolerance(field)) return built;
+  // The field was built within a tolerance and changed afterwards: only these settings have a meaning without it.
+  return {.grid = built.grid,
+          .continuityWeight = built.continuityWeight,
+          .blend = built.blend,
+          .bounds = built.bounds,
+          .coefficients = built.coefficients};
+}
+
 std::map<std::string, std::string> Explorer::settingsOfField() const {
   const CurrentField& current = session_.current();
   const Field& field = current.field;
   const auto corner = [](const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); };
-  BuildOptions built = settingsOf(field.data());
-  // If the construction had no target error, use the error that the field reached as the target.
-  if (built.targetError.isNone() && !(built.maxError > 0) && !(built.tolerance > 0) && !built.maxBytes)
-    built.targetError = field.metadata().totalError;
+  const BuildOptions built = rebuildOptions(field);
   std::map<std::string, std::string> settings;
   for (const BuildSetting& setting : buildSettings()) {
     const std::string text = settingText(setting, built);
@@ -148,6 +162,13 @@ void Explorer::removeWithoutEffect(std::map<std::string, std::string>& settings)
     const bool ofTolerance = setting.name == "tolerance" || setting.owner == "tolerance";
     if (isWithinTolerance ? !setting.hasEffectWithTolerance : ofTolerance) settings.erase(std::string(setting.name));
   }
+  // A tolerance does not outlive weak continuity.
+  const auto continuity = settings.find("continuity");
+  if (!isWithinTolerance || continuity == settings.end()) return;
+  if (continuity->second == "weak")
+    settings.erase(continuity);
+  else if (continuity->second == "both")
+    continuity->second = "exact";
 }
 
 void Explorer::rebuild(std::optional<int> maxSteps) {

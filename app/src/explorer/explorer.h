@@ -27,6 +27,10 @@ struct Layout {
 /// Computes the layout of a frame, which depends only on the state `view`.
 Layout layoutOf(const ViewState& view);
 
+/// Returns options with which the field can be built again as it was, as far as its metadata tells. For a field that
+/// was built within a tolerance and changed afterwards, they have the default target error.
+BuildOptions rebuildOptions(const Field& field);
+
 class Explorer final : public SessionExtension {
  public:
   explicit Explorer(Session& session);

@@ -140,7 +140,7 @@ void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures
   };
   if (hasTolerance(field)) {
     rows.emplace_back("tolerance", shortNumber(field.metadata().settings.tolerance));
-  } else {
+  } else if (field.metadata().hasEstimate()) {
     rows.emplace_back("target error τ", shortNumber(field.metadata().settings.targetError.weighted()));
     rows.emplace_back("weighted estimate (τ)", shortNumber(field.metadata().totalError));
   }

@@ -190,7 +190,7 @@ void drawRefinement(const BuildControls& build, const BuildOptions& built) {
 void drawBuildPanel(const Controls& controls, Explorer& explorer) {
   const CurrentField& current = explorer.session().current();
   const Field& field = current.field;
-  const BuildOptions built = settingsOf(field.data());
+  const BuildOptions built = rebuildOptions(field);
   const BuildControls build{controls, explorer.settings()};
   build.field("mesh", current.madeFrom());
   const bool isTolerant = hasTolerance(field);

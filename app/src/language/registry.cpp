@@ -294,11 +294,14 @@ class ArgumentReader {
     for (std::size_t i = words_.size(); i-- > 0;) {
       const std::string_view text = words_[i].text;
       const bool aliased = parameter.letter != 0 && text.starts_with(fmt::format("-{}", parameter.letter));
-      const bool named =
-          sets(words_[i], parameter.name) || (!parameter.synonym.empty() && sets(words_[i], parameter.synonym));
-      if (named || aliased || (parameter.isPositional && text == value)) return i;
+      if (isNamedIn(words_[i], parameter) || aliased || (parameter.isPositional && text == value)) return i;
     }
     return 0;
+  }
+
+  /// True if the word sets the parameter by its name or by its synonym.
+  static bool isNamedIn(const Word& word, const Parameter& parameter) {
+    return sets(word, parameter.name) || (!parameter.synonym.empty() && sets(word, parameter.synonym));
   }
 
   /// True if the word sets the option `name`, as `name=value`, `--name` or `--name=value`.
@@ -319,6 +322,7 @@ class ArgumentReader {
                           wordOf(parameter, results.back()));
     Arguments::Entry entry;
     entry.given = !results.empty();
+    entry.named = std::ranges::any_of(words_, [&](const Word& word) { return isNamedIn(word, parameter); });
     for (const std::string& text : results) entry.values.push_back(checked(parameter, text));
     const bool needed =
         parameter.need == Need::always || (parameter.need == Need::onCommandLine && origin_ == Origin::commandLine);
@@ -394,6 +398,7 @@ const Arguments::Value& Arguments::single(std::string_view name) const {
 
 bool Arguments::given(std::string_view name) const { return entry(name).given; }
 bool Arguments::has(std::string_view name) const { return !entry(name).values.empty(); }
+bool Arguments::named(std::string_view name) const { return entry(name).named; }
 std::string Arguments::text(std::string_view name) const { return single(name).text; }
 std::string Arguments::textOr(std::string_view name, std::string fallback) const {
   return has(name) ? text(name) : std::move(fallback);

@@ -27,6 +27,8 @@ class Arguments {
   bool given(std::string_view name) const;
   /// True if the parameter has a value, given explicitly or by default.
   bool has(std::string_view name) const;
+  /// True if the caller gave the parameter by its name. False if it was given as a positional word, or not at all.
+  bool named(std::string_view name) const;
 
   std::string text(std::string_view name) const;
   /// Returns the text of the parameter, or `fallback` if the parameter has no value.
@@ -49,6 +51,7 @@ class Arguments {
   };
   struct Entry {
     bool given = false;
+    bool named = false;
     std::vector<Value> values = {};
   };
   const Value& single(std::string_view name) const;

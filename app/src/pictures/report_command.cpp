@@ -107,7 +107,7 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   rows.emplace_back("Memory", memoryText(field));
   if (hasTolerance(field)) {
     rows.emplace_back("Tolerance", toleranceText(field));
-  } else {
+  } else if (metadata.hasEstimate()) {
     rows.emplace_back("Target error τ", shortNumber(metadata.settings.targetError.weighted()));
     rows.emplace_back("Total error ε",
                       fmt::format("{}, nearness {}", shortNumber(metadata.totalError), metadata.settings.nearness));

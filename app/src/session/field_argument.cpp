@@ -30,15 +30,15 @@ std::string useFieldWithSurface(Session& session, const Arguments& arguments) {
   const std::string field = arguments.textOr("field", "");
   const FileKind kind = field.empty() ? FileKind::field : kindOfFile(field);
   if (kind == FileKind::surface) {
+    if (arguments.named("field"))
+      throw Error(ErrorKind::field, field,
+                  "this is a mesh or a shape, not a field; name the file of a field (*.hpsdf), or give the surface as "
+                  "mesh");
     if (session.hasField() && !arguments.has("mesh")) return field;
     throw Error(
         fmt::format("{}: this is a mesh or a shape; give the file of a field (*.hpsdf) first, then the mesh", field));
   }
-  if (kind == FileKind::unknown && std::filesystem::exists(field))
-    throw Error(
-        fmt::format("{}: this is neither a field nor a mesh: it does not begin as field files do, and its name "
-                    "does not end as those of meshes do",
-                    field));
+  if (kind == FileKind::unknown && std::filesystem::exists(field)) throw unknownKind(field);
   useField(session, arguments);
   return arguments.has("mesh") ? arguments.text("mesh") : surfaceOf(session.current());
 }

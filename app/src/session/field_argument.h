@@ -19,8 +19,9 @@ void loadField(Session& session, const std::string& file);
 void useField(Session& session, const Arguments& arguments);
 
 /// Loads the field that the argument `field` names, and returns the surface that the argument `mesh` names. Without
-/// `field`, keeps the current field; without `mesh`, returns the result of `surfaceOf`. If the session has a field, the
-/// argument `field` alone may name the surface. Throws `Error` if the arguments name something else.
+/// `field`, keeps the current field; without `mesh`, returns the result of `surfaceOf`. If the session has a field, a
+/// positional word alone may name the surface instead of the field. Throws `Error` if the arguments name something
+/// else.
 std::string useFieldWithSurface(Session& session, const Arguments& arguments);
 
 }  // namespace hpsdf::app

@@ -16,6 +16,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr int kHistogramColumns = 40;
+constexpr double kVisiblyMissed = 1.005;  // errors over the allowed ones that three digits distinguish from 1
 
 /// Returns a table with one row for each level (a degree or a depth). A row shows the level's share of the volume, its
 /// number of leaves, and a bar proportional to the share.
@@ -95,8 +96,8 @@ Json fieldJson(const CurrentField& current) {
                {"precision", field.singlePrecision() ? "float" : "double"},
                {"bytes", figures.bytes},
                {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
-               {"total_error", hasTolerance(field) ? Json() : Json(metadata.totalError)},
-               {"rms_estimate", hasTolerance(field) ? Json() : Json(metadata.rmsEstimate(field.domain()))},
+               {"total_error", metadata.hasEstimate() ? Json(metadata.totalError) : Json()},
+               {"rms_estimate", metadata.hasEstimate() ? Json(metadata.rmsEstimate(field.domain())) : Json()},
                {"measured", measuredJson(field)},
                {"rounding_rms", metadata.roundingRms},
                {"exact_evaluations", metadata.exactEvaluations},
@@ -104,7 +105,7 @@ Json fieldJson(const CurrentField& current) {
                {"domain", boxJson(field.domain())},
                {"grid", field.grid()}};
   addSettings(json, metadata.settings);
-  json["target_error"] = metadata.settings.targetError.weighted();
+  json["target_error"] = metadata.hasEstimate() ? Json(metadata.settings.targetError.weighted()) : Json();
   json["measured_error"] =
       metadata.settings.maxError > 0 || hasTolerance(field) ? Json(metadata.measuredError) : Json();
   json.update(
@@ -153,12 +154,21 @@ std::string wrongSignsText(const Measurement& m) {
 
 bool hasTolerance(const Field& field) { return field.metadata().settings.tolerance > 0; }
 
+bool missesTolerance(const Field& field) {
+  const FieldMetadata& metadata = field.metadata();
+  if (!hasTolerance(field)) return false;
+  return metadata.measuredError > metadata.settings.tolerance ||
+         (metadata.measurement && metadata.measurement->beyondTolerance > 0);
+}
+
 std::string toleranceText(const Field& field) {
   const BuildOptions& settings = field.metadata().settings;
   const std::optional<Measurement>& m = field.metadata().measurement;
   std::string text = fmt::format("{} within {} of the surface, and 1 % of the distance beyond",
                                  shortNumber(settings.tolerance), shortNumber(settings.within));
-  if (field.metadata().measuredError > settings.tolerance) return text + "; missed in some cells";
+  if (const double ratio = field.metadata().measuredError / settings.tolerance; ratio > 1)
+    return text + "; missed in some cells" +
+           (ratio > kVisiblyMissed ? fmt::format(", where the error is up to {:.3g} times as great", ratio) : "");
   if (!m) return text + "; not measured";
   if (m->beyondTolerance > 0)
     return text + fmt::format("; missed at {} of {} points, where the error is up to {:.3g} times as great",
@@ -178,9 +188,11 @@ std::string measuredText(const Field& field) {
 std::string estimateLine(const Field& field) {
   const FieldMetadata& metadata = field.metadata();
   const std::optional<Measurement>& m = metadata.measurement;
-  const std::string asked = hasTolerance(field) ? "tolerance " + shortNumber(metadata.settings.tolerance)
-                                                : "weighted estimate (τ) " + shortNumber(metadata.totalError);
-  return fmt::format("{}, {}", asked, m ? "measured near the surface " + errorText(m->near) : "not measured");
+  const std::string asked =
+      hasTolerance(field)      ? fmt::format("tolerance {}, ", shortNumber(metadata.settings.tolerance))
+      : metadata.hasEstimate() ? fmt::format("weighted estimate (τ) {}, ", shortNumber(metadata.totalError))
+                               : "";
+  return asked + (m ? "measured near the surface " + errorText(m->near) : "not measured");
 }
 
 Json measuredJson(const Field& field) {
@@ -272,9 +284,8 @@ std::string fieldText(const CurrentField& current) {
   if (figures.exact.leaves > 0) row("exact triangles", exactTrianglesText(figures.exact));
   row("memory", memoryText(field));
   if (current.fileBytes) row("file", bytesText(double(*current.fileBytes)));
-  if (hasTolerance(field))
-    row("tolerance", toleranceText(field) + unitText(field));
-  else
+  if (hasTolerance(field)) row("tolerance", toleranceText(field) + unitText(field));
+  if (metadata.hasEstimate())
     row("error, target",
         fmt::format("{}, {} (at the scale where the longest side is 2)", shortNumber(metadata.totalError),
                     shortNumber(metadata.settings.targetError.weighted())));
@@ -287,15 +298,17 @@ std::string fieldText(const CurrentField& current) {
   } else {
     row("measured", "no, or not since the field was changed; 'hpsdf verify' measures it");
   }
-  if (!hasTolerance(field))
+  if (metadata.hasEstimate())
     row("weighted estimate", shortNumber(metadata.rmsEstimate(field.domain())) + ", √(ε/|Ω|)" + unitText(field));
   if (field.singlePrecision()) row("change by float", shortNumber(metadata.roundingRms) + " RMS");
   row("exact distances", grouped(metadata.exactEvaluations));
   if (metadata.steps) row("refinement steps", grouped(*metadata.steps));
   row("base grid", fmt::format("{} x {} x {}", grid[0], grid[1], grid[2]));
-  if (!hasTolerance(field)) {
+  if (metadata.hasEstimate()) {
     row("settings", settingsText(metadata.settings, false));
     row("", settingsText(metadata.settings, true));
+  } else if (metadata.settings.continuityWeight) {
+    row("continuity", fmt::format("weak, weight {}", shortNumber(*metadata.settings.continuityWeight)));
   }
   if (metadata.settings.maxError > 0) row("greatest error", shortNumber(metadata.measuredError));
   if (const double width = field.data().blend; width > 0)

@@ -33,6 +33,8 @@ std::string measuredText(const Field& field);
 
 /// Returns true if the field was built within a tolerance.
 bool hasTolerance(const Field& field);
+/// Returns true if the field misses its tolerance in a cell or at a measured point.
+bool missesTolerance(const Field& field);
 /// Returns the tolerance of a field, and whether the measurement found it kept.
 std::string toleranceText(const Field& field);
 

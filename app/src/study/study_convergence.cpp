@@ -69,7 +69,10 @@ Json curveOf(const BuildInput& input, Strategy strategy, const ExactSamples& sam
   BuildOptions options = input.options;
   options.strategy = strategy;
   options.coefficients = CoefficientType::float64;
-  options.targetError = 0;  // none, at any scale: the number of coefficients ends the construction
+  // The number of coefficients ends the construction: there is no target error, and no default limit of the memory
+  // for want of one.
+  options.targetError = 0;
+  if (!arguments.given("memory-limit")) options.memoryLimit.reset();
   Json stages = Json::array();
   const auto inspect = [&](const Field& field) {
     const std::size_t coefficients = statistics(field).coefficients;
@@ -156,11 +159,12 @@ std::string csvOf(const Json& meshes) {
 }
 
 std::string textOf(const Json& mesh) {
-  std::string text = fmt::format("{}\n  {:<9} {:>14} {:>12} {:>14} {:>13} {:>13}\n", mesh["mesh"].get<std::string>(),
-                                 "strategy", "coefficients", "cells", "estimated RMS", "measured RMS", "measured max");
+  std::string text =
+      fmt::format("{}\n  {:<9} {:>14} {:>12} {:>17} {:>13} {:>13}\n", mesh["mesh"].get<std::string>(), "strategy",
+                  "coefficients", "cells", "weighted estimate", "measured RMS", "measured max");
   for (const auto& [strategy, stages] : mesh["curves"].items()) {
     const Json& last = stages.back();
-    text += fmt::format("  {:<9} {:>14} {:>12} {:>14} {:>13} {:>13}\n", strategy,
+    text += fmt::format("  {:<9} {:>14} {:>12} {:>17} {:>13} {:>13}\n", strategy,
                         grouped(last["coefficients"].get<std::uint64_t>()),
                         grouped(last["leaves"].get<std::uint64_t>()), shortNumber(numberIn(last, "estimated_rms")),
                         shortNumber(numberIn(last, "measured_rms")), shortNumber(numberIn(last, "measured_max")));
@@ -197,7 +201,7 @@ std::string plotScript(const Json& mesh) {
       mesh["name"].get<std::string>());
   const std::array<std::array<std::string_view, 3>, 3> kinds = {
       {{"5", "measured RMS", "with linespoints lw 2 pt 7 ps 0.6"},
-       {"4", "estimated RMS", "with lines lw 1.5 dt (8,5)"},
+       {"4", "weighted estimate", "with lines lw 1.5 dt (8,5)"},
        {"6", "measured maximum", "with lines lw 2 dt (2,3)"}}};
   std::string separator;
   std::size_t n = 0;
@@ -284,7 +288,7 @@ Study convergenceStudy() {
       .name = "convergence",
       .help = paragraphs(R"(
 error over the number of coefficients, for hp and for plain octrees of degree 2 and 1 (the paper's Figs. 3 and 4), each
-curve from one construction. The estimated RMS error of the construction stands beside RMS error and maximum measured at
+curve from one construction. The weighted estimate of the construction stands beside RMS error and maximum measured at
 random points, whose exact distances are taken once. Errors are at the scale where the mesh's longest side is 2. Writes
 convergence.csv, convergence.json and, with gnuplot, a picture of each mesh; tells how many coefficients each strategy
 needs for the same measured RMS error.)"),

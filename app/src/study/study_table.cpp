@@ -4,6 +4,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "console/interrupt.h"
@@ -59,7 +60,11 @@ struct TableRow {
   std::array<LevelPicture, std::size(kLevels)> pictures = {};  ///< one picture for each of `kLevels`
 
   double scale() const { return field.metadata().referenceLength / 2; }
-  double estimatedRms() const { return field.metadata().rmsEstimate(field.domain()) / scale(); }
+  /// Returns the weighted estimate; std::nullopt if the construction made none, as within a tolerance.
+  std::optional<double> estimatedRms() const {
+    const FieldMetadata& metadata = field.metadata();
+    return metadata.hasEstimate() ? std::optional(metadata.rmsEstimate(field.domain()) / scale()) : std::nullopt;
+  }
 };
 
 TableRow rowOf(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
@@ -112,15 +117,16 @@ std::string gridText(const TableRow& row) {
 std::vector<std::pair<std::string, std::string>> cellsOf(const TableRow& row) {
   const FieldMetadata& metadata = row.field.metadata();
   const bool isMesh = metadata.source.faces > 0;
+  const std::optional<double> estimate = row.estimatedRms();
   return {{"mesh", row.name},
           {"vertices", isMesh ? grouped(metadata.source.vertices) : "–"},
           {"faces", isMesh ? grouped(metadata.source.faces) : "–"},
           {"grid", gridText(row)},
           {"time", fmt::format("{:.1f} s", row.seconds)},
           {"cells", grouped(row.figures.leaves) + exactCountText(row.figures)},
-          {"τ", shortNumber(metadata.settings.targetError.weighted())},
+          {"τ", estimate ? shortNumber(metadata.settings.targetError.weighted()) : "–"},
           {"memory", bytesText(double(row.figures.bytes))},
-          {"weighted estimate (τ)", shortNumber(row.estimatedRms())},
+          {"weighted estimate (τ)", estimate ? shortNumber(*estimate) : "–"},
           {"measured RMS", shortNumber(row.error.rms / row.scale())},
           {"measured max", shortNumber(row.error.max / row.scale())}};
 }
@@ -152,6 +158,7 @@ std::string markdownOf(const std::vector<TableRow>& rows) {
 
 Json jsonOf(const TableRow& row) {
   const FieldMetadata& metadata = row.field.metadata();
+  const std::optional<double> estimate = row.estimatedRms();
   Json json = {{"mesh", row.mesh},
                {"name", row.name},
                {"vertices", metadata.source.vertices},
@@ -161,11 +168,12 @@ Json jsonOf(const TableRow& row) {
                {"leaves", row.figures.leaves},
                {"degree_volume", levelsJson(row.figures.degreeVolume)},
                {"depth_volume", levelsJson(row.figures.depthVolume)},
-               {"target_error", metadata.settings.targetError.weighted()},
+               {"target_error", estimate ? Json(metadata.settings.targetError.weighted()) : Json()},
+               {"tolerance", metadata.settings.tolerance > 0 ? Json(metadata.settings.tolerance) : Json()},
                {"coefficients", row.figures.coefficients},
                {"precision", row.field.singlePrecision() ? "float" : "double"},
                {"bytes", row.figures.bytes},
-               {"estimated_rms", row.estimatedRms()},
+               {"estimated_rms", estimate ? Json(*estimate) : Json()},
                {"measured_rms", row.error.rms / row.scale()},
                {"measured_max", row.error.max / row.scale()}};
   if (const Json exact = exactJson(row.figures.exact); !exact.is_null()) json["exact_leaves"] = exact;

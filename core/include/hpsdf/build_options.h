@@ -157,7 +157,7 @@ struct BuildOptions {
   double maxError = 0;
   /// Greatest allowed error |f − Φ| within `within` of the surface, in the field's own units; 0: no tolerance. Beyond
   /// it the allowed error grows (`AllowedError`), so that the sign is right wherever |Φ| exceeds the tolerance. The
-  /// construction then chooses the octree, the polynomials and the exact leaves that take the fewest bytes, in place of
+  /// construction then seeks the octree, the polynomials and the exact leaves that take the fewest bytes, in place of
   /// Algorithm 1. Of the other settings only the grid, blending, bounds, coefficients, memory and threads have an
   /// effect. Errors are checked at 1241 points or more of each cell; see `certified` for a proof.
   /// Where the distance jumps, the tolerance cannot be kept; `FieldMetadata::measuredError` is greater then.

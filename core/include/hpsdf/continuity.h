@@ -21,9 +21,9 @@ struct WeaklyContinuous {
 /// `field` (Koschier et al. 2017). The result has the same leaves, degrees and bytes as `field`, and does not depend on
 /// `threads` (0: all that the machine offers). Float coefficients are converted to double and rounded again at the end.
 /// In the metadata of the result, the weight λ is stored, and the error estimates grow by the change of the field and
-/// by the second rounding. The proven bounds of `field` are dropped because they do not hold for the new polynomials.
-/// Exact leaves, and the linear polynomials in their place where the surface is plane, do not change; their neighbours
-/// adapt to them.
+/// by the second rounding. The proven bounds of `field`, and the tolerance within which it was built, are dropped
+/// because they do not hold for the new polynomials. Exact leaves, and the linear polynomials in their place where the
+/// surface is plane, do not change; their neighbours adapt to them.
 ///
 /// Throws `Error` for options out of range; for a field that is weakly continuous already, because its original
 /// polynomials f₀ are lost; and if the tolerance is not reached within `maxIterations`. Throws `Cancelled` when
@@ -34,7 +34,8 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
 /// Returns a copy of `field` in which neighbouring leaves are blended (`FieldData::blend`), so that value and gradient
 /// are continuous throughout the domain. `width` is the width of the blended zones relative to the edge of a leaf, up
 /// to `kMaxBlend`: the wider the zones, the smoother the field, and the more queries evaluate several leaves. A width
-/// of 0 removes the blending. The proven bounds of `field` are dropped because they do not hold for the new field.
+/// of 0 removes the blending. The proven bounds of `field`, and the tolerance within which it was built, are dropped
+/// because they do not hold for the new field.
 ///
 /// Exact leaves of a field that was built without blending list the triangles that are nearest within the leaf. In the
 /// zones beyond it, their distance may be too great, and may jump where its sign is uncertain. To avoid this, build the

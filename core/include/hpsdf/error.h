@@ -52,7 +52,7 @@ class MemoryLimitError : public Error {
       : Error(ErrorKind::limit, "",
               shortage + (enough > 0 ? ", or allow more memory: a memoryLimit of " + std::to_string(enough) +
                                            " bytes is likely to suffice"
-                                     : "; this machine has not enough memory")),
+                                     : "; this machine does not allow more memory")),
         shortage_(shortage),
         enough_(enough) {}
 

@@ -46,7 +46,8 @@ struct FieldMetadata {
   /// settings whose `BuildSetting::storedAt` is not 0.
   BuildOptions settings = {
       .targetError = 0, .nearness = 0, .maxDegree = 0, .maxDepth = 0, .strategy = Strategy::hp, .quadrature = 0};
-  double totalError = 0;               ///< weighted error ε, scaled to a surface of size 2 like the target error τ
+  /// Weighted error ε, scaled to a surface of size 2 like the target error τ; 0 if it is unknown (`hasEstimate`).
+  double totalError = 0;
   double referenceLength = 2;          ///< size L of the surface; ε·(L/2)^5 is the error at this size
   std::uint64_t exactEvaluations = 0;  ///< evaluations of Φ during the construction
   /// Number of steps of the construction, each of which raised the degree of a leaf or split a leaf. It is
@@ -65,6 +66,10 @@ struct FieldMetadata {
   /// Returns the estimated RMS error of the field over the domain, at the end of the construction: √(ε·(L/2)^5 / V)
   /// with the error ε (`totalError`), the surface's size L (`referenceLength`) and the domain's volume V.
   double rmsEstimate(const Box& domain) const;
+
+  /// Returns true if the construction estimated the error, so that `totalError` is known. A construction within a
+  /// tolerance estimates none, and its field has none after `weaklyContinuous` or `blended` either.
+  bool hasEstimate() const;
 };
 
 /// Proven upper bounds that hold throughout one leaf (see `safe_distance.h`).

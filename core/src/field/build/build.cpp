@@ -58,8 +58,8 @@ BuildOptions settled(BuildOptions options, const DistanceFunction& distance, con
 /// Throws `Error` if the options ask for a tolerance, which goes without the steps of Algorithm 1.
 void refuseTolerance(const BuildOptions& options, const char* what) {
   if (options.tolerance > 0)
-    throw Error(std::string("a construction within a tolerance has no steps, and so no ") + what +
-                ": leave one of them out");
+    throw Error(std::string("a construction within a tolerance has no steps, and so no ") + what + ": leave out the " +
+                what + " or the tolerance");
 }
 
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.

@@ -1,5 +1,5 @@
 #pragma once
-// The octree that takes the fewest bytes within a tolerance.
+// Seeks the octree that takes the fewest bytes within a tolerance.
 
 #include <array>
 #include <atomic>
@@ -54,9 +54,9 @@ class LeastBytes {
         budget_(budget),
         requireRoom_(std::move(requireRoom)) {}
 
-  /// Makes the leaf of a cell that takes the fewest bytes. Returns true if the cell's children might take fewer bytes,
-  /// or if there is no such leaf. `ratioAbove` is the error ratio of the parent, 0 if there is none. Appends the leaves
-  /// that were considered to `trials`, if that is given.
+  /// Makes a leaf of a cell, and seeks the one that takes the fewest bytes. Returns true if the cell's children might
+  /// take fewer bytes, or if there is no such leaf. `ratioAbove` is the error ratio of the parent, 0 if there is none.
+  /// Appends the leaves that were considered to `trials`, if that is given.
   bool makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove,
                 std::vector<LeafTrial>* trials = nullptr) const;
   /// Gives a cell eight children without fits.

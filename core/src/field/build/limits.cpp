@@ -19,14 +19,16 @@ double allowedMemory(const BuildOptions& options) {
   return options.memoryLimit ? std::min(most, double(*options.memoryLimit)) : most;
 }
 
+double baseCells(const BuildOptions& options) { return double(options.grid[0]) * options.grid[1] * options.grid[2]; }
+
 /// Throws a `MemoryLimitError` whose message is made of the parts. `enough` are the bytes that are likely to suffice;
-/// the limit that is suggested is some more, with two significant digits.
+/// the limit that is suggested is some more, with two significant digits, as far as the machine allows it.
 template <typename... Parts>
 [[noreturn]] void refuseMemory(double enough, const Parts&... parts) {
   constexpr double kSpare = 1.2;
   const double unit = std::pow(10, std::floor(std::log10(kSpare * enough)) - 1);
-  const double limit = std::ceil(kSpare * enough / unit) * unit;
-  throw MemoryLimitError(messageOf(parts...), limit <= hpsdf::allowedMemory() ? std::uint64_t(limit) : 0);
+  const double most = hpsdf::allowedMemory(), limit = std::min(std::ceil(kSpare * enough / unit) * unit, most);
+  throw MemoryLimitError(messageOf(parts...), enough <= most ? std::uint64_t(limit) : 0);
 }
 
 /// Returns a number of cells as rounded text for messages.
@@ -78,6 +80,18 @@ bool hasEnd(const BuildOptions& options) {
   });
 }
 
+/// Throws `Error` if a setting changes the field after its tolerance or its maximum error was reached.
+void checkOutlived(const BuildOptions& options) {
+  const char* reached = options.tolerance > 0 ? "tolerance" : options.maxError > 0 ? "maximum error" : nullptr;
+  if (reached == nullptr) return;
+  for (const char* later :
+       {options.continuityWeight ? "weak continuity" : nullptr, options.enrich ? "enrich" : nullptr})
+    if (later != nullptr)
+      refuse("a ", reached, " does not outlive ", later, ": leave out ", later, " or the ", reached);
+  if (options.tolerance > 0 && options.band > 0)
+    refuse("a tolerance is kept in the whole domain: leave out the band or the tolerance");
+}
+
 /// Throws `Error` if the settings that determine when the construction ends contradict each other.
 void checkEnds(const BuildOptions& options) {
   const NearFarError byDistance = options.targetError.byDistance();
@@ -90,12 +104,9 @@ void checkEnds(const BuildOptions& options) {
         "target error 0: expected a number above 0, or another end: near and far error, maximum error, bytes, steps");
   if (options.tolerance > 0 && (options.maxError > 0 || options.maxBytes || options.targetError.isByDistance()))
     refuse("a tolerance decides alone: leave out maximum error, bytes, near and far error");
-  if (options.tolerance > 0 && (options.continuityWeight || options.enrich || options.band > 0))
-    refuse("a tolerance does not outlive weak continuity, and needs no band: leave out one of them");
+  checkOutlived(options);
   if (options.certified && options.blend > 0)
     refuse("blending changes what is certified: leave out blending or the certificate");
-  if (options.maxError > 0 && (options.continuityWeight || options.enrich))
-    refuse("a maximum error does not outlive weak continuity or one degree more: leave out one of them");
   if (options.estimator == Estimator::checked && options.trialSamples == TrialSamples::own)
     refuse("the checked estimator needs trials by the children's samples: take the estimator embedded or residual");
   if (options.criterion != Criterion::optimal) return;
@@ -116,7 +127,7 @@ double limitWithoutLookup(const BuildOptions& options) {
   if (!options.maxBytes) return HUGE_VAL;
   const auto limit = double(*options.maxBytes);
   const double entries = options.blend > 0 ? 1.5 : 1;
-  const double baseEntries = 8.0 * double(std::size_t(options.grid[0]) * options.grid[1] * options.grid[2]);
+  const double baseEntries = 8 * baseCells(options);
   return std::min(limit / (1 + entries / 16), limit - entries * baseEntries);
 }
 
@@ -140,7 +151,7 @@ int mostDegree(const BuildOptions& options) {
 }
 
 static void requireGridMemory(const BuildOptions& options) {
-  const double cells = double(options.grid[0]) * options.grid[1] * options.grid[2];
+  const double cells = baseCells(options);
   const double bytesPerCell = kBytesPerNode + kBytesPerCoefficient * coefficientCount(startDegree(options));
   constexpr double kGridRoom = 2;  // the octree takes some memory besides the grid
   const double allowed = allowedMemory(options), byMemory = allowed / bytesPerCell;
@@ -153,8 +164,9 @@ static void requireGridMemory(const BuildOptions& options) {
     refuse(grid.str(), "with more than 2^32 coefficients: take at most ", std::floor(std::cbrt(byNumbers)), " an axis");
   grid << "and would need " << bytesText(cells * bytesPerCell) << ", more than the " << bytesText(allowed)
        << " allowed: ";
-  refuseMemory(kGridRoom * cells * bytesPerCell, grid.str(), "take at most ",
-               std::max(1.0, std::floor(std::cbrt(byMemory))), " an axis");
+  const double least = cells * bytesPerCell;
+  refuseMemory(std::min(kGridRoom * least, std::max(least, hpsdf::allowedMemory())), grid.str(),
+               "take a coarser grid, at most ", std::max(1.0, std::floor(std::cbrt(byMemory))), " an axis");
 }
 
 std::size_t ByteBudget::finalCoefficients(const Fit& fit) const {
@@ -176,10 +188,13 @@ void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
   const double factor = isLikelyTooMuch ? std::max(need.likelyFactor, need.growthFactor) : need.growthFactor;
   const double finally = fixed + bytes * factor;
   if (fixed + bytes <= most && finally <= kTolerance * most) return;
+  const bool isMostlyBaseGrid = baseCells(options) > 0.5 * double(need.nodes) * factor;
   refuseMemory(fixed + bytes * std::max(need.likelyFactor, need.growthFactor), "about ",
                cellsText(double(need.nodes) * factor), " and ", bytesText(finally),
-               " of memory are needed, more than the ", bytesText(most), " allowed: take a larger ",
-               options.tolerance > 0 ? "tolerance" : "target error or a lower maximum depth");
+               " of memory are needed, more than the ", bytesText(most), " allowed: take ",
+               isMostlyBaseGrid        ? "a coarser grid"
+               : options.tolerance > 0 ? "a larger tolerance"
+                                       : "a larger target error or a lower maximum depth");
 }
 
 double mostNodes(const BuildOptions& options) {
@@ -231,7 +246,7 @@ double ByteBudget::growthLimit(double exactBytes) const {
 void ByteBudget::requireRoomForFirstCells(double bytes, double leastBytes, double exactBytes) const {
   const double missing = std::max(leastBytes - limit_, bytes - growthLimit(exactBytes));
   if (!(missing > 0)) return;
-  const double cells = double(options_.grid[0]) * options_.grid[1] * options_.grid[2];
+  const double cells = baseCells(options_);
   const bool mayLower = options_.criterion == Criterion::optimal;
   const double baseGrid = cells * leafBytes(mayLower ? leastDegree(options_) : startDegree(options_));
   if (exactBytes > 0 && baseGrid <= limit_)

@@ -28,9 +28,10 @@ struct ToleranceSetup {
   std::uint32_t maxDepth;  ///< greatest depth at which cell indices are whole numbers of 32 bits
 };
 
-/// Builds the field that takes the fewest bytes within `BuildOptions::tolerance`. Its coefficients are rounded, and its
-/// bounds computed, as the options ask for. Makes a forecast before a tenth of the work is done. Throws `Error`
-/// if the field does not fit into the allowed memory: at the latest when the forecast is made if that shows it.
+/// Builds a field within `BuildOptions::tolerance`, and seeks the one that takes the fewest bytes. Its coefficients are
+/// rounded, and its bounds computed, as the options ask for. Makes a forecast before a tenth of the work is done.
+/// Throws `Error` if the field does not fit into the allowed memory: at the latest when the forecast is made if that
+/// shows it.
 FieldData buildWithinTolerance(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                                const Progress& progress);
 

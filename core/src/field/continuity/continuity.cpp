@@ -145,6 +145,15 @@ double weightedChange(const FieldData& field, std::span<const double> x0, std::s
   return sum;
 }
 
+/// Removes what is known of a field's errors only as long as the field is not changed: its measurement, and the
+/// tolerance within which it was built.
+void forgetErrors(FieldMetadata& metadata) {
+  metadata.measurement.reset();
+  if (metadata.settings.tolerance == 0) return;
+  metadata.settings.tolerance = metadata.settings.within = metadata.measuredError = 0;
+  metadata.settings.certified = false;
+}
+
 /// Throws `Error` if an option is out of range.
 void checkWeakContinuity(const WeakContinuity& options) {
   if (!(options.weight > 0 && options.weight <= kMaxContinuityWeight))
@@ -166,7 +175,8 @@ WeakContinuityFigures makeWeaklyContinuous(FieldData& field, const WeakContinuit
   FieldMetadata& metadata = field.metadata;
   metadata.settings.continuityWeight = options.weight;
   metadata.settings.maxError = metadata.measuredError = 0;  // both are valid only for the unchanged field
-  metadata.totalError += weightedChange(field, x, change) / std::pow(metadata.referenceLength / 2, 5);
+  if (metadata.hasEstimate())
+    metadata.totalError += weightedChange(field, x, change) / std::pow(metadata.referenceLength / 2, 5);
   field.bounds.clear();
   if (solver.figures.change > 0) {
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += change[i];
@@ -183,8 +193,7 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
   if (field.metadata().settings.continuityWeight)
     throw Error("the field is weakly continuous already: take it as it was before, or build it anew");
   FieldData data = field.data();
-  data.metadata.measurement.reset();
-  data.metadata.settings.certified = false;
+  continuity::forgetErrors(data.metadata);
   query::toDouble(data);
   const continuity::WeakContinuityFigures figures =
       withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
@@ -200,8 +209,7 @@ Field blended(const Field& field, double width) {
     throw Error("blend zones of a width of " + std::to_string(width) + " edges are out of range: give 0 to 0.25");
   FieldData data = field.data();
   data.blend = width;
-  data.metadata.measurement.reset();
-  data.metadata.settings.certified = false;
+  continuity::forgetErrors(data.metadata);
   data.bounds.clear();  // The bounds depend on which leaves contribute at a point, and blending changes this.
   return Field(std::move(data));
 }

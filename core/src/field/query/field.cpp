@@ -175,6 +175,10 @@ double FieldMetadata::rmsEstimate(const Box& domain) const {
   return std::sqrt(totalError * std::pow(referenceLength / 2, 5) / volume);
 }
 
+bool FieldMetadata::hasEstimate() const {
+  return settings.tolerance == 0 && (totalError != 0 || steps || !settings.targetError.isNone());
+}
+
 Field::Field(FieldData data) : data_(std::move(data)) {
   checkDomain(data_);
   const std::size_t baseCells = checkGrid(data_);
