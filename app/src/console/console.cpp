@@ -19,10 +19,13 @@ void warn(const Console& console, std::string_view text) {
   console.err << "hpsdf: warning: " << printable(text) << std::endl;
 }
 
+std::string forecastText(const Forecast& forecast) {
+  return fmt::format("the field will take about {} and {}", bytesText(forecast.bytes), durationText(forecast.seconds));
+}
+
 void noteForecast(const Console& console, const Forecast& forecast) {
   if (console.redrawsProgress) console.err << kEraseLine;
-  note(console,
-       fmt::format("the field will take about {} and {}", bytesText(forecast.bytes), durationText(forecast.seconds)));
+  note(console, forecastText(forecast));
 }
 
 void requireWritten(const std::ostream& out) {
