@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "explorer/build_preview.h"
 #include "explorer/ui.h"
 #include "explorer/view_state.h"
+#include "pictures/build_preview.h"
 #include "pictures/readout.h"
 #include "session/session.h"
 

@@ -1,4 +1,4 @@
-#include "explorer/build_preview.h"
+#include "pictures/build_preview.h"
 
 #include <utility>
 #include <vector>

@@ -1,5 +1,5 @@
 #pragma once
-// What the explorer shows while its first field is being built.
+// What is shown of a field while it is being built.
 
 #include <cstddef>
 #include <memory>
