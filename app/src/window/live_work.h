@@ -22,7 +22,7 @@ class LiveWork : public WorkListener {
   /// How often a growing field is shown.
   struct Pace {
     double seconds = 0.25;  ///< least time between two states of the field
-    double share = 0.05;    ///< greatest share of the time in which the field is made and shown, above 0; 1: no limit
+    double share = 0.1;     ///< greatest share of the time in which the field is made and shown, above 0; 1: no limit
   };
 
   LiveWork(Explorer& explorer, std::function<void()> refresh) : LiveWork(explorer, std::move(refresh), Pace{}) {}
