@@ -369,6 +369,12 @@ bool Explorer::isStale() const {
   return !isKept && (!picture_ || !isUpToDate);
 }
 
+bool Explorer::redraws(int shrink) const {
+  const bool isOther = drawnFor_ != pictureKey() || shrunk_ != shrink;
+  if (showsPreview()) return isOther;
+  return !work && isStale() && (isOther || !picture_);
+}
+
 const Field& Explorer::shownField() const { return showsPreview() ? *preview_.field() : session_.current().field; }
 
 const Box& Explorer::shownDomain() const {
@@ -475,11 +481,7 @@ void Explorer::drawPreview(int shrink) {
 
 render::Image Explorer::frame(int shrink) {
   if (session_.forgetChangedOthers()) drawnFor_.clear();
-  if (showsPreview()) {
-    if (drawnFor_ != pictureKey() || shrunk_ != shrink) drawPreview(shrink);
-  } else if (!work && isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) {
-    drawPicture(shrink);
-  }
+  if (redraws(shrink)) showsPreview() ? drawPreview(shrink) : drawPicture(shrink);
   settlePanels();
   render::Image image(view_.width, view_.height, {250, 250, 248});
   const Layout layout = layoutOf(view_);

@@ -75,6 +75,8 @@ class Explorer final : public SessionExtension {
   /// True if the picture must be redrawn: there is none yet, or the last one was drawn at reduced resolution or for
   /// another state of the explorer.
   bool isStale() const;
+  /// True if `frame` would draw the picture anew.
+  bool redraws(int shrink) const;
 
   /// Runs one line of script. Widgets act by calling this function.
   void run(const std::string& line);

@@ -331,10 +331,11 @@ class Window {
     showTitle();
     const bool slow = roughly && fullSeconds_ > kSmoothSeconds;
     const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kSmoothSeconds))), 2, 4) : 1;
-    const bool measures = explorer_.isStale() && shrink == 1;
+    // The pictures of a growing field may all be rough, so that their time in full is estimated.
+    const bool measures = explorer_.redraws(shrink) && (shrink == 1 || explorer_.showsUnfinished());
     const auto start = Clock::now();
     const render::Image image = frame(shrink);
-    if (measures) fullSeconds_ = std::chrono::duration<double>(Clock::now() - start).count();
+    if (measures) fullSeconds_ = shrink * shrink * std::chrono::duration<double>(Clock::now() - start).count();
     screen_.show(image);
   }
 
@@ -367,7 +368,8 @@ class Window {
     }
     events_ = std::move(later);
     if (ended()) explorer_.cancelWanted = true;
-    draw(std::chrono::duration<double>(Clock::now() - lastInput_).count() < kStillSeconds);
+    const bool isMoving = std::chrono::duration<double>(Clock::now() - lastInput_).count() < kStillSeconds;
+    draw(isMoving || explorer_.showsUnfinished());
   }
 
   /// Ends the user's gestures and records the pointer's position, so that the recording leads to the present
