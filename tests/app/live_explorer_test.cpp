@@ -29,7 +29,7 @@ constexpr const char* kFirst = "show size=900x560 cpu=true";
 /// A session and its explorer.
 class Desk {
  public:
-  Desk() { run(kField); }
+  explicit Desk(const std::string& opening = kField) { run(opening); }
   void run(const std::string& lines) { runScript(session_, parseScript(registry_, "test", lines, {})); }
   Explorer& explorer() { return explorerOf(session_); }
   Session& session() { return session_; }
@@ -242,13 +242,150 @@ TEST(LiveWork, showsAConstructionAndCancelsIt) {
   EXPECT_TRUE(desk.explorer().widgets().contains("build/rebuild"));
 }
 
+/// Returns the share of the pixels of the explorer's picture that differ clearly between two frames.
+double shareOfDifferent(const Explorer& explorer, const render::Image& a, const render::Image& b) {
+  const UiRect canvas = layoutOf(explorer.view()).canvas;
+  int different = 0;
+  for (int y = int(canvas.y0); y < int(canvas.y1); ++y)
+    for (int x = int(canvas.x0); x < int(canvas.x1); ++x) {
+      int sum = 0;
+      for (std::size_t channel = 0; channel < 3; ++channel) sum += std::abs(a.at(x, y)[channel] - b.at(x, y)[channel]);
+      different += sum > 30;
+    }
+  return different / (canvas.width() * canvas.height());
+}
+
+/// Returns the frame that is shown while the first field is on its way.
+render::Image frameWithoutField(Explorer& explorer) {
+  explorer.work = Explorer::Work{.task = "opening"};
+  render::Image frame = explorer.frame();
+  explorer.work.reset();
+  return frame;
+}
+
+TEST(LiveWork, showsTheMeshAtOnceAndTurnsIt) {
+  constexpr const char* kOpening = "build builtin:torus target-error=1e-4";
+  Desk desk(kFirst);
+  Explorer& explorer = desk.explorer();
+  Recording recording(explorer, {kOpening});
+  const render::Image empty = frameWithoutField(explorer);
+  std::optional<render::Image> first, turned;
+  LiveWork work(explorer, [&] {
+    if (first) return;
+    first = explorer.frame();
+    desk.moveTo("canvas");
+    desk.press();
+    for (int i = 1; i <= 3; ++i) {
+      const auto [x, y] = explorer.ui().pointer();
+      desk.move(x + 20, y + 40);
+    }
+    desk.release();
+    explorer.input({.kind = Input::Kind::wheel, .turn = 1e6});  // too near for a camera: nothing happens
+    turned = explorer.frame();
+  });
+  EXPECT_FALSE(desk.session().hasField());
+  explorer.open(kOpening);
+  ASSERT_TRUE(first && turned);
+  EXPECT_GT(shareOfDifferent(explorer, empty, *first), 0.2) << "the mesh is shown";
+  EXPECT_GT(shareOfDifferent(explorer, *first, *turned), 0.05) << "it was turned";
+  const render::Image field = explorer.frame();
+  EXPECT_LT(shareOfDifferent(explorer, *turned, field), 0.04) << "the field's surface is where the mesh was";
+  recording.notePointer();
+  Desk again(std::string(kFirst) + "\n" + recording.script());
+  EXPECT_TRUE(again.explorer().frame().pixels == field.pixels);
+  EXPECT_EQ(history(again.explorer()), history(explorer));
+  EXPECT_THAT(recording.script(), testing::MatchesRegex("build [^\n]*\ncamera [^\n]*\nui hover [^\n]*\n"));
+}
+
+TEST(LiveWork, showsTheFieldAsItGrows) {
+  constexpr const char* kOpening = "build analytic:torus target-error=1e-6 grid=2,2,2";
+  Desk desk(kFirst);
+  Explorer& explorer = desk.explorer();
+  Recording recording(explorer, {kOpening});
+  const render::Image empty = frameWithoutField(explorer);
+  std::vector<render::Image> surfaces, slices;
+  const auto refresh = [&] {
+    if (!explorer.showsUnfinished()) return;
+    EXPECT_FALSE(desk.session().hasField());
+    if (surfaces.empty()) {
+      surfaces.push_back(explorer.frame());
+      desk.click("bar/slice");
+      desk.moveTo("canvas");
+      explorer.input({.kind = Input::Kind::wheel, .turn = 1});
+    }
+    slices.push_back(explorer.frame());
+  };
+  LiveWork work(explorer, refresh, {.seconds = 0, .share = 1});
+  explorer.open(kOpening);
+  ASSERT_GE(slices.size(), 2U);
+  EXPECT_GT(shareOfDifferent(explorer, empty, surfaces[0]), 0.2) << "the surface is shown";
+  EXPECT_GT(shareOfDifferent(explorer, surfaces[0], slices[0]), 0.2) << "a slice was asked for";
+  EXPECT_GT(shareOfDifferent(explorer, slices.front(), slices.back()), 0.05) << "the cells change";
+  EXPECT_TRUE(explorer.view().slice);
+  recording.notePointer();
+  Desk again(std::string(kFirst) + "\n" + recording.script());
+  EXPECT_TRUE(again.explorer().frame().pixels == explorer.frame().pixels);
+  EXPECT_THAT(recording.script(),
+              testing::MatchesRegex("build [^\n]*\nshow slice\nplane zoom=1.15\nui hover [^\n]*\n"));
+}
+
+/// A rebuild shows the field before it until the new one is finished.
+TEST(LiveWork, showsTheFieldBeforeDuringARebuild) {
+  Desk desk(std::string(kField) + "\n" + kFirst);
+  Explorer& explorer = desk.explorer();
+  const render::Image before = explorer.frame();
+  int frames = 0;
+  const auto refresh = [&] {
+    ++frames;
+    EXPECT_FALSE(explorer.showsUnfinished());
+    EXPECT_EQ(shareOfDifferent(explorer, before, explorer.frame()), 0);
+    if (frames == 3) desk.key(Key::escape);
+  };
+  LiveWork work(explorer, refresh, {.seconds = 0, .share = 1});
+  desk.run("settings target-error=1e-30");
+  EXPECT_THROW(explorer.run("rebuild"), Cancelled);
+}
+
+TEST(LiveWork, aConstructionThatFailsLeavesNoMesh) {
+  Desk desk(kFirst);
+  Explorer& explorer = desk.explorer();
+  const render::Image empty = frameWithoutField(explorer);
+  LiveWork work(explorer, [&] { desk.key(Key::escape); });
+  EXPECT_THROW(explorer.open("build builtin:torus target-error=1e-30"), Cancelled);
+  EXPECT_EQ(shareOfDifferent(explorer, empty, frameWithoutField(explorer)), 0);
+}
+
+TEST(LiveWork, tellsTheForecast) {
+  Desk desk(kFirst);
+  Explorer& explorer = desk.explorer();
+  std::optional<Forecast> told;
+  LiveWork work(explorer, [&] {
+    if (explorer.work->forecast) told = explorer.work->forecast;
+  });
+  withProgress(desk.session().console(), [](const Progress& progress) {
+    progress.forecast({.bytes = 1e6, .seconds = 30});
+    for (int i = 0; i < 8; ++i) {
+      progress.update("working", i / 8.0);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return 0;
+  });
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->seconds, 30);
+  EXPECT_EQ(forecastText(*told), "the field will take about 1.00 MB and 30 s");
+}
+
 TEST(LiveWork, escapeCancelsWhileThePanelIsClosed) {
   Desk desk;
   desk.run(std::string(kFirst) + "\npanel all=false\nsettings target-error=1e-30");
   desk.explorer().frame();
-  LiveWork work(desk.explorer(), [&] { desk.key(Key::escape); });
+  bool cancels = true;
+  LiveWork work(desk.explorer(), [&] {
+    if (cancels) desk.key(Key::escape);
+  });
   EXPECT_THROW(desk.explorer().run("rebuild"), Cancelled);
   // After the cancelled construction, the next one runs to its end.
+  cancels = false;
   desk.run("settings target-error=1e-3");
   EXPECT_NO_THROW(desk.explorer().run("rebuild"));
 }

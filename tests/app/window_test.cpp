@@ -220,17 +220,25 @@ class WindowTest : public testing::Test {
     desktop({"key", "Return"});
   }
 
-  /// Returns true if the display shows this part of a frame, pixel by pixel, at the window's position.
-  bool screenShows(const render::Image& frame, const UiRect& part) {
-    const std::string screen =
-        contents(folder_ / "x" / "Xvfb_screen0");  // an xwd file, which begins with big-endian words
+  struct Screen {
+    std::string bytes;        ///< pixels of four bytes: blue, green, red and a byte without use
+    std::size_t first, line;  ///< position of the first pixel, and number of bytes of a row
+  };
+  Screen screen() const {
+    std::string file = contents(folder_ / "x" / "Xvfb_screen0");  // an xwd file, which begins with big-endian words
     const auto word = [&](std::size_t index) {
       std::uint32_t value = 0;
       for (std::size_t byte = 0; byte < 4; ++byte)
-        value = value << 8 | static_cast<unsigned char>(screen[4 * index + byte]);
+        value = value << 8 | static_cast<unsigned char>(file[4 * index + byte]);
       return value;
     };
-    const std::size_t pixels = word(0) + 12 * word(19), line = word(12);
+    const std::size_t first = word(0) + 12 * word(19), line = word(12);
+    return {std::move(file), first, line};
+  }
+
+  /// Returns true if the display shows this part of a frame, pixel by pixel, at the window's position.
+  bool screenShows(const render::Image& frame, const UiRect& part) {
+    const auto [screen, pixels, line] = this->screen();
     for (int y = int(part.y0); y < int(part.y1); ++y)
       for (int x = int(part.x0); x < int(part.x1); ++x)
         for (std::size_t channel = 0; channel < 3; ++channel) {  // the display stores the blue channel first
@@ -238,6 +246,18 @@ class WindowTest : public testing::Test {
           if (static_cast<std::uint8_t>(shown) != frame.at(x, y)[channel]) return false;
         }
     return true;
+  }
+
+  /// Returns the number of pixels of the display that have the colour of a surface, more red than blue.
+  std::size_t clayOnScreen() const {
+    const Screen shown = screen();
+    std::size_t count = 0;
+    for (std::size_t pixel = shown.first; pixel + 4 <= shown.bytes.size(); pixel += 4) {
+      const auto blue = static_cast<unsigned char>(shown.bytes[pixel]);
+      const auto red = static_cast<unsigned char>(shown.bytes[pixel + 2]);
+      count += red > blue + 20;
+    }
+    return count;
   }
 
   support::TemporaryDirectory folder_;
@@ -329,6 +349,7 @@ TEST_F(WindowTest, itShowsTheProgressOfTheFirstConstructionAndClosingCancelsIt) 
       const std::string screen = contents(folder_ / "x" / "Xvfb_screen0");
       return std::ranges::count(screen, char(0xf8)) > 1000;  // the frame's background has the blue 248
     }));
+    EXPECT_TRUE(comesTrue([&] { return clayOnScreen() > 5000; })) << "the mesh is shown";
     EXPECT_EQ(desktop({"getwindowname", id_}).find("weighted estimate"), std::string::npos);
     desktop({"key", key});
     EXPECT_EQ(window_->wait(), 0) << window_->err();

@@ -244,6 +244,70 @@ TEST(Build, stagesAreTheFieldsOfLimitedConstructions) {
   EXPECT_THROW(buildStages(torus, cube(), options, descending, [](const Field&) {}), Error);
 }
 
+/// The field that a construction offers while it grows costs no evaluation of the distance, even where later stages
+/// would, and does not affect the result.
+TEST(Build, offersTheFieldAsItGrows) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "field.hpsdf";
+  std::atomic<std::uint64_t> evaluations = 0;
+  const auto counted = [&](const Vector3& x) {
+    ++evaluations;
+    return torus(x);
+  };
+  const BuildOptions simple{.targetError = 1e-5, .grid = {2, 2, 2}, .maxError = 0.02};
+  BuildOptions rich = simple;
+  rich.maxError = 0;
+  rich.criterion = Criterion::optimal;
+  rich.enrich = rich.bounds = true;
+  rich.continuityWeight = 1;
+  for (const BuildOptions& options : {simple, rich}) {
+    evaluations = 0;
+    const std::string alone = fileBytes(build(counted, cube(), options), file);
+    const std::uint64_t evaluationsAlone = evaluations.exchange(0);
+    std::vector<std::uint64_t> steps;
+    const auto look = [&](const std::function<Field()>& fieldSoFar) {
+      const std::uint64_t before = evaluations;
+      const Field field = fieldSoFar();
+      EXPECT_EQ(evaluations, before);
+      EXPECT_LT(measure(field, torus, 100).rms, 0.2);
+      steps.push_back(field.metadata().steps.value());
+    };
+    EXPECT_TRUE(fileBytes(build(counted, cube(), options, {}, look), file) == alone);
+    EXPECT_EQ(evaluations, evaluationsAlone);
+    EXPECT_GT(steps.size(), 2U);
+    EXPECT_TRUE(std::ranges::is_sorted(steps));
+    EXPECT_GT(steps.back(), steps.front());
+  }
+  EXPECT_THROW(build(torus, cube(), simple, {}, [](const auto&) { throw Cancelled(); }), Cancelled);
+}
+
+/// The field so far is that of a construction which ends there, but for the rounding of its coefficients.
+TEST(Build, theFieldSoFarIsThatOfALimitedConstruction) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "field.hpsdf";
+  BuildOptions options{.targetError = 1e-5, .grid = {2, 2, 2}, .coefficients = CoefficientType::float32};
+  std::vector<Field> offered;
+  build(torus, cube(), options, {}, [&](const auto& fieldSoFar) { offered.push_back(fieldSoFar()); });
+  ASSERT_GT(offered.size(), 2U);
+  options.maxSteps = offered[1].metadata().steps;
+  const Field limited = build(torus, cube(), options);
+  EXPECT_TRUE(std::ranges::equal(offered[1].data().nodes, limited.data().nodes));
+  EXPECT_TRUE(offered[1].data().coefficients == limited.data().coefficients);
+}
+
+TEST(Build, offersNoFieldWhileMemoryIsShort) {
+  BuildOptions options{.targetError = 1e-6, .grid = {2, 2, 2}};
+  const auto offers = [&] {
+    int count = 0;
+    build(torus, cube(), options, {}, [&](const auto&) { ++count; });
+    return count;
+  };
+  const int all = offers();
+  const Field field = build(torus, cube(), options);
+  options.memoryLimit = 250 * field.data().nodes.size() + 8 * statistics(field).coefficients + 1000;
+  EXPECT_LT(offers(), all);
+}
+
 /// τ refers to a mesh scaled to the paper's size: scaling the shape by a power of two gives exactly the same cells.
 TEST(Build, targetErrorIsMeantAtThePapersScale) {
   const Field one = build(DistanceFunction(sphere, Source{.box = cube(1)}), cube(), {.targetError = 1e-6});

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +19,8 @@
 #include "hpsdf/build.h"
 #include "hpsdf/detail/crossings.h"
 #include "hpsdf/error.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/render/picture.h"
 #include "picture/defect_marks.h"
 #include "support/made_meshes.h"
 #include "support/require_gl.h"
@@ -239,6 +242,28 @@ TEST(MeshPicture, isTheSameWithOpenGl) {
   const Image cpu = drawn(mesh, above);
   const Image gl = drawMesh(makeGl, mesh, defectsOf(mesh), above);
   EXPECT_LT(differentPixels(cpu, gl, 40), std::size_t(kWidth) * kHeight / 500) << "edges of a pixel, at most";
+}
+
+TEST(MeshView, isThatOfTheFieldsSurface) {
+  HPSDF_REQUIRE_GL();
+  const TriangleMesh mesh = moved(boxOfTwo(), {3, 0, 0}, 0.5);
+  const Box domain = domainAround(mesh);
+  const Field field =
+      build(ExactDistance(mesh), domain, {.targetError = 1e-4, .grid = {4, 4, 4}, .strategy = Strategy::hpx});
+  SurfacePicture picture{.camera = pictureFrom(20, 40).camera, .width = kWidth, .height = kHeight, .bare = true};
+  for (const std::optional<Vector3>& target : {std::optional<Vector3>(), std::optional(Vector3(3.2, 0, 0))}) {
+    picture.camera.target = target;
+    const Image surface = draw(*makeCpuRenderer(field), field, picture);
+    for (const MakeBodyRenderer& make : {MakeBodyRenderer(makeCpuBodyRenderer), MakeBodyRenderer(makeGl)}) {
+      const DrawView drawView = meshView(make, mesh, domain);
+      const Image view = drawView(picture.camera, kWidth, kHeight);
+      EXPECT_LT(differentPixels(surface, view, 40), std::size_t(kWidth) * kHeight / 100) << "edges, at most";
+      picture.camera.azimuthDegrees += 30;
+      EXPECT_GT(differentPixels(surface, drawView(picture.camera, kWidth, kHeight), 40),
+                std::size_t(kWidth) * kHeight / 50);
+      picture.camera.azimuthDegrees -= 30;
+    }
+  }
 }
 
 TEST(MeshPicture, hasATidyLegendAtAnySize) {

@@ -19,10 +19,14 @@ void warn(const Console& console, std::string_view text) {
   console.err << "hpsdf: warning: " << printable(text) << std::endl;
 }
 
+std::string forecastText(const Forecast& forecast) {
+  const std::string seconds = forecast.seconds < 1 ? "less than a second" : "about " + durationText(forecast.seconds);
+  return fmt::format("the field will take about {} and {}", bytesText(forecast.bytes), seconds);
+}
+
 void noteForecast(const Console& console, const Forecast& forecast) {
   if (console.redrawsProgress) console.err << kEraseLine;
-  const std::string seconds = forecast.seconds < 1 ? "less than a second" : "about " + durationText(forecast.seconds);
-  note(console, fmt::format("the field will take about {} and {}", bytesText(forecast.bytes), seconds));
+  note(console, forecastText(forecast));
 }
 
 void requireWritten(const std::ostream& out) {

@@ -2,11 +2,14 @@
 // The program's input and output streams, and an observer of its long work.
 
 #include <filesystem>
+#include <functional>
 #include <iosfwd>
 #include <string>
 #include <string_view>
 
 #include "hpsdf/error.h"
+#include "hpsdf/field.h"
+#include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::app {
 
@@ -19,6 +22,12 @@ class WorkListener {
   /// Tells whether the work should stop. Any thread may call it, and it is called often. Once it returns true,
   /// the work ends with the exception `Cancelled`.
   virtual bool wantsCancel() = 0;
+  /// Receives the forecast of the work, if it makes one. Any thread may call it.
+  virtual void forecast(const Forecast&) {}
+  /// Receives the mesh and the domain of a field that is about to be built.
+  virtual void showMesh(const TriangleMesh& /*mesh*/, const Box& /*domain*/) {}
+  /// Is offered the field of an unfinished construction, often: fieldSoFar() makes it. Any thread may call it.
+  virtual void offerField(const std::function<Field()>& /*fieldSoFar*/) {}
   /// Called when the work has succeeded, failed or been cancelled.
   virtual void ended() = 0;
 };
@@ -39,6 +48,9 @@ struct Console {
 /// Writes one line to the stream `err`. Control characters in `text`, which file names may contain, become blanks.
 void note(const Console& console, std::string_view text);
 void warn(const Console& console, std::string_view text);
+
+/// Says what a long operation will take: "the field will take about 12.3 MB and 40 s".
+std::string forecastText(const Forecast& forecast);
 
 /// Writes a line that says what a long operation will take.
 void noteForecast(const Console& console, const Forecast& forecast);

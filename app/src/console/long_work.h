@@ -32,7 +32,11 @@ auto withProgress(const Console& console, const Work& work) {
           },
       .cancelled =
           [listener] { return InterruptGuard::interrupted() || (listener != nullptr && listener->wantsCancel()); },
-      .forecast = [&console](const Forecast& forecast) { noteForecast(console, forecast); },
+      .forecast =
+          [&console, listener](const Forecast& forecast) {
+            noteForecast(console, forecast);
+            if (listener != nullptr) listener->forecast(forecast);
+          },
   };
   auto result = work(progress);
   progress.throwIfCancelled();  // Ctrl-C may have come after the last check inside `work`

@@ -56,6 +56,11 @@ Field measured(Field field, const BuildInput& input, const Progress& progress) {
   return withMeasurement(std::move(field), measurement);
 }
 
+OfferField offerTo(WorkListener* listener) {
+  if (listener == nullptr) return {};
+  return [listener](const std::function<Field()>& fieldSoFar) { listener->offerField(fieldSoFar); };
+}
+
 }  // namespace
 
 std::filesystem::path checkpointOf(const std::filesystem::path& output) { return output.string() + ".checkpoint"; }
@@ -76,6 +81,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     if (options.certified && !isShell && prepared.report && !prepared.report->closed())
       throw Error("certified: the mesh has holes, beside which nothing is proven: close them, or leave certified out");
     warnOfCutSurface(console, box, domain);
+    if (console.listener != nullptr && !prepared.analytic) console.listener->showMesh(prepared.mesh, domain);
 
     // Set up the exact distance function and measure how long this takes. The default memory limit is meant for the
     // octree alone, so add the memory of the distance function to it.
@@ -93,7 +99,8 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
     const auto start = std::chrono::steady_clock::now();
     Field field = withProgress(console, [&](const Progress& progress) {
       if (checkpoint.empty())
-        return measured(build(*input.exact, input.domain, input.options, progress), input, progress);
+        return measured(build(*input.exact, input.domain, input.options, progress, offerTo(console.listener)), input,
+                        progress);
       const Checkpoint state = checkpointAt(console, checkpoint, arguments);
       return measured(buildResumably(*input.exact, input.domain, input.options, state, progress), input, progress);
     });

@@ -200,6 +200,7 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
 }
 
 void Explorer::fieldChanged() {
+  preview_ = {};
   picture_.reset();
   figures_.reset();
   worst_.clear();
@@ -210,19 +211,43 @@ void Explorer::fieldChanged() {
   ++fields_;
 }
 
+void Explorer::showMesh(const TriangleMesh& mesh, const Box& domain) { preview_.showMesh(mesh, domain, view_.backend); }
+
+void Explorer::showUnfinished(Field field) { preview_.showField(std::move(field), view_.backend); }
+
+void Explorer::open(const std::string& line) {
+  try {
+    perform(line);
+  } catch (...) {
+    preview_ = {};
+    shown_.clear();
+    throw;
+  }
+}
+
+/// Runs a line of script, perhaps while another line is running.
+void Explorer::perform(const std::string& line) {
+  const bool isWithinAnother = std::exchange(running_, true);
+  try {
+    runScript(session_, parseScript(session_.registry(), "panel", line, {}));
+  } catch (...) {
+    running_ = isWithinAnother;
+    throw;
+  }
+  running_ = isWithinAnother;
+}
+
 void Explorer::run(const std::string& line) {
   message.clear();
   const std::string kind = ui_.busy() ? kindOf(line) : "";
   replaces_ = !kind.empty() && kind == lastKind_;
   lastKind_.clear();  // if this line fails, the next line must not replace it
-  running_ = true;
   try {
-    runScript(session_, parseScript(session_.registry(), "panel", line, {}));
+    perform(line);
   } catch (...) {
-    running_ = replaces_ = false;
+    replaces_ = false;
     throw;
   }
-  running_ = false;
   lastKind_ = kind;
   if (onCommand) onCommand(line, replaces_);
   replaces_ = false;
@@ -247,10 +272,24 @@ void Explorer::settlePanels() {
 }
 
 void Explorer::inputWhileWorking(const Input& event) {
-  std::vector<std::string> ignored;
-  drawPanels(&event, ignored);
+  std::vector<std::string> commands;
+  drawPanels(&event, commands);
   if (event.kind == Input::Kind::key && event.key == Key::escape && work->cancellable) cancelWanted = true;
-  if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
+  if (!showsPreview()) {
+    if (event.kind == Input::Kind::release && dragged_ == event.button) dragged_.reset();
+    return;
+  }
+  if (const auto command = canvasCommand(event)) commands.push_back(*command);
+  for (const std::string& command : commands) runOnPreview(command);
+  if (!ui_.busy()) lastKind_.clear();
+}
+
+/// Runs a command that changes the view of the preview. An error of the command must not end the long work.
+void Explorer::runOnPreview(const std::string& line) {
+  try {
+    run(line);
+  } catch (const Error&) {  // a camera or a plane out of range: nothing has changed
+  }
 }
 
 void Explorer::releaseInput() {
@@ -302,8 +341,8 @@ std::string Explorer::wheelCommand(double notches) const {
 std::string Explorer::dragCommand(double dx, double dy) const {
   const UiRect canvas = layoutOf(view_).canvas;
   const double width = canvas.width(), height = canvas.height();
-  const Field& field = session_.current().field;
   if (view_.slice) {
+    const Field& field = shownField();
     const render::SliceView plane =
         render::sliceView(field, slicePicture(viewAtPress_, field), int(width), int(height));
     const Vector3 target = plane.origin - plane.right * (dx / width) + plane.up * (dy / height);
@@ -315,11 +354,11 @@ std::string Explorer::dragCommand(double dx, double dy) const {
                        std::clamp(rounded(c.elevationDegrees + kDegreesPerPixel * dy, 0.1), -90.0, 90.0), c.distance);
   // A drag with any button except the left one moves the camera's target together with the mouse. In the plane of the
   // target, the vectors scale · right and scale · up are half the picture's width and height.
-  const auto camera = render::cameraOf(c, field.domain(), int(width), int(height));
-  const double scale =
-      c.projection == render::Projection::perspective ? c.distance * field.domain().diagonal().norm() : 1;
-  const Vector3 target = c.target.value_or(field.domain().center()) +
-                         scale * (-camera.right * (2 * dx / width) + camera.up * (2 * dy / height));
+  const Box& domain = shownDomain();
+  const auto camera = render::cameraOf(c, domain, int(width), int(height));
+  const double scale = c.projection == render::Projection::perspective ? c.distance * domain.diagonal().norm() : 1;
+  const Vector3 target =
+      c.target.value_or(domain.center()) + scale * (-camera.right * (2 * dx / width) + camera.up * (2 * dy / height));
   return "camera target=" + vectorWord(target);
 }
 
@@ -358,13 +397,33 @@ std::optional<std::string> Explorer::clickCommand() {
   return "why point=" + vectorWord(at->pick.position);
 }
 
+bool Explorer::isStale() const {
+  const bool isUpToDate = shrunk_ == 1 && drawnFor_ == pictureKey();
+  if (showsPreview()) return !isUpToDate;
+  const bool isKept = work && session_.hasField();
+  return !isKept && (!picture_ || !isUpToDate);
+}
+
+bool Explorer::redraws(int shrink) const {
+  const bool isOther = drawnFor_ != pictureKey() || shrunk_ != shrink;
+  if (showsPreview()) return isOther;
+  return !work && isStale() && (isOther || !picture_);
+}
+
+const Field& Explorer::shownField() const { return showsPreview() ? *preview_.field() : session_.current().field; }
+
+const Box& Explorer::shownDomain() const {
+  return showsPreview() ? preview_.domain() : session_.current().field.domain();
+}
+
 std::string Explorer::pictureKey() const {
   ViewState shown = view_;  // parts on which the picture does not depend are reset below
   const Layout layout = layoutOf(view_);
   shown.open = {};
   shown.scroll = {};
   shown.worstPage = 0;
-  return fmt::format("{} {}x{} {}", scriptOf(shown), layout.canvas.width(), layout.canvas.height(), fields_);
+  return fmt::format("{} {}x{} {} {}", scriptOf(shown), layout.canvas.width(), layout.canvas.height(), fields_,
+                     preview_.changes());
 }
 
 render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
@@ -380,7 +439,7 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
   };
   // Place the plane and the camera relative to the session's current field, even if `field` is the second field, which
   // is drawn beside it. Both pictures then show the same part of space.
-  const Field& current = session_.current().field;
+  const Field& current = shownField();
   return view_.slice ? render::drawSlice(renderer, field, fit(slicePicture(view_, current)), reference)
                      : render::drawSurface(renderer, field, fit(surfacePicture(view_, current)), reference);
 }
@@ -444,9 +503,20 @@ void Explorer::drawPicture(int shrink) {
   drawnFor_ = pictureKey();
 }
 
+void Explorer::drawPreview(int shrink) {
+  const UiRect canvas = layoutOf(view_).canvas;
+  const int width = std::max(16, int(canvas.width()) / shrink), height = std::max(16, int(canvas.height()) / shrink);
+  if (const Field* field = preview_.field())
+    shown_ = {drawn(preview_.renderer(), *field, {}, view_.colors().scale, shrink).image};
+  else
+    shown_ = {preview_.drawMesh(view_.camera, width, height)};
+  shrunk_ = shrink;
+  drawnFor_ = pictureKey();
+}
+
 render::Image Explorer::frame(int shrink) {
   if (session_.forgetChangedOthers()) drawnFor_.clear();
-  if (!work && isStale() && (drawnFor_ != pictureKey() || shrunk_ != shrink || !picture_)) drawPicture(shrink);
+  if (redraws(shrink)) showsPreview() ? drawPreview(shrink) : drawPicture(shrink);
   settlePanels();
   render::Image image(view_.width, view_.height, {250, 250, 248});
   const Layout layout = layoutOf(view_);

@@ -11,6 +11,7 @@
 
 #include "explorer/ui.h"
 #include "explorer/view_state.h"
+#include "pictures/build_preview.h"
 #include "pictures/readout.h"
 #include "session/session.h"
 
@@ -60,7 +61,7 @@ class Explorer final : public SessionExtension {
 
   /// Handles one mouse or keyboard event: draws the panels, then runs the commands that the widgets request.
   /// Exceptions of these commands are passed on to the caller. While long work runs, an event can only cancel
-  /// the work.
+  /// the work or, if there is no field yet, change the view of what is shown in its stead.
   void input(const Input& event);
   /// Ends all input that a recorded script cannot reproduce: releases the mouse buttons, closes open lists and discards
   /// a text that is being typed. The pointer keeps its position. Ignores errors of commands that run as a result.
@@ -73,22 +74,33 @@ class Explorer final : public SessionExtension {
 
   /// Draws and returns the whole frame. Redraws the picture in it only if the picture is out of date. `shrink` divides
   /// the picture's resolution along each axis, so that drawing keeps up with a moving mouse. During long work the last
-  /// picture is shown again.
+  /// picture is shown again or, if there is no field yet, what stands for it.
   render::Image frame(int shrink = 1);
   /// True if the picture must be redrawn: there is none yet, or the last one was drawn at reduced resolution or for
   /// another state of the explorer.
-  bool isStale() const { return !picture_ || shrunk_ != 1 || drawnFor_ != pictureKey(); }
+  bool isStale() const;
+  /// True if `frame` would draw the picture anew.
+  bool redraws(int shrink) const;
 
   /// Runs one line of script. Widgets act by calling this function.
   void run(const std::string& line);
+  /// Runs the line of script that loads or builds the first field, without calling `onCommand` for it.
+  void open(const std::string& line);
   /// Called after each line of script that `run` has run. `replaces` is true if this line alone has the same
   /// effect as the previous line followed by this line, as during a drag of a slider. A recording may then drop
   /// the previous line.
   std::function<void(const std::string& line, bool replaces)> onCommand;
-  /// True while `run` is running a line of script.
+  /// True while `run` or `open` is running a line of script.
   bool running() const { return running_; }
 
   void fieldChanged() override;
+
+  /// Until there is a field, long work shows this mesh in its stead. `domain` is the domain of the field.
+  void showMesh(const TriangleMesh& mesh, const Box& domain);
+  /// The same with an unfinished state of the field.
+  void showUnfinished(Field field);
+  /// True once the field is shown as it grows.
+  bool showsUnfinished() const { return showsPreview() && preview_.field() != nullptr; }
 
   /// Long work that is now running, such as a construction. The panels show its progress. Only the button that cancels
   /// the work takes input.
@@ -96,6 +108,7 @@ class Explorer final : public SessionExtension {
     std::string task;
     double fraction = 0;  ///< completed share of the work, 0 to 1
     bool cancellable = false;
+    std::optional<Forecast> forecast = {};
   };
   std::optional<Work> work;
   /// The panels set this to true when the user cancels the long work.
@@ -121,6 +134,13 @@ class Explorer final : public SessionExtension {
   /// `from` is empty.
   bool goBack(std::vector<ViewState>& from, std::vector<ViewState>& to);
   std::string pictureKey() const;
+  /// True if the frame shows `preview_` in place of a picture of the field.
+  bool showsPreview() const { return work && !session_.hasField() && !preview_.isEmpty(); }
+  /// The domain of the picture that is shown, and the field in it. While there is only a mesh, there is no field.
+  const Box& shownDomain() const;
+  const Field& shownField() const;
+  void perform(const std::string& line);
+  void drawPreview(int shrink);
   /// Returns the `build` parameters that made the current field, as far as the field's metadata record them.
   std::map<std::string, std::string> settingsOfField() const;
   void removeWithoutEffect(std::map<std::string, std::string>& settings) const;
@@ -130,6 +150,7 @@ class Explorer final : public SessionExtension {
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settlePanels();
   void inputWhileWorking(const Input& event);
+  void runOnPreview(const std::string& line);
   std::optional<std::string> canvasCommand(const Input& event);
   std::optional<std::string> clickCommand();
   std::string wheelCommand(double notches) const;
@@ -166,6 +187,7 @@ class Explorer final : public SessionExtension {
   std::optional<JumpKind> worstBy_;  ///< kind of jump by which `worst_` is sorted
   bool worstOnSurface_ = false;      ///< `worst_` has only interfaces at the surface
 
+  BuildPreview preview_;
   std::optional<render::Drawn> picture_;
   std::optional<render::Drawn> beside_;  ///< picture of the second field, beside the current one
   std::vector<render::Image> shown_;     ///< images of picture_ and beside_

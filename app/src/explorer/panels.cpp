@@ -17,14 +17,19 @@ void section(const Controls& controls, const ViewState& view, Panel panel, const
   content();
 }
 
+void nextTo(float space) { ImGui::SameLine(0, space); }
+
+void drawKinds(const Controls& controls, const ViewState& view) {
+  if (controls.ui.button("bar/surface", "surface", !view.slice)) controls.commands.emplace_back("show surface");
+  nextTo(2);
+  if (controls.ui.button("bar/slice", "slice", view.slice)) controls.commands.emplace_back("show slice");
+}
+
 void drawBar(const Controls& controls, const Explorer& explorer) {
   Ui& ui = controls.ui;
   std::vector<std::string>& commands = controls.commands;
   const ViewState& view = explorer.view();
-  const auto nextTo = [](float space) { ImGui::SameLine(0, space); };
-  if (ui.button("bar/surface", "surface", !view.slice)) commands.push_back("show surface");
-  nextTo(2);
-  if (ui.button("bar/slice", "slice", view.slice)) commands.push_back("show slice");
+  drawKinds(controls, view);
   nextTo(24);
   for (std::size_t panel = 1; panel < kPanels; ++panel) {  // panel 0 is the bar itself, which needs no button
     const char* name = kPanelNames[panel];
@@ -114,7 +119,9 @@ void drawMark(const Explorer& explorer, const Layout& layout) {
 
 void drawReadout(Ui& ui, Explorer& explorer) {
   if (const auto& work = explorer.work) {
-    ui.text(fmt::format("{} {:.0f} %", work->task, std::floor(100 * work->fraction)));
+    std::string line = fmt::format("{} {:.0f} %", work->task, std::floor(100 * work->fraction));
+    if (work->forecast) line += "   " + forecastText(*work->forecast);
+    ui.text(line);
     if (work->cancellable) ui.text("Escape: cancel", true);
     return;
   }
@@ -163,6 +170,19 @@ void drawExplanation(const Explorer& explorer, const Layout& layout) {
   list.PopClipRect();
 }
 
+/// Draws the panels while the first field is on its way: its progress and, once there are cells, the buttons that show
+/// its surface or a slice.
+void drawPanelsWithoutField(const Controls& controls, Explorer& explorer, const Layout& layout) {
+  Ui& ui = controls.ui;
+  if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
+  if (layout.bar.width() > 0 && explorer.showsUnfinished()) {
+    ui.freeze(false);
+    ui.column("bar", layout.bar, {}, [&] { drawKinds(controls, explorer.view()); });
+    ui.freeze(true);
+  }
+  ui.addArea("canvas", layout.canvas);
+}
+
 }  // namespace
 
 void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) {
@@ -175,10 +195,7 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
     const double now = ui.column(name, rect, scroll, content);
     if (std::abs(now - scroll) > 0.5) commands.push_back(fmt::format("panel {}-scroll={}", name, now));
   };
-  if (explorer.work && !explorer.session().hasField()) {  // the first field is on its way: there is only its progress
-    if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
-    return;
-  }
+  if (explorer.work && !explorer.session().hasField()) return drawPanelsWithoutField(controls, explorer, layout);
   if (layout.bar.width() > 0) ui.column("bar", layout.bar, {}, [&] { drawBar(controls, explorer); });
   scrolling("left", layout.left, view.scroll[0], [&] {
     section(controls, view, Panel::view, view.slice ? "Slice" : "Surface", [&] { drawViewPanel(controls, explorer); });

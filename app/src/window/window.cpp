@@ -27,6 +27,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kPollSeconds = 0.2;     // longest wait for an event, because Ctrl-C does not end a wait
 constexpr double kRestSeconds = 0.06;    // time without an event after which a slow picture is drawn in full
+constexpr double kStillSeconds = 0.3;    // the same while work runs, which full pictures would slow down
 constexpr double kSmoothSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
 constexpr int kLeastSize = 64, kGreatestSize = 8192;  // range of frame sizes, pixels
 
@@ -161,8 +162,8 @@ class Window {
     const auto size = screen_.size().value_or(std::array{options.width, options.height});
     const std::string show = fmt::format("show size={}x{} {}", size[0], size[1], backendText(options.backend));
     explorer_.run(show);
-    openField(options.opening);
     recording_.emplace(explorer_, std::vector{options.opening});
+    openField(options.opening);
     explorer_.run(show);
   }
 
@@ -318,6 +319,7 @@ class Window {
 
   /// Shows in the window's title what the field is and how wrong it is.
   void showTitle() {
+    if (!explorer_.session().hasField()) return;
     const CurrentField& current = explorer_.session().current();
     const std::string title = fmt::format("{} - {} - hpsdf", current.name, estimateLine(current.field));
     if (title != title_) glfwSetWindowTitle(screen_.window(), title.c_str());
@@ -329,21 +331,22 @@ class Window {
     showTitle();
     const bool slow = roughly && fullSeconds_ > kSmoothSeconds;
     const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kSmoothSeconds))), 2, 4) : 1;
-    const bool measures = explorer_.isStale() && shrink == 1;
+    // The pictures of a growing field may all be rough, so that their time in full is estimated.
+    const bool measures = explorer_.redraws(shrink) && (shrink == 1 || explorer_.showsUnfinished());
     const auto start = Clock::now();
     const render::Image image = frame(shrink);
-    if (measures) fullSeconds_ = std::chrono::duration<double>(Clock::now() - start).count();
+    if (measures) fullSeconds_ = shrink * shrink * std::chrono::duration<double>(Clock::now() - start).count();
     screen_.show(image);
   }
 
   /// Loads or builds the field. The window is there at once and shows the progress; closing it or Escape cancels the
   /// work.
   void openField(const std::string& opening) {
-    explorer_.work = Explorer::Work{"opening", 0, true};
+    explorer_.work = Explorer::Work{.task = "opening", .cancellable = true};
     screen_.show(explorer_.frame());
     explorer_.work.reset();
     try {
-      explorer_.run(opening);
+      explorer_.open(opening);
     } catch (const Error& error) {
       throw Error(withoutPosition(error.what()));
     }
@@ -361,10 +364,12 @@ class Window {
         explorer_.input(*event);
       else
         later.emplace_back();
+      lastInput_ = Clock::now();
     }
     events_ = std::move(later);
     if (ended()) explorer_.cancelWanted = true;
-    screen_.show(explorer_.frame());
+    const bool isMoving = std::chrono::duration<double>(Clock::now() - lastInput_).count() < kStillSeconds;
+    draw(isMoving || explorer_.showsUnfinished());
   }
 
   /// Ends the user's gestures and records the pointer's position, so that the recording leads to the present
@@ -389,9 +394,10 @@ class Window {
   Explorer& explorer_;
   Screen screen_;
   LiveWork work_;
-  std::optional<Recording> recording_;       ///< begins once there is a field
+  std::optional<Recording> recording_;       ///< begins with the line that makes the field
   std::deque<std::optional<Input>> events_;  ///< waiting events; std::nullopt asks for a screenshot
   bool damaged_ = false;                     ///< true if the desktop has lost the window's content
+  Clock::time_point lastInput_ = {};         ///< time of the last event that was handled while work ran
   std::string title_ = {};                   ///< title of the window; empty before the first frame
   double fullSeconds_ = 0;                   ///< time that the last picture in full resolution took
 };

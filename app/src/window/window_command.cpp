@@ -45,7 +45,8 @@ void addWindowCommand(Registry& registry) {
       .summary = "Look at a field in a window: turn it, cut it, colour it, build it anew.",
       .help = paragraphs(R"(
 FIELD is a field's file (*.hpsdf), or what 'build' takes: a mesh, builtin:SHAPE or analytic:SHAPE, from which a field is
-built with the default settings first; the window shows the progress, and closing it cancels the construction.
+built with the default settings first. Meanwhile the window shows the progress, the mesh and then the field as it grows,
+its surface or a slice, which the mouse turns and moves; closing the window cancels the construction.
 
 Mouse over the picture: drag to turn the surface or move the slice, drag with the right button to move the surface,
 wheel to go nearer or farther, hover to read out what is there. In the panels: Ctrl+click a slider to type its number,

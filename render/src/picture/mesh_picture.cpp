@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,6 +40,17 @@ class Normalization {
   }
 
   Vector3 operator()(const Vector3& point) const { return (point - middle_) / unit_; }
+
+  Box operator()(const Box& box) const { return Box((*this)(box.min()), (*this)(box.max())); }
+
+  /// Throws `Error` if the camera's target is too far away.
+  OrbitCamera operator()(OrbitCamera camera) const {
+    if (!camera.target) return camera;
+    camera.target = (*this)(*camera.target);
+    if (!(camera.target->cwiseAbs().maxCoeff() <= kFarthest))
+      throw Error("the camera's target is too far from the mesh: give a point nearer to it");
+    return camera;
+  }
 
   TriangleMesh operator()(TriangleMesh mesh) const {
     for (Vector3& vertex : mesh.vertices) vertex = (*this)(vertex);
@@ -118,10 +130,7 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   const Normalization normalized(boundingBox(mesh));
   const TriangleMesh normalizedMesh = normalized(mesh);
   const auto renderer = make({normalizedMesh});
-  OrbitCamera orbit = picture.camera;
-  if (orbit.target) orbit.target = normalized(*orbit.target);
-  if (orbit.target && !(orbit.target->cwiseAbs().maxCoeff() <= kFarthest))
-    throw Error("the camera's target is too far from the mesh: give a point nearer to it");
+  OrbitCamera orbit = normalized(picture.camera);
   const Box box = renderer->bounds({&body, 1}), domain = domainAround(box);
   if (picture.whole) orbit = nearestForWhole(normalizedMesh.vertices, orbit, domain, width, height);
   const Camera camera = startingBefore(box, cameraOf(orbit, domain, width, height));
@@ -149,6 +158,21 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   addCaption(overlay, frame, mesh.name, details);
   paint(image, overlay);
   return image;
+}
+
+DrawView meshView(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Box& domain) {
+  const Normalization normalized(domain);
+  const std::shared_ptr<BodyRenderer> renderer = make({normalized(mesh)});
+  return [normalized, renderer, domain = normalized(domain)](const OrbitCamera& orbit, int width, int height) {
+    checkPictureSize(width, height, 1);
+    const Body body;
+    const Camera camera =
+        startingBefore(renderer->bounds({&body, 1}), cameraOf(normalized(orbit), domain, width, height));
+    ViewBuffers buffers = emptyBuffers(width, height, true);
+    addBodies(renderer->view(camera, {&body, 1}, width, height), buffers);
+    const LinearColor clay = decodeSrgb(surfaceColor());
+    return colorSurface(buffers, camera, {}, Sampling{}, 0, {}, {&clay, 1});
+  };
 }
 
 }  // namespace hpsdf::render

@@ -89,6 +89,15 @@ class Construction {
     return reader.has_value();
   }
 
+  /// From now on, offers the field of the present state after each round of refinements.
+  void offerTo(const OfferField& offer) {
+    if (!offer) return;
+    observer_.atWholeState = [this, &offer] {
+      if (state_.stage != ConstructionState::Stage::fitFirstCells && hasMemoryForAnother())
+        offer([this] { return fieldSoFar(); });
+    };
+  }
+
   std::uint64_t steps() const { return state_.steps; }
 
   void grow(const std::function<void(std::uint64_t)>& afterStep = {}) {
@@ -124,6 +133,24 @@ class Construction {
     if (options.bounds) field.metadata.exactEvaluations += findBounds(field, setup_.distance, setup_.progress);
     ownEvaluations_ += fitter_.evaluations() - before;
     return field;
+  }
+
+  /// Returns the field of the present state, as it would be if no stages followed the refinement.
+  Field fieldSoFar() const {
+    FieldData field = layOut(state_.tree, metadata(sumOfErrors(state_.tree)), setup_.distance.triangleSearch());
+    roundCoefficients(CoefficientType::float32, field);
+    field.blend = setup_.options.blend;
+    return Field(std::move(field));
+  }
+
+  /// Returns true if twice the octree would not exceed the allowed memory.
+  bool hasMemoryForAnother() const {
+    try {
+      refiner_.requireMemory(2);
+      return true;
+    } catch (const MemoryLimitError&) {
+      return false;
+    }
   }
 
   void prune(BuildTree& tree) const {
@@ -193,13 +220,14 @@ class Construction {
 
 void checkBuild(const Box& domain, const BuildOptions& options) { checkOptions(domain, options); }
 
-Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
-            const Progress& progress) {
+Field build(const DistanceFunction& distance, const Box& domain, const BuildOptions& options, const Progress& progress,
+            const OfferField& offer) {
   checkOptions(domain, options);
   return Field(withThreads(options.threads, [&] {
     if (options.tolerance > 0) return buildWithinTolerance(distance, domain, options, progress);
     const BuildOptions settings = settled(options, distance, domain, progress);
     Construction construction(distance, domain, settings, progress);
+    construction.offerTo(offer);
     construction.grow();
     return construction.finish();
   }));

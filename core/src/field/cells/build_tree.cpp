@@ -90,7 +90,10 @@ ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, Coeffic
   return size;
 }
 
-FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search) {
+/// Does what `layOut` does. Calls release(n) once the fit of the node with number n has been copied.
+template <typename Release>
+static FieldData layOutTree(const BuildTree& tree, FieldMetadata metadata, const TriangleSearch* search,
+                            const Release& release) {
   FieldData data;
   data.domain = tree.domain;
   data.grid = tree.grid;
@@ -110,16 +113,16 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch*
     while (!stack.empty()) {
       const Pair pair = stack.back();
       stack.pop_back();
-      BuildNode& node = tree.nodes[pair.from];
+      const BuildNode& node = tree.nodes[pair.from];
       if (node.firstChild == 0 && node.fit.isExact()) {
         data.nodes[pair.to] = node::exactLeaf(node.fit.sign.rule, packer->pack(node.fit.list, node.fit.sign));
-        node.fit = Fit{};
+        release(pair.from);
         continue;
       }
       if (node.firstChild == 0) {
         data.nodes[pair.to] = node::leaf(node.fit.degree, static_cast<std::uint32_t>(coefficients.size()));
         coefficients.insert(coefficients.end(), node.fit.coefficients.begin(), node.fit.coefficients.end());
-        node.fit = Fit{};
+        release(pair.from);
         continue;
       }
       data.nodes[pair.to] = node::internal(nextGroup);
@@ -132,6 +135,14 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch*
   if (packer) data.exact = packer->finish();
   data.metadata = std::move(metadata);
   return data;
+}
+
+FieldData layOut(const BuildTree& tree, FieldMetadata metadata, const TriangleSearch* search) {
+  return layOutTree(tree, std::move(metadata), search, [](std::uint32_t) {});
+}
+
+FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search) {
+  return layOutTree(tree, std::move(metadata), search, [&](std::uint32_t n) { tree.nodes[n].fit = Fit{}; });
 }
 
 void roundCoefficients(CoefficientType type, FieldData& field) {

@@ -67,8 +67,9 @@ double bytesOf(const TriangleList& list);
 ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, CoefficientType type);
 
 /// Copies the nodes and coefficients into the arrays of a field, depth first, so that neighbours in space are
-/// neighbours in memory. The coefficients remain double. Destroys the tree.
+/// neighbours in memory. The coefficients remain double. Frees the memory of a temporary tree as it goes on.
 /// `search` provides the triangles of exact leaves; it may be nullptr if there are none.
+FieldData layOut(const BuildTree& tree, FieldMetadata metadata, const TriangleSearch* search);
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search);
 
 /// Rounds the coefficients of a field, and the vertices of its exact leaves, from double to `type`. Vertices that are

@@ -34,4 +34,13 @@ using MakeBodyRenderer = std::function<std::unique_ptr<BodyRenderer>(std::vector
 Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const MeshDefects& defects,
                const MeshPicture& picture);
 
+/// A function that draws a bare view, `width` × `height` pixels, from a camera.
+using DrawView = std::function<Image(const OrbitCamera& camera, int width, int height)>;
+
+/// Returns a function that draws views of a mesh in the way in which bare pictures show the surface of a field over
+/// `domain`: clay-coloured, and with the camera relative to this domain. Thus the mesh can stand for its field while
+/// that is built. The mesh is passed to `make` once, moved and scaled as for `drawMesh`. Throws `Error` as `make` does;
+/// the returned function throws `Error` if a size or the camera is out of range.
+DrawView meshView(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Box& domain);
+
 }  // namespace hpsdf::render
