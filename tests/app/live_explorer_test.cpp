@@ -372,7 +372,7 @@ TEST(LiveWork, tellsTheForecast) {
   });
   ASSERT_TRUE(told);
   EXPECT_EQ(told->seconds, 30);
-  EXPECT_EQ(forecastText(*told), "the field will take about 1.00 MB and 30 s");
+  EXPECT_EQ(forecastText(*told), "the field will take about 1.00 MB and about 30 s");
 }
 
 TEST(LiveWork, escapeCancelsWhileThePanelIsClosed) {

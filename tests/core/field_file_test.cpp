@@ -181,7 +181,8 @@ std::string withChecksum(std::string bytes) {
 }
 
 constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8,
-                      kSinceVersion7 = 8 + 4 + 8 + 8 + 8 + 1 + 4 + 4 * 8 + 8;  // bytes that versions 3, 4 and 7 added
+                      kSinceVersion8 =
+                          8 + 4 + 8 + 8 + 8 + 1 + 1 + 1 + 8 + 4 + 4 * 8 + 8;  // bytes that versions 3, 4 and 8 added
 
 /// Older files end their headers earlier: version 4 before settings and sizes of exact leaves, the tolerance and the
 /// number of measured points, version 3 before the inside test, version 2 before the settings that follow the number of
@@ -197,14 +198,14 @@ TEST(FieldFile, filesOfOlderVersionsAreRead) {
   const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
   bytes[8] = 4;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion7, kSinceVersion7)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion8, kSinceVersion8)));
   EXPECT_EQ(load(file).metadata().source.insideTest, field.metadata().source.insideTest);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
   bytes[8] = 3;
-  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion7 - kSinceVersion4, kSinceVersion4)));
+  writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion8 - kSinceVersion4, kSinceVersion4)));
   EXPECT_EQ(load(file).metadata().measuredError, field.metadata().measuredError);
   EXPECT_EQ(load(file).data().nodes, field.data().nodes);
-  const std::size_t sinceSteps = nodes - kSinceVersion7 - kSinceVersion4 - kSinceVersion3;
+  const std::size_t sinceSteps = nodes - kSinceVersion8 - kSinceVersion4 - kSinceVersion3;
   bytes[8] = 2;
   writeAll(file, withChecksum(bytes.erase(sinceSteps, kSinceVersion3)));
   EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
@@ -280,6 +281,9 @@ TEST(FieldFile, continuityAndBoundsAreKept) {
   data.metadata.settings.tolerance = 0.001;
   data.metadata.settings.within = 0.25;
   data.metadata.settings.certified = true;
+  data.metadata.settings.cubature = CubatureKind::product;
+  data.metadata.settings.trialSamples = TrialSamples::own;
+  data.metadata.settings.maxBytes = 5'000'000'000;
   data.metadata.source.insideTest = InsideTest::shell;
   data.metadata.source.thickness = 0.125;
   save(Field(data), file);
@@ -300,6 +304,9 @@ TEST(FieldFile, continuityAndBoundsAreKept) {
   EXPECT_EQ(again.metadata().settings.tolerance, 0.001);
   EXPECT_EQ(again.metadata().settings.within, 0.25);
   EXPECT_TRUE(again.metadata().settings.certified);
+  EXPECT_EQ(again.metadata().settings.cubature, CubatureKind::product);
+  EXPECT_EQ(again.metadata().settings.trialSamples, TrialSamples::own);
+  EXPECT_EQ(again.metadata().settings.maxBytes, 5'000'000'000) << "more than 32 bits hold";
 }
 
 /// Invalid blend widths, bounds and settings are refused even if the checksum is right.
@@ -313,7 +320,7 @@ TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   const std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(data.coefficients).size(), count = data.nodes.size();
   const std::size_t bounds = bytes.size() - 8 - 8 * count,
-                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion7;
+                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion8;
   const auto refused = [&](std::size_t at, auto value) {
     std::string forged = bytes;
     std::memcpy(&forged[at], &value, sizeof(value));
