@@ -177,7 +177,10 @@ TEST_F(Accuracy, aDifferentMeshIsRefusedUnlessAskedFor) {
 TEST_F(Accuracy, aMeshThatIsNotKnownIsAskedFor) {
   std::ofstream(at("t.off")) << "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
   ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("t.hpsdf"), "--target-error", "1e-2", "--grid", "2"}).status, 0);
-  EXPECT_THAT(runHere({"verify", at("t.hpsdf")}).err, HasSubstr("give MESH, t.off"));
+  std::filesystem::create_directory(at("alone"));
+  std::filesystem::copy(at("t.hpsdf"), at("alone"));
+  EXPECT_THAT(runHere({"verify", at("alone/t.hpsdf")}).err, HasSubstr("give MESH, t.off"));
+  EXPECT_EQ(runHere({"verify", at("t.hpsdf"), "--points", "1000"}).status, kExitDone) << "the mesh lies beside it";
   EXPECT_EQ(runHere({"verify", at("t.hpsdf"), at("t.off"), "--points", "1000"}).status, kExitDone);
   // A field of a normalized mesh is compared with the normalized mesh.
   ASSERT_EQ(runHere({"build", at("t.off"), "-o", at("n.hpsdf"), "--target-error", "1e-2", "--grid", "2", "--normalize"})

@@ -152,7 +152,9 @@ TEST_F(Continuity, boundsRequireTheFieldsOwnMesh) {
   };
   build("t.obj", "t.hpsdf");
   build("open.obj", "open.hpsdf");
-  expectRefused({{"bounds", at("t.hpsdf"), "-o", at("b.hpsdf")}}, "give MESH, t.obj");
+  fs::create_directory(at("alone"));
+  fs::copy(at("t.hpsdf"), at("alone"));
+  expectRefused({{"bounds", at("alone/t.hpsdf"), "-o", at("b.hpsdf")}}, "give MESH, t.obj");
   expectRefused({{"bounds", at("t.hpsdf"), "builtin:gear", "-o", at("b.hpsdf")}},
                 "was made from t.obj, not from builtin:gear; give that mesh");
   expectRefused({{"bounds", at("t.hpsdf"), at("none.obj"), "-o", at("b.hpsdf")}}, "none.obj");

@@ -109,6 +109,7 @@ const std::multimap<std::string, std::string> kTrials = {
      "study table builtin:box strategy=hpx target-error=1e-2 grid=3 points=100 cpu=$cpu output=$out/table; "
      "study continuity builtin:box strategy=hpx target-error=1e-2 grid=3 points=100 weights=1 output=$out/continuity; "
      "study tradeoff builtin:box strategy=hpx target-errors=1e-2 grid=3 points=100 output=$out/tradeoff"},
+    {"why", "why point=0.3,0,0.2 json=true; expect why(0.3,0,0.2).agrees == 1"},
     {"run", "run execute=\"info $field\""},
 };
 

@@ -198,6 +198,8 @@ TEST(Explorer, aClickExplainsTheCell) {
   EXPECT_FALSE(same(before, bench.explorer().frame())) << "the picture shows the reasons";
   bench.run("ui drag canvas 40,0");
   EXPECT_FALSE(bench.session.explanation()) << "a drag shows something else, and explains nothing";
+  bench.run("why point=0.7,0,0; undo");
+  EXPECT_FALSE(bench.session.explanation()) << "so does undo";
   EXPECT_EQ(bench.failure("why point=0.7,0,0; expect why(0.7,0,0).agrees == 1"), "nothing failed");
 }
 

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/detail/random_points.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
 
@@ -99,7 +101,9 @@ TEST_P(ReplayTest, arrivesAtTheLeavesOfTheField) {
   const TriangleMesh mesh = loadMesh(GetParam().shape);
   const ExactDistance distance(mesh);
   const Field field = build(distance, domainAround(mesh), GetParam().options);
-  for (const Vector3& x : kPlaces) {
+  std::vector<Vector3> places = kPlaces;
+  for (std::uint64_t i = 0; i < 25; ++i) places.push_back(detail::Random(5, i).inBox(field.domain()));
+  for (const Vector3& x : places) {
     const CellHistory history = cellHistory(field, distance, x);
     EXPECT_TRUE(history.agrees) << x.transpose();
     EXPECT_EQ(history.steps.back().degree, history.cell.degree) << x.transpose();
@@ -113,6 +117,24 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"optimal",
              "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
              {.targetError = 1e-7, .grid = {3, 3, 3}, .criterion = Criterion::optimal}},
+        Case{"optimalWithExactLeaves",
+             "builtin:gear,teeth=5,segments=2",
+             {.targetError = 1e-6, .grid = {3, 3, 3}, .criterion = Criterion::optimal, .strategy = Strategy::hpx}},
+        Case{"optimalWithinBytes",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 0, .grid = {3, 3, 3}, .maxBytes = 30'000, .criterion = Criterion::optimal}},
+        Case{"optimalEnriched",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-6, .grid = {3, 3, 3}, .criterion = Criterion::optimal, .enrich = true}},
+        Case{"enrichedWithExactLeaves",
+             "builtin:gear,teeth=5,segments=2",
+             {.targetError = 1e-6, .grid = {3, 3, 3}, .strategy = Strategy::hpx, .enrich = true}},
+        Case{"maxErrorCutOffBySteps",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-4, .grid = {2, 2, 2}, .maxError = 2e-3, .maxDepth = 4, .maxSteps = 60}},
+        Case{"maxErrorCutOffByBytes",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.targetError = 1e-4, .grid = {2, 2, 2}, .maxError = 2e-3, .maxBytes = 60'000, .maxDepth = 4}},
         Case{"maxError",
              "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
              {.targetError = 1e-4, .grid = {2, 2, 2}, .maxError = 5e-3, .maxDepth = 4}},
@@ -162,6 +184,29 @@ TEST(CellHistory, comparesWhatTheConstructionCompared) {
     }
   EXPECT_GT(raised, 0U);
   EXPECT_GT(divided, 0U);
+}
+
+TEST(CellHistory, refusesFieldsThatWereChanged) {
+  const TriangleMesh mesh = loadMesh("builtin:box");
+  const ExactDistance distance(mesh);
+  const Field field = build(distance, domainAround(mesh), {.grid = {3, 3, 3}, .tolerance = 0.05});
+  EXPECT_TRUE(cellHistory(field, distance, Vector3::Zero()).agrees);
+  EXPECT_THROW(cellHistory(blended(field), distance, Vector3::Zero()), Error);
+}
+
+TEST(CellHistory, rejectsWhatIsNotWithinTheTolerance) {
+  const TriangleMesh mesh = loadMesh("builtin:torus,major=0.7,minor=0.25,segments=24,sides=12");
+  const ExactDistance distance(mesh);
+  const Field field = build(distance, domainAround(mesh), {.grid = {2, 2, 2}, .tolerance = 0.02});
+  std::size_t rejected = 0, taken = 0;
+  for (const Vector3& x : kPlaces)
+    for (const CellStep& step : cellHistory(field, distance, x).steps) {
+      if (!step.degreeTrial) continue;
+      EXPECT_EQ(step.degreeTrial->isRejected, step.degreeTrial->error > 0.93) << step.degreeTrial->error;
+      ++(step.degreeTrial->isRejected ? rejected : taken);
+    }
+  EXPECT_GT(rejected, 0U);
+  EXPECT_GT(taken, 0U);
 }
 
 TEST(CellHistory, refusesPlacesOutside) {

@@ -105,6 +105,7 @@ bool Explorer::goBack(std::vector<ViewState>& from, std::vector<ViewState>& to) 
   if (from.empty()) return false;
   to.push_back(std::exchange(view_, withFrameOf(view_, from.back())));
   from.pop_back();
+  session_.setExplanation({});
   return true;
 }
 
@@ -113,7 +114,8 @@ BuildOptions rebuildOptions(const Field& field) {
   const FieldMetadata& metadata = field.metadata();
   if (metadata.hasEstimate()) {
     // If the construction had no target error, use the error that the field reached as the target.
-    if (built.targetError.isNone() && !(built.maxError > 0) && !built.maxBytes) built.targetError = metadata.totalError;
+    if (built.targetError.isNone() && !(built.maxError > 0)) built.targetError = metadata.totalError;
+    built.maxBytes.reset();  // no control shows it, and it would keep a smaller target error from having an effect
     return built;
   }
   if (hasTolerance(field)) return built;
@@ -394,6 +396,11 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
 std::optional<std::string> Explorer::clickCommand() {
   const std::optional<Readout> at = readout();
   if (!at || !session_.current().field.domain().contains(at->pick.position)) return std::nullopt;
+  if (!session_.knowsSurface()) {
+    message = "Why this cell is as it is can be told only beside its mesh, " + session_.current().madeFrom() +
+              ": open the field in the folder of the mesh.";
+    return std::nullopt;
+  }
   return "why point=" + vectorWord(at->pick.position);
 }
 

@@ -154,19 +154,23 @@ void drawExplanation(const Explorer& explorer, const Layout& layout) {
   const auto& explained = explorer.session().explanation();
   if (!explained || layout.canvas.width() < 16) return;
   constexpr float kPad = 8, kAxes = 74;
-  const float lineHeight = ImGui::GetTextLineHeightWithSpacing();
+  const float most = float(layout.canvas.width()) - 4 * kPad;
   float width = 0;
-  for (const std::string& line : explained->lines) width = std::max(width, widthOf(line));
+  std::string text;
+  for (const std::string& line : explained->lines) {
+    width = std::max(width, std::min(widthOf(line), most));
+    text += (text.empty() ? "" : "\n") + line;
+  }
+  const float height = ImGui::CalcTextSize(text.c_str(), nullptr, false, width + 1).y;
   const float x = float(layout.canvas.x0) + kPad + 4;
   const float bottom = float(layout.canvas.y1) - kAxes;
-  const float top = bottom - lineHeight * float(explained->lines.size());
+  const float top = bottom - height;
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   list.PushClipRect({float(layout.canvas.x0), float(layout.canvas.y0)},
                     {float(layout.canvas.x1), float(layout.canvas.y1)});
   list.AddRectFilled({x - kPad, top - kPad}, {x + width + kPad, bottom + kPad}, IM_COL32(250, 250, 248, 235), 3);
   list.AddRect({x - kPad, top - kPad}, {x + width + kPad, bottom + kPad}, kSoftInk, 3);
-  for (std::size_t i = 0; i < explained->lines.size(); ++i)
-    list.AddText({x, top + lineHeight * float(i)}, kInk, explained->lines[i].c_str());
+  list.AddText(ImGui::GetFont(), ImGui::GetFontSize(), {x, top}, kInk, text.c_str(), nullptr, width + 1);
   list.PopClipRect();
 }
 

@@ -38,6 +38,10 @@ std::string surfaceOf(const CurrentField& current, const char* asked) {
                           source.empty() ? "" : ", " + source));
 }
 
+bool findsSurface(const CurrentField& current) {
+  return !current.surface.empty() || isShape(current.field.metadata().source.name) || !meshBeside(current).empty();
+}
+
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
                    std::string_view otherwise) {
   if (reference.fieldIsMadeFromIt) return;

@@ -18,6 +18,9 @@ Parameter surfaceParameter();
 /// the message then asks the user for the argument `asked`.
 std::string surfaceOf(const CurrentField& current, const char* asked = "MESH");
 
+/// Returns true if `surfaceOf` finds the surface.
+bool findsSurface(const CurrentField& current);
+
 /// Throws `Error` if the current field was not made from `surface`. `reference` holds the data of `surface`.
 /// The error message ends with the text `otherwise`.
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,

@@ -74,7 +74,10 @@ const DistanceFunction& Session::exact(const std::string& surface) {
   return *exactOfArgument_;
 }
 
+bool Session::knowsSurface() const { return reference_ || findsSurface(current()); }
+
 const ReferenceSurface& Session::referenceSurface(const std::string& surface) {
+  if (surface.empty() && reference_) return *reference_;
   const std::string name = surface.empty() ? surfaceOf(current(), "mesh") : surface;
   if (!reference_ || name != referenceName_) {
     auto reference = std::make_unique<const ReferenceSurface>(

@@ -70,8 +70,11 @@ class Session {
   /// holds, takes the surface of the previous call. Throws `Error` if no surface is known or if it cannot be read.
   const DistanceFunction& exact(const std::string& surface);
   /// Returns the surface from which the current field was made, and keeps it for later calls. If `surface` is empty,
-  /// finds it as `surfaceOf` does. Throws `Error` for another surface, and if it cannot be read.
+  /// takes that of the previous call, or finds it as `surfaceOf` does. Throws `Error` for another surface, and if it
+  /// cannot be read.
   const ReferenceSurface& referenceSurface(const std::string& surface);
+  /// True if `referenceSurface` can be called with an empty `surface`.
+  bool knowsSurface() const;
   /// True if `exact` can be called with an empty `surface`.
   bool knowsExact() const;
   void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }

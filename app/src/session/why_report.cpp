@@ -106,8 +106,8 @@ std::string alignedRows(const std::vector<std::vector<std::string>>& rows) {
 }
 
 std::string refinementTable(const CellHistory& history) {
-  std::vector<std::vector<std::string>> rows = {
-      {"depth", "degree", "estimated", "measured", "greatest", "gain of degree", "of 8 children", "exact list", ""}};
+  std::vector<std::vector<std::string>> rows = {{"depth", "degree", "estimated RMS", "measured RMS", "greatest",
+                                                 "gain of degree, μ", "of 8 children, ν", "exact list", ""}};
   for (const CellStep& step : history.steps) {
     const auto gain = [](const std::optional<CellAlternative>& trial) { return trial ? trial->gain : std::nullopt; };
     rows.push_back({fmt::format("{}", step.depth), step.degree ? levelName(*step.degree) : "–",
@@ -121,19 +121,24 @@ std::string refinementTable(const CellHistory& history) {
   return alignedRows(rows);
 }
 
+/// Returns the error of a polynomial over the allowed one, and whether the polynomial was rejected for it.
+std::string polynomialErrorColumn(const CellStep& step) {
+  if (!step.degreeTrial) return "–";
+  return shortNumber(step.degreeTrial->error) + (step.degreeTrial->isRejected ? ", rejected" : "");
+}
+
 std::string toleranceTable(const CellHistory& history) {
   std::vector<std::vector<std::string>> rows = {
-      {"depth", "edge", "polynomial", "error / allowed", "bytes", "list", "bytes", "8 children, bytes", ""}};
+      {"depth", "edge", "polynomial", "error / allowed", "its bytes", "list", "its bytes", "bytes of 8 children", ""}};
   for (const CellStep& step : history.steps) {
     const auto bytes = [](const std::optional<CellAlternative>& trial) {
       return trial ? grouped(static_cast<std::uint64_t>(trial->bytes)) : "–";
     };
     const bool isBound = step.choice == CellChoice::keep && step.octreeTrial;
     rows.push_back({fmt::format("{}", step.depth), shortNumber(step.box.sizes().maxCoeff()),
-                    step.trialDegree ? fmt::format("degree {}", *step.trialDegree) : "–",
-                    step.degreeTrial ? shortNumber(step.degreeTrial->error) : "–", bytes(step.degreeTrial),
-                    exactColumn(step), bytes(step.exactTrial), (isBound ? "≥ " : "") + bytes(step.octreeTrial),
-                    choiceName(step.choice)});
+                    step.trialDegree ? fmt::format("degree {}", *step.trialDegree) : "–", polynomialErrorColumn(step),
+                    bytes(step.degreeTrial), exactColumn(step), bytes(step.exactTrial),
+                    (isBound ? "≥ " : "") + bytes(step.octreeTrial), choiceName(step.choice)});
   }
   return alignedRows(rows);
 }
@@ -147,6 +152,8 @@ std::string windingText(double number) {
 
 std::string signText(const WhyReport& report) {
   const Source& source = report.field.metadata().source;
+  constexpr double kOnSurface = 1e-9;  // of the surface's size: what rounding leaves of a distance of 0
+  if (std::abs(report.exact) <= kOnSurface * report.field.metadata().referenceLength) return "on the surface";
   std::string text = report.exact < 0 ? "inside" : "outside";
   if (source.faces > 0) text += fmt::format(", by {}", insideTestName(source.insideTest));
   if (report.windingNumber) text += "; winding number " + windingText(*report.windingNumber);
@@ -166,24 +173,65 @@ std::string exactReason(const WhyReport& report) {
 
 std::string toleranceReason(const WhyReport& report) {
   const CellStep& last = report.history.steps.back();
+  if (last.isMissed)
+    return "No leaf within the tolerance was found, and smaller cells are not tried: the distance jumps here, or "
+           "changes "
+           "faster than the smallest cells can follow.";
   std::string text = exactReason(report);
   if (text.empty() && last.degreeTrial)
     text = fmt::format(
-        "The polynomial of degree {} is the lowest one within the tolerance: its greatest error is {} "
-        "of the allowed one.",
+        "The polynomial of degree {} is the lowest one within the tolerance: its greatest error is {} of "
+        "the allowed one.",
         *last.trialDegree, shortNumber(last.degreeTrial->error));
   if (last.octreeTrial)
     text += fmt::format(" Eight children would take {} or more.",
                         countOf(static_cast<std::size_t>(last.octreeTrial->bytes), "byte", "bytes"));
-  else if (!text.empty())
-    text += " Eight children cannot take fewer bytes.";
   return text;
+}
+
+/// Returns the part of the field's weighted error that the leaf has, as a sentence.
+std::string shareText(const WhyReport& report) {
+  const double total = report.field.metadata().totalError;
+  if (!(total > 0)) return "";
+  return fmt::format(" This cell has {} % of it.", shortNumber(100 * report.history.steps.back().weighted / total));
+}
+
+/// Returns the reason for which the refinement by errors ended.
+std::string endReason(const WhyReport& report) {
+  const FieldMetadata& metadata = report.field.metadata();
+  const BuildOptions& settings = metadata.settings;
+  const std::string target = shortNumber(settings.targetError.weighted()), total = shortNumber(metadata.totalError);
+  const bool hasTarget = !settings.targetError.isNone();
+  // Weak continuity and a final rise of all degrees change the error after the refinement.
+  if (settings.continuityWeight && hasTarget)
+    return fmt::format(
+        "The refinement ended at the target error τ = {}. Weak continuity changed the polynomials of all "
+        "cells afterwards; the errors above are those before.",
+        target);
+  if (settings.enrich && hasTarget)
+    return fmt::format("The refinement ended at the target error τ = {}. Then all degrees were raised by one (enrich).",
+                       target);
+  // For errors near the surface and far from it, the error that was reached is stored as the target.
+  if (hasTarget && metadata.totalError == settings.targetError.weighted())
+    return fmt::format(
+        "The refinement ended because the errors near the surface and far from it (near-error, far-error) "
+        "were reached, at the weighted error {} of all cells together.{}",
+        total, shareText(report));
+  if (hasTarget && metadata.totalError < settings.targetError.weighted())
+    return fmt::format(
+        "The refinement ended because the weighted error of all cells together, {}, had fallen below the "
+        "target τ = {}.{}",
+        total, target, shareText(report));
+  const std::string limit = settings.maxBytes
+                                ? fmt::format("The limit of {} bytes (max-bytes)", grouped(*settings.maxBytes))
+                                : "A limit of steps (max-steps)";
+  return fmt::format("{} ended the refinement, at the weighted error {} of all cells together.{}", limit, total,
+                     shareText(report));
 }
 
 std::string refinementReason(const WhyReport& report) {
   const CellHistory& history = report.history;
-  const FieldMetadata& metadata = report.field.metadata();
-  const BuildOptions& settings = metadata.settings;
+  const BuildOptions& settings = report.field.metadata().settings;
   const CellStep& last = history.steps.back();
   if (std::string text = exactReason(report); !text.empty()) return text;
   if (last.stage == CellStage::exactLeaves)
@@ -191,29 +239,19 @@ std::string refinementReason(const WhyReport& report) {
         "The polynomial stands for the triangles of the cell, with an error of at most {} times the "
         "longest side (exact-tolerance).",
         shortNumber(settings.exactTolerance));
-  if (last.stage == CellStage::pruning)
-    return "The refinement went at least as far as this. Pruning then kept the depth and the degree that cost the "
-           "fewest bytes for the error of the whole field.";
+  if (last.isOutsideBand) return "The cell lies outside the narrow band, where cells are not refined.";
+  if (settings.criterion == Criterion::optimal)
+    return fmt::format(
+        "The refinement went at least as far as this. Pruning then kept the depth and the degree that cost "
+        "the fewest bytes for the error of the whole field.{}",
+        settings.enrich ? " At the end, all degrees were raised by one (enrich)." : "");
   if (history.isAtLimit)
     return fmt::format("Depth and degree have reached their limits (max-depth {}, max-degree {}).", settings.maxDepth,
                        settings.maxDegree);
   if (last.stage == CellStage::maxError)
-    return fmt::format("The refinement for the maximum error ended here: {} is allowed.",
+    return fmt::format("The refinement for the maximum error ended here; {} is allowed.",
                        shortNumber(settings.maxError));
-  const double target = settings.targetError.weighted();
-  const std::string share =
-      metadata.totalError > 0
-          ? fmt::format(" This cell has {} % of it.", shortNumber(100 * last.weighted / metadata.totalError))
-          : "";
-  if (target > 0 && metadata.totalError <= target)
-    return fmt::format(
-        "The refinement ended because the weighted error of all cells together, {}, had fallen below "
-        "the target τ = {}.{}",
-        shortNumber(metadata.totalError), shortNumber(target), share);
-  return fmt::format(
-      "A limit of bytes or steps, or another goal than τ, ended the refinement at the weighted error {} "
-      "of all cells together.{}",
-      shortNumber(metadata.totalError), share);
+  return endReason(report);
 }
 
 std::string leafReason(const WhyReport& report) {
@@ -223,13 +261,19 @@ std::string leafReason(const WhyReport& report) {
   return isWithinTolerance(report) ? toleranceReason(report) : refinementReason(report);
 }
 
+/// Returns what the construction was asked for.
 std::string settingsLine(const WhyReport& report) {
   const BuildOptions& settings = report.field.metadata().settings;
   if (isWithinTolerance(report))
     return fmt::format("tolerance {}, within {} of the surface", shortNumber(settings.tolerance),
                        shortNumber(settings.within));
-  return fmt::format("target error τ = {}, strategy {}", shortNumber(settings.targetError.weighted()),
-                     settingText(buildSetting("strategy"), settings));
+  std::string text = "strategy " + settingText(buildSetting("strategy"), settings);
+  const bool wasGiven = report.field.metadata().totalError != settings.targetError.weighted();
+  if (!settings.targetError.isNone() && wasGiven)
+    text = fmt::format("target error τ = {}, {}", shortNumber(settings.targetError.weighted()), text);
+  if (settings.maxError > 0) text += ", maximum error " + shortNumber(settings.maxError);
+  if (settings.maxBytes) text += fmt::format(", at most {} bytes", grouped(*settings.maxBytes));
+  return text;
 }
 
 /// Breaks a text into lines of at most `width` bytes.
@@ -251,8 +295,8 @@ WhyReport whyAt(Session& session, const std::string& surface, const Vector3& x) 
   const CurrentField& current = session.current();
   const Box& domain = current.field.domain();
   if (!x.allFinite() || !domain.contains(x))
-    throw Error(
-        fmt::format("why: {} lies outside the field's domain, {}: give a point in it", vectorText(x), boxText(domain)));
+    throw Error(fmt::format("why: {} lies outside the field's domain, {}: give a point in it", vectorText(x, domain),
+                            boxText(domain)));
   const ReferenceSurface& reference = session.referenceSurface(surface);
   WhyReport report{.point = x,
                    .value = current.field.value(x),
@@ -265,6 +309,8 @@ WhyReport whyAt(Session& session, const std::string& surface, const Vector3& x) 
   report.history = withProgress(session.console(), [&](const Progress& progress) {
     return cellHistory(current.field, *reference.distance, x, progress);
   });
+  if (CellStep& last = report.history.steps.back(); report.history.agrees && last.measuredMax)
+    last.measuredMax = std::max(*last.measuredMax, std::abs(report.value - report.exact));
   if (reference.closest) report.nearest = reference.closest(x);
   if (reference.closest && current.field.metadata().source.insideTest != InsideTest::shell)
     report.windingNumber = windingNumber(reference.mesh, x);

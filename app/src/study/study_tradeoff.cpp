@@ -74,9 +74,27 @@ std::vector<std::string> partsOf(const std::string& text) {
   return parts;
 }
 
-/// Returns the range of target errors, the greatest first, or else the range of tolerances in their given order.
+/// Returns the range of tolerances in their given order.
+TradeoffRange rangeOfTolerances(const std::string& text) {
+  constexpr std::size_t kMost = 20;
+  const auto isTolerance = [](std::string value) {
+    if (value.ends_with('%')) value.pop_back();
+    const auto number = parseNumber(value);
+    return number && *number > 0;
+  };
+  TradeoffRange range{"tolerance", partsOf(text)};
+  if (range.values.empty() || range.values.size() > kMost || !std::ranges::all_of(range.values, isTolerance))
+    throw Error(
+        fmt::format("tolerances: expected 1 to {} lengths or percentages with commas between them, such as "
+                    "1%,0.5%, found '{}'",
+                    kMost, text));
+  return range;
+}
+
+/// Returns the range of target errors, the greatest first, or else that of tolerances.
 TradeoffRange rangeOf(const Arguments& arguments) {
-  if (!arguments.has("target-errors")) return {"tolerance", partsOf(arguments.text("tolerances"))};
+  if (!arguments.has("target-errors")) return rangeOfTolerances(arguments.text("tolerances"));
+  if (arguments.given("tolerances")) throw Error("tolerances and target-errors are two ranges: leave out one of them");
   std::vector<double> targets = arguments.numbers("target-errors");
   std::ranges::sort(targets, std::greater());
   targets.erase(std::unique(targets.begin(), targets.end()), targets.end());

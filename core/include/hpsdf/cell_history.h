@@ -38,8 +38,11 @@ struct CellAlternative {
   /// the greatest error that was found over the allowed error.
   double error = 0;
   /// Algorithm 1: the reduction of ε per byte of added coefficients (μ and ν; paper, eqs. 7 and 8), by which the
-  /// construction decides. It is missing for exact leaves and within a tolerance, where no gains are compared.
+  /// construction decides, unless one degree more suffices for `BuildOptions::maxError`. It is missing for exact leaves
+  /// and within a tolerance, where no gains are compared.
   std::optional<double> gain = {};
+  /// Within a tolerance: the polynomial's error is too great or, if that is certified, not proven to be small enough.
+  bool isRejected = false;
 };
 
 /// One decision of the construction, about the cell that held the point at that time.
@@ -55,6 +58,8 @@ struct CellStep {
   /// RMS and greatest error of that leaf at 1000 random points of the cell.
   std::optional<double> measuredRms = {}, measuredMax = {};
   double weighted = 0;          ///< weighted error ε of that leaf, at the scale of the target error τ
+  bool isOutsideBand = false;   ///< the cell lies outside the narrow band (`BuildOptions::band`)
+  bool isMissed = false;        ///< no leaf within the tolerance was found, and the cell is not divided further
   bool isWithoutError = false;  ///< the leaf is exact, or the plane in which all nearest triangles lie
   std::size_t triangles = 0;    ///< triangles in the list of an exact leaf
   bool listIsTooLong = false;   ///< more triangles can be nearest to points of the cell than a list may have
@@ -68,8 +73,8 @@ struct CellStep {
 struct CellHistory {
   Cell cell;                         ///< the leaf of the field
   std::vector<CellStep> steps = {};  ///< from the base cell to the leaf
-  /// The replayed construction arrived at a leaf with the box and the degree of `cell` and, unless the field was
-  /// smoothed afterwards, with the same polynomial or as many triangles.
+  /// The replayed construction arrived at a leaf with the box and the degree of `cell` and, unless the field is weakly
+  /// continuous, with the same polynomial or as many triangles.
   bool agrees = false;
   /// Further refinement was forbidden: by the limits of degree and depth.
   bool isAtLimit = false;
@@ -77,8 +82,8 @@ struct CellHistory {
 
 /// Repeats the construction of `field` for the one leaf that holds x: the decisions about a cell do not depend on other
 /// cells. When a refinement ends does depend on them; the replay therefore ends at the leaf of the field. `distance`
-/// must be the Φ from which the field was made. Throws `Error` if x lies outside the domain or is not finite, and
-/// `Cancelled` when `progress` says so.
+/// must be the Φ from which the field was made. Throws `Error` if x lies outside the domain or is not finite, and for a
+/// field that was changed after it was built within a tolerance. Throws `Cancelled` when `progress` says so.
 CellHistory cellHistory(const Field& field, const DistanceFunction& distance, const Vector3& x,
                         const Progress& progress = {});
 

@@ -176,14 +176,30 @@ class RefinementReplay {
     const Cell& cell = target_.cell();
     if (int(node.depth) != cell.depth) return false;
     if (node.fit.isExact() || target_.isExact()) return node.fit.isExact() && target_.isExact();
+    if (node.fit.isFinal) return node.fit.degree == cell.degree;
     // A pruned leaf has any degree up to that of the projection from which its last fit was made.
-    if (isPruned() && !node.fit.isFinal) return budget_.finalDegree(node.fit.cached.degree) >= cell.degree;
+    if (isPruned()) return budget_.finalDegree(node.fit.cached.degree) >= cell.degree;
     return budget_.finalDegree(node.fit.degree) == cell.degree;
+  }
+  /// Returns true if the refinement is known to have gone as far as this leaf. Which projection a pruned leaf was cut
+  /// from shows in its coefficients.
+  bool isFound(const BuildNode& node) const {
+    if (!reaches(node)) return false;
+    const bool isComparable = isPruned() && !node.fit.isFinal && !options_.enrich && !options_.continuityWeight;
+    return !isComparable || target_.holds(pruned(node.fit));
+  }
+  /// Returns the fit that pruning makes of a fit which reaches the leaf of the field.
+  Fit pruned(const Fit& fit) const {
+    const int degree = options_.enrich ? lowestWithFinal(target_.cell().degree) : target_.cell().degree;
+    Fit lowered;
+    lowered.degree = degree;
+    lowered.coefficients = basis::truncated(fit.cached.coefficients, fit.cached.degree, degree);
+    return lowered;
   }
   bool isBeyond(const BuildNode& node) const {
     const Cell& cell = target_.cell();
     if (int(node.depth) != cell.depth) return int(node.depth) > cell.depth;
-    return !target_.isExact() && node.fit.degree > cell.degree;
+    return !target_.isExact() && !isPruned() && node.fit.degree > cell.degree;
   }
 
   /// Makes the leaf after a refinement of `visited`. Returns std::nullopt if there is none on the way to the leaf of
@@ -214,7 +230,7 @@ class RefinementReplay {
     for (;;) {
       progress_.throwIfCancelled();
       way.push_back(tryRefinement(std::move(node)));
-      if (!grows || !way.back().trial || reaches(way.back().node) || isBeyond(way.back().node)) return way;
+      if (!grows || !way.back().trial || isFound(way.back().node) || isBeyond(way.back().node)) return way;
       if (isPruned() && dividesLeaf(way.back())) {
         // Of a divided cell, pruning knows the fit of the degree that was tried in place of the division.
         way.push_back({.node = nodeAt(target_.cell().depth, *way.back().trial->raised)});
@@ -233,13 +249,14 @@ class RefinementReplay {
   }
 
   /// Follows the pass for the maximum error. Returns an empty way if it does not lead to the leaf of the field.
-  std::vector<Visited> followProbes(BuildNode node) const {
+  /// `isCutOff` means that a limit ended the pass before all cells were refined.
+  std::vector<Visited> followProbes(BuildNode node, bool isCutOff) const {
     std::vector<Visited> way;
     for (;;) {
       progress_.throwIfCancelled();
       Probed probed = probe(refiner_, node);
       way.push_back({std::move(node), std::move(probed.trial), probed.raises, CellStage::maxError});
-      if (!way.back().trial) break;
+      if (!way.back().trial || (isCutOff && reaches(way.back().node))) break;
       std::optional<BuildNode> after = next(way.back());
       if (!after || isBeyond(*after)) return {};
       node = std::move(*after);
@@ -251,15 +268,7 @@ class RefinementReplay {
     std::vector<Visited> way = followErrors(std::move(first));
     // When the refinement by errors ended is not known. The pass for the maximum error went on from the last of its
     // leaves from which it leads to the leaf of the field.
-    if (options_.maxError > 0) {
-      for (std::size_t ended = way.size(); ended-- > 0;) {
-        std::vector<Visited> rest = followProbes(way[ended].node);
-        if (rest.empty()) continue;
-        way.resize(ended);
-        std::ranges::move(rest, std::back_inserter(way));
-        break;
-      }
-    }
+    if (options_.maxError > 0 && !goOnByProbes(way, false)) goOnByProbes(way, true);
     // Whether a leaf that was pruned had been refined further is not known: `finish` records what became of it.
     const std::size_t known = isPruned() && !way.back().node.fit.isFinal ? way.size() - 1 : way.size();
     for (std::size_t i = 0; i < known; ++i) record(way[i], i + 1 == way.size());
@@ -267,16 +276,25 @@ class RefinementReplay {
     return std::move(way.back().node);
   }
 
+  /// Replaces the end of the refinement by errors by what the pass for the maximum error makes of it. Returns false if
+  /// that does not lead to the leaf of the field.
+  bool goOnByProbes(std::vector<Visited>& way, bool isCutOff) const {
+    for (std::size_t ended = way.size(); ended-- > 0;) {
+      std::vector<Visited> rest = followProbes(way[ended].node, isCutOff);
+      if (rest.empty()) continue;
+      way.resize(ended);
+      std::ranges::move(rest, std::back_inserter(way));
+      return true;
+    }
+    return false;
+  }
+
   /// Records what follows the refinement, and whether it leads to the leaf of the field.
   void finish(BuildNode& node) {
     const Cell& cell = target_.cell();
     if (!reaches(node)) return;
     if (isPruned() && !node.fit.isFinal) {
-      int degree = cell.degree;
-      if (options_.enrich) degree = lowestWithFinal(cell.degree);
-      node.fit.coefficients = basis::truncated(node.fit.cached.coefficients, node.fit.cached.degree, degree);
-      node.fit.degree = degree;
-      node.fit.error = {};
+      node.fit = pruned(node.fit);
       keep(node, CellStage::pruning);
     }
     if (options_.enrich && !node.fit.isFinal && node.fit.degree < cell.degree) {
@@ -302,6 +320,7 @@ class RefinementReplay {
     setPlace(step, node);
     step.degree = node.fit.degree;
     step.triangles = node.fit.list.triangles.size();
+    step.isOutsideBand = node.fit.outsideBand;
     step.isWithoutError = node.fit.isExact() || (node.fit.isFinal && !(options_.exactTolerance > 0));
     step.weighted = node.fit.error.weighted / scale_;
     if (node.fit.isExact()) {
@@ -393,6 +412,7 @@ class ToleranceReplay {
         step.degree = cell.fit.degree;
         step.triangles = cell.fit.list.triangles.size();
         step.isWithoutError = cell.leafRatio == 0;
+        step.isMissed = cell.isMissed;
         if (cell.fit.isExact())
           step.measuredRms = step.measuredMax = 0;
         else
@@ -417,7 +437,7 @@ class ToleranceReplay {
   CellStep stepOf(const CellPlace& place, std::span<const LeafTrial> trials) const {
     CellStep step{.stage = CellStage::tolerance, .depth = int(place.depth), .box = setup_.tree.boxOf(place)};
     for (const LeafTrial& trial : trials) {
-      const CellAlternative alternative{.bytes = trial.bytes, .error = trial.ratio};
+      const CellAlternative alternative{.bytes = trial.bytes, .error = trial.ratio, .isRejected = trial.isRejected};
       if (trial.bytes == std::numeric_limits<double>::infinity()) {
         step.listIsTooLong = true;
       } else if (trial.degree == kExactDegree) {
@@ -486,6 +506,8 @@ CellHistory cellHistory(const Field& field, const DistanceFunction& distance, co
   if (!x.allFinite() || !field.domain().contains(x)) throw Error("the point lies outside the field's domain");
   BuildOptions options = settingsOf(field.data());
   options.maxSteps.reset();
+  if (!(options.tolerance > 0) && !field.metadata().hasEstimate())
+    throw Error("the field was changed after it was built within a tolerance, and does not tell any more how");
   const Target target(field, x);
   if (options.tolerance > 0) return ToleranceReplay(field, options, distance, target, progress).run();
   return RefinementReplay(field, options, distance, target, progress).run();

@@ -21,7 +21,7 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 
 void LeastBytes::consider(CheapCell& cell, Fit&& fit, double bytes, double ratio,
                           std::vector<LeafTrial>* trials) const {
-  if (trials) trials->push_back({fit.degree, bytes, ratio, fit.list.triangles.size(), bytes < cell.bytes});
+  if (trials) trials->push_back({fit.degree, bytes, ratio, fit.list.triangles.size()});
   if (bytes >= cell.bytes) return;
   cell.fit = std::move(fit);
   cell.bytes = bytes;
@@ -75,7 +75,7 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
     const double bytes = polynomialBytes(*polynomial.fit);
     consider(cell, std::move(*polynomial.fit), bytes, polynomial.ratio, trials);
   } else if (trials && !polynomial.closest.coefficients.empty()) {
-    trials->push_back({polynomial.closest.degree, polynomialBytes(polynomial.closest), polynomial.ratio, 0, false});
+    trials->push_back({polynomial.closest.degree, polynomialBytes(polynomial.closest), polynomial.ratio, 0, true});
   }
   constexpr int kCheapDegree = 2;  // a longer list than those above does not take fewer bytes
   if (exact_ && (!polynomial.fit || cell.fit.degree > kCheapDegree)) {

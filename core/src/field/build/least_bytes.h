@@ -34,7 +34,7 @@ struct LeafTrial {
   double bytes = 0;  ///< infinite if there is no such leaf, because its list would be too long or would have no sign
   double ratio = 0;  ///< error over the allowed error, 0 without error
   std::size_t triangles = 0;  ///< length of the list
-  bool isTaken = false;       ///< it takes the fewest bytes so far
+  bool isRejected = false;    ///< its error is too great, or not proven to be small enough
 };
 
 /// Seeks the octree of a cell that takes the fewest bytes within a tolerance. A leaf is a polynomial of low degree or,

@@ -30,16 +30,16 @@ bool hasJump(const CellLattice& lattice, const Box& cell, std::span<const double
   });
 }
 
-/// Where the error would be greatest, and its ratio to the allowed error there, if it rose between the middle ones of
-/// four points as steeply as beside them.
+/// A place between the middle ones of four points in a row at which the error is greatest if it rises there as steeply
+/// as beside them, and the ratio of that error to the allowed one.
 struct Peak {
   double ratio = 0;
   Vector3 local = Vector3::Zero();
 };
 
-/// Appends the peaks of rows of four points. At a kink of the distance, the error has a peak that is as narrow as the
-/// kink is sharp. The points on either side tell its height, which is at least a part of the true one: the error is
-/// often steeper near the kink. Kinks are often planes that pass diagonally between the points.
+/// Appends the peaks of rows of four points. Where the distance has a kink, such as on the planes halfway between two
+/// faces, the error has a sharp peak, which all points of the lattices may miss. Its true height is often greater than
+/// this estimate, because the error becomes steeper towards the kink; the distance itself is evaluated there.
 template <typename Points>
 void findPeaks(const Points& points, std::span<const CellLattice::Row> rows, std::vector<Peak>& peaks) {
   constexpr double kLeast = 0.7;  // lower peaks are not within reach of the greatest allowed ratio
@@ -216,8 +216,10 @@ ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {
     if (degree == 3) {  // before the degrees in between are tried, the highest one must be within the tolerance
       Fit highest = tried(CellLattice::kMostDegree);
       const double ratio = latticeRatio(errors, allowed);
-      keepCloser(std::move(highest), ratio);
-      if (ratio > kMostRatio) return result;
+      if (ratio > kMostRatio) {
+        keepCloser(std::move(highest), ratio);
+        return result;
+      }
     }
     Fit fit = tried(degree);
     double ratio = latticeRatio(errors, allowed);
