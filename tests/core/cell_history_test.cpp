@@ -194,6 +194,14 @@ TEST(CellHistory, refusesFieldsThatWereChanged) {
   EXPECT_THROW(cellHistory(blended(field), distance, Vector3::Zero()), Error);
 }
 
+TEST(CellHistory, refusesSettingsOutOfRange) {
+  const TriangleMesh mesh = loadMesh("builtin:box");
+  const ExactDistance distance(mesh);
+  FieldData forged = build(distance, domainAround(mesh), {.targetError = 1e-3, .grid = {2, 2, 2}}).data();
+  forged.metadata.settings.maxDegree = 200;
+  EXPECT_THROW(cellHistory(Field(forged), distance, Vector3::Zero()), Error);
+}
+
 TEST(CellHistory, rejectsWhatIsNotWithinTheTolerance) {
   const TriangleMesh mesh = loadMesh("builtin:torus,major=0.7,minor=0.25,segments=24,sides=12");
   const ExactDistance distance(mesh);

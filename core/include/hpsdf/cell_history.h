@@ -83,7 +83,8 @@ struct CellHistory {
 /// Repeats the construction of `field` for the one leaf that holds x: the decisions about a cell do not depend on other
 /// cells. When a refinement ends does depend on them; the replay therefore ends at the leaf of the field. `distance`
 /// must be the Φ from which the field was made. Throws `Error` if x lies outside the domain or is not finite, and for a
-/// field that was changed after it was built within a tolerance. Throws `Cancelled` when `progress` says so.
+/// field that was changed after it was built within a tolerance or whose stored settings are out of range. Throws
+/// `Cancelled` when `progress` says so.
 CellHistory cellHistory(const Field& field, const DistanceFunction& distance, const Vector3& x,
                         const Progress& progress = {});
 

@@ -505,11 +505,14 @@ CellHistory cellHistory(const Field& field, const DistanceFunction& distance, co
                         const Progress& progress) {
   if (!x.allFinite() || !field.domain().contains(x)) throw Error("the point lies outside the field's domain");
   BuildOptions options = settingsOf(field.data());
-  options.maxSteps.reset();
   if (!(options.tolerance > 0) && !field.metadata().hasEstimate())
     throw Error("the field was changed after it was built within a tolerance, and does not tell any more how");
   const Target target(field, x);
   if (options.tolerance > 0) return ToleranceReplay(field, options, distance, target, progress).run();
+  // A damaged file may hold any settings. A number of steps is a goal, if the file stores no other.
+  options.maxSteps = 0;
+  checkOptions(field.domain(), options);
+  options.maxSteps.reset();
   return RefinementReplay(field, options, distance, target, progress).run();
 }
 
