@@ -209,6 +209,7 @@ TEST(CellHistory, rejectsWhatIsNotWithinTheTolerance) {
   std::size_t rejected = 0, taken = 0;
   for (const Vector3& x : kPlaces)
     for (const CellStep& step : cellHistory(field, distance, x).steps) {
+      EXPECT_TRUE(!step.exactTrial || step.triangles > 0);
       if (!step.degreeTrial) continue;
       EXPECT_EQ(step.degreeTrial->isRejected, step.degreeTrial->error > 0.93) << step.degreeTrial->error;
       ++(step.degreeTrial->isRejected ? rejected : taken);

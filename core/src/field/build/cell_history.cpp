@@ -410,7 +410,7 @@ class ToleranceReplay {
       CellStep step = stepOf(place, trials);
       if (isLeaf && cell.bytes < std::numeric_limits<double>::infinity()) {
         step.degree = cell.fit.degree;
-        step.triangles = cell.fit.list.triangles.size();
+        if (cell.fit.isExact()) step.triangles = cell.fit.list.triangles.size();
         step.isWithoutError = cell.leafRatio == 0;
         step.isMissed = cell.isMissed;
         if (cell.fit.isExact())
