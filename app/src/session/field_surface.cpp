@@ -29,18 +29,21 @@ static std::string meshBeside(const CurrentField& current) {
   return "";
 }
 
-std::string surfaceOf(const CurrentField& current, const char* asked) {
-  const std::string& source = current.field.metadata().source.name;
+/// Returns the mesh file or shape from which the current field was made, or "" if it is unknown.
+static std::string knownSurface(const CurrentField& current) {
   if (!current.surface.empty()) return current.surface;
-  if (isShape(source)) return source;
-  if (std::string file = meshBeside(current); !file.empty()) return file;
+  const std::string& source = current.field.metadata().source.name;
+  return isShape(source) ? source : meshBeside(current);
+}
+
+std::string surfaceOf(const CurrentField& current, const char* asked) {
+  if (std::string known = knownSurface(current); !known.empty()) return known;
+  const std::string& source = current.field.metadata().source.name;
   throw Error(fmt::format("{}: this needs the mesh that it was made from; give {}{}", current.name, asked,
                           source.empty() ? "" : ", " + source));
 }
 
-bool findsSurface(const CurrentField& current) {
-  return !current.surface.empty() || isShape(current.field.metadata().source.name) || !meshBeside(current).empty();
-}
+bool findsSurface(const CurrentField& current) { return !knownSurface(current).empty(); }
 
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
                    std::string_view otherwise) {
