@@ -1,5 +1,5 @@
 #pragma once
-// What is shown of a field while it is being built.
+// The preview of a field: pictures of its mesh or of the unfinished field while it is being built.
 
 #include <cstddef>
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace hpsdf::app {
 
-/// What stands for a field while this is being built: its mesh or, once there is one, the field as it is so far.
+/// Stands in for a field that is being built: holds its mesh or, once there is one, the field as it is so far.
 class BuildPreview {
  public:
   /// Shows a mesh. `domain` is the domain of its field. A mesh that cannot be drawn is not shown.

@@ -93,7 +93,7 @@ class Session {
     return static_cast<Extension&>(*extension_);
   }
 
-  /// What `why` said last of the current field. The explorer shows it.
+  /// The last answer of `why` about the current field. The explorer shows it.
   struct Explanation {
     Vector3 point;
     std::vector<std::string> lines;

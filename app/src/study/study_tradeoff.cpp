@@ -27,7 +27,7 @@
 namespace hpsdf::app {
 namespace {
 
-/// What ends the constructions of a range: the option of `build`, and its values as a user writes them.
+/// The option of `build` that ends the constructions of a range, and its values as a user writes them.
 struct TradeoffRange {
   std::string option;
   std::vector<std::string> values;

@@ -19,7 +19,7 @@ namespace hpsdf::app {
 /// pass input events to `Explorer::input` and show a frame.
 class LiveWork : public WorkListener {
  public:
-  /// How often a growing field is shown.
+  /// Limits of the rate at which a growing field is shown.
   struct Pace {
     double seconds = 0.25;  ///< least time between two states of the field
     double share = 0.1;     ///< greatest share of the time in which the field is made and shown, above 0; 1: no limit
