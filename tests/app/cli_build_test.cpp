@@ -216,7 +216,7 @@ TEST_F(BuildCommand, memoryLimitsThatMessagesNameSuffice) {
   for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
            {"analytic:torus", "--target-error", "1e-7", "--memory-limit", "1e6"},
            {"analytic:torus", "--grid", "40", "--memory-limit", "1e6"},
-           {"builtin:torus,segments=24,sides=12", "--tolerance", "1", "--grid", "20", "--memory-limit", "2.7e6"},
+           {"builtin:gear", "--tolerance", "1", "--grid", "20", "--memory-limit", "2.7e6"},
            {"builtin:torus", "--target-error", "1e-5", "--memory-limit", "1e5"},
            {"builtin:gear", "--strategy", "hpx", "--memory-limit", "2e6"}}) {
     std::vector<std::string> words = {"build", "-o", at("f.hpsdf")};
@@ -357,7 +357,7 @@ TEST_F(BuildCommand, optionsWithoutEffectAreRefused) {
   refused({"--tolerance", "0.1", "--certified", "--sign", "pseudonormal"}, "certified: nothing is proven where");
   refused({"--tolerance", "0.1", "--strategy", "hp"}, "strategy has no effect with tolerance");
   refused({"--tolerance", "0.1", "--target-error", "1e-3"}, "target-error and tolerance exclude each other");
-  refused({"--tolerance", "0.1", "--strategy", "hp"}, "leave out strategy or tolerance");
+  refused({"--tolerance", "0.1", "--strategy", "hp"}, "leave out strategy, or give a target error");
   refused({"--tolerance", "0.1", "--checkpoint"}, "no checkpoint: leave out the checkpoint or the tolerance");
   refused({"--tolerance", "0.1x"}, "expected a number above 0, or a percentage, found '0.1x'");
   for (const char* option : {"--blend-width=0.1", "--max-bytes=1e6", "--max-error=0.1", "--bounds", "--tolerance=1%"})
@@ -375,6 +375,15 @@ TEST_F(BuildCommand, warnsOfADomainBesideTheSurface) {
   EXPECT_THAT(build("5,5,5,6,6,6"), HasSubstr("warning: the domain leaves out the whole surface"));
   EXPECT_THAT(build("0,-2,-2,2,2,2"), HasSubstr("warning: the domain leaves out part of the surface"));
   EXPECT_THAT(build("-2,-2,-2,2,2,2"), Not(HasSubstr("warning")));
+}
+
+TEST_F(BuildCommand, aMeshThatIsNormalizedAlreadyStaysAsItIs) {
+  // The coordinates 0.3 and 0.7 would be rounded differently by a scale about a centre.
+  writeFile(at("mesh.off"),
+            "OFF\n4 4 0\n-1 -1 -1\n1 0.3 0.7\n0.3 1 -0.1\n0.7 0.1 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+  ASSERT_EQ(run({{"build", at("mesh.off"), "-o", at("f.hpsdf"), "--normalize", "--tolerance", "5%"}}).status, 0);
+  const Outcome outcome = run({{"verify", at("f.hpsdf"), "--points", "1000"}});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
 }
 
 TEST_F(BuildCommand, normalizationIsRemembered) {

@@ -49,6 +49,7 @@ struct Case {
   std::string name;
   std::string shape;
   BuildOptions options;
+  DistanceOptions distance = {};
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -99,7 +100,7 @@ class ReplayTest : public testing::TestWithParam<Case> {};
 
 TEST_P(ReplayTest, arrivesAtTheLeavesOfTheField) {
   const TriangleMesh mesh = loadMesh(GetParam().shape);
-  const ExactDistance distance(mesh);
+  const ExactDistance distance(mesh, GetParam().distance);
   const Field field = build(distance, domainAround(mesh), GetParam().options);
   std::vector<Vector3> places = kPlaces;
   for (std::uint64_t i = 0; i < 25; ++i) places.push_back(detail::Random(5, i).inBox(field.domain()));
@@ -159,6 +160,21 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"tolerance",
              "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
              {.grid = {3, 3, 3}, .tolerance = 5e-3}},
+        Case{"certified",
+             "builtin:torus,major=0.7,minor=0.25,segments=24,sides=12",
+             {.grid = {3, 3, 3}, .tolerance = 2e-2, .certified = true}},
+        Case{"shell",
+             "builtin:box",
+             {.targetError = 1e-6, .grid = {3, 3, 3}},
+             {.insideTest = InsideTest::shell, .thickness = 0.1}},
+        Case{"shellWithinTolerance",
+             "builtin:box",
+             {.grid = {3, 3, 3}, .tolerance = 1e-2},
+             {.insideTest = InsideTest::shell, .thickness = 0.1}},
+        Case{"hull",
+             "builtin:gear,teeth=5,segments=2",
+             {.targetError = 1e-6, .grid = {3, 3, 3}},
+             {.insideTest = InsideTest::outerHull}},
         Case{"toleranceOfBox", "builtin:box", {.grid = {3, 3, 3}, .tolerance = 1e-3}}),
     [](const auto& test) { return test.param.name; });
 

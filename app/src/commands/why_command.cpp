@@ -33,8 +33,8 @@ the number of triangles if the cell could become exact ("too many" where a list 
 
 For a field within a tolerance each row has the edge of the cell; the polynomial of the lowest degree that is within the
 tolerance, or else the closest one, with its greatest error over the allowed one and its bytes (it is rejected above
-0.93, because errors between the checked points may be greater, or where --certified has no proof); the list of triangles
-with its bytes; and the bytes of eight children with all their descendants, of which the fewest were taken. Where the
+0.93, because errors between the checked points may be greater, and "no proof" stands where only the proof for
+--certified failed); the list of triangles with its bytes; and the bytes of eight children with all their descendants, of which the fewest were taken. Where the
 search among the children was given up because they already took more, their bytes are a lower bound (≥).
 
 It also names the nearest triangle and whether its face, edge or vertex is nearest, and how the sign was found, with

@@ -86,8 +86,8 @@ void requireEffect(const Arguments& arguments) {
     if (setting.isOffered && arguments.given(setting.name) && !setting.hasEffectWithTolerance &&
         setting.ending != BuildSetting::Ending::target)
       throw Error(
-          fmt::format("{0} has no effect with tolerance, which decides how the field is built: leave out {0} or "
-                      "tolerance",
+          fmt::format("{0} has no effect with tolerance, which decides how the field is built: leave out {0}, or give "
+                      "a target error in place of a tolerance",
                       setting.name));
   if (arguments.flag("paper")) throw Error("paper and tolerance exclude each other: give one of them");
 }

@@ -124,7 +124,8 @@ std::string refinementTable(const CellHistory& history) {
 /// Returns the error of a polynomial over the allowed one, and whether the polynomial was rejected for it.
 std::string polynomialErrorColumn(const CellStep& step) {
   if (!step.degreeTrial) return "–";
-  return shortNumber(step.degreeTrial->error) + (step.degreeTrial->isRejected ? ", rejected" : "");
+  const char* rejected = step.degreeTrial->isUnproven ? ", no proof" : ", rejected";
+  return shortNumber(step.degreeTrial->error) + (step.degreeTrial->isRejected ? rejected : "");
 }
 
 std::string toleranceTable(const CellHistory& history) {

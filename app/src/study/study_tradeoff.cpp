@@ -191,17 +191,19 @@ Json endJson(const TradeoffRange& range, const TradeoffPoint& point) {
 
 Json pointJson(const TradeoffRange& range, const TradeoffPoint& point) {
   const Measurement& m = point.measured;
-  return {{range.key(), endJson(range, point)},
-          {"bytes", point.counts.bytes},
-          {"leaves", point.counts.leaves},
-          {"exact_leaves", point.counts.exact.leaves},
-          {"seconds", point.seconds},
-          {"near_rms", m.near.rms},
-          {"near_max", m.near.max},
-          {"domain_rms", m.domain.rms},
-          {"domain_max", m.domain.max},
-          {"wrong_signs", m.wrongSigns},
-          {"torn_share", m.tornShare}};
+  Json json = {{range.key(), endJson(range, point)},
+               {"bytes", point.counts.bytes},
+               {"leaves", point.counts.leaves},
+               {"exact_leaves", point.counts.exact.leaves},
+               {"seconds", point.seconds},
+               {"near_rms", m.near.rms},
+               {"near_max", m.near.max},
+               {"domain_rms", m.domain.rms},
+               {"domain_max", m.domain.max},
+               {"wrong_signs", m.wrongSigns},
+               {"torn_share", m.tornShare}};
+  if (range.isOfTolerances()) json["tolerance_ratio"] = m.toleranceRatio;
+  return json;
 }
 
 Json tradeoffJson(const Tradeoff& tradeoff) {
@@ -216,8 +218,8 @@ Json tradeoffJson(const Tradeoff& tradeoff) {
 std::string tradeoffCsv(const std::vector<Tradeoff>& tradeoffs) {
   std::string text = fmt::format(
       "mesh,{},bytes,leaves,exact_leaves,seconds,near_rms,near_max,domain_rms,domain_max,wrong_signs,"
-      "torn_share\n",
-      tradeoffs.front().range.key());
+      "torn_share{}\n",
+      tradeoffs.front().range.key(), tradeoffs.front().range.isOfTolerances() ? ",tolerance_ratio" : "");
   for (const Tradeoff& tradeoff : tradeoffs)
     for (const TradeoffPoint& point : tradeoff.points)
       text += fmt::format("{},{}\n", tradeoff.name, rowText(pointJson(tradeoff.range, point)));
@@ -225,31 +227,35 @@ std::string tradeoffCsv(const std::vector<Tradeoff>& tradeoffs) {
 }
 
 /// Returns the figures of a point as text, in the order of `tradeoffHeads`.
-std::vector<std::string> tradeoffCells(const TradeoffPoint& point) {
+std::vector<std::string> tradeoffCells(const TradeoffRange& range, const TradeoffPoint& point) {
   const Measurement& m = point.measured;
-  return {point.end,
-          bytesText(double(point.counts.bytes)),
-          grouped(point.counts.leaves),
-          shortNumber(point.seconds) + " s",
-          shortNumber(m.near.rms),
-          shortNumber(m.near.max),
-          shortNumber(m.domain.rms),
-          shortNumber(m.domain.max),
-          shortNumber(100 * m.tornShare) + " %"};
+  std::vector<std::string> cells = {point.end,
+                                    bytesText(double(point.counts.bytes)),
+                                    grouped(point.counts.leaves),
+                                    shortNumber(point.seconds) + " s",
+                                    shortNumber(m.near.rms),
+                                    shortNumber(m.near.max),
+                                    shortNumber(m.domain.rms),
+                                    shortNumber(m.domain.max),
+                                    shortNumber(100 * m.tornShare) + " %"};
+  if (range.isOfTolerances()) cells.push_back(m.toleranceRatio > 1 ? "no" : "yes");
+  return cells;
 }
 
-std::vector<std::string> tradeoffHeads(const Tradeoff& tradeoff) {
-  return {tradeoff.range.head(), "memory",     "leaves", "time", "near RMS", "near max",
-          "domain RMS",          "domain max", "torn"};
+std::vector<std::string> tradeoffHeads(const TradeoffRange& range) {
+  std::vector<std::string> heads = {range.head(), "memory",     "leaves",     "time", "near RMS",
+                                    "near max",   "domain RMS", "domain max", "torn"};
+  if (range.isOfTolerances()) heads.push_back("kept");
+  return heads;
 }
 
 std::string tradeoffText(const Tradeoff& tradeoff) {
   std::string text = tradeoff.mesh + "\n ";
-  for (const std::string& head : tradeoffHeads(tradeoff)) text += fmt::format(" {:>11}", head);
+  for (const std::string& head : tradeoffHeads(tradeoff.range)) text += fmt::format(" {:>11}", head);
   text += "\n";
   for (const TradeoffPoint& point : tradeoff.points) {
     text += " ";
-    for (const std::string& cell : tradeoffCells(point)) text += fmt::format(" {:>11}", cell);
+    for (const std::string& cell : tradeoffCells(tradeoff.range, point)) text += fmt::format(" {:>11}", cell);
     text += "\n";
   }
   if (tradeoff.recommendation.empty()) return text;
@@ -290,11 +296,12 @@ svg.chart { display: block; max-width: 100%; height: auto; margin: 1rem 0; }
 
 std::string tradeoffSection(const Tradeoff& tradeoff) {
   std::string html = fmt::format("<h2>{}</h2>\n<table>\n<tr>", htmlEscaped(tradeoff.mesh));
-  for (const std::string& head : tradeoffHeads(tradeoff)) html += fmt::format("<th>{}</th>", head);
+  for (const std::string& head : tradeoffHeads(tradeoff.range)) html += fmt::format("<th>{}</th>", head);
   html += "</tr>\n";
   for (const TradeoffPoint& point : tradeoff.points) {
     html += &point == tradeoff.best() ? "<tr class=\"chosen\">" : "<tr>";
-    for (const std::string& cell : tradeoffCells(point)) html += fmt::format("<td>{}</td>", htmlEscaped(cell));
+    for (const std::string& cell : tradeoffCells(tradeoff.range, point))
+      html += fmt::format("<td>{}</td>", htmlEscaped(cell));
     html += "</tr>\n";
   }
   html += "</table>\n";
@@ -369,8 +376,7 @@ tradeoff.json.)"),
       .parameters = joined(
           {{{"tolerances", text("TOLERANCE,…").byDefault("2%,1%,0.5%,0.2%,0.1%"),
              "The tolerances of the range, as lengths or as percentages of the mesh's longest side. Each makes a field "
-             "of "
-             "its own, so that the smallest one takes most of the time."},
+             "of its own, so that the smallest one takes most of the time."},
             {"target-errors", numbers("τ,τ,…", countsFrom(1, 20)).above(0),
              "A range of target errors τ in place of tolerances, such as 1e-4,1e-5,1e-6."},
             {"budget", number().above(0).in("bytes"),

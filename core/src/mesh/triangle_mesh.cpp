@@ -88,6 +88,7 @@ TriangleMesh normalized(const TriangleMesh& mesh) {
   const Box box = boundingBox(mesh);
   const double longest = longestSide(box, mesh.name.empty() ? "mesh" : mesh.name);
   TriangleMesh result = mesh;
+  if (normalizationOf(box).isIdentity()) return result;  // not even rounded, so that a field's mesh is found again
   // (x - min) - (max - x) equals 2(x - centre) but avoids rounding the centre. Along the longest side of the box it is
   // exactly -longest at min and +longest at max, and it never decreases with x. Therefore no vertex leaves [-1, 1].
   for (Vector3& v : result.vertices) v = ((v - box.min()) - (box.max() - v)) / longest;

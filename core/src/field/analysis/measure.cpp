@@ -148,7 +148,7 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
   const double usual = metadata.settings.tolerance > 0 ? within : 0.01 * length;
   result.nearDistance = options.near > 0 ? options.near : usual;
   const std::size_t points =
-      options.points > 0 ? options.points : std::clamp(metadata.exactEvaluations / 10, kFewest, kMost);
+      options.points > 0 ? options.points : std::clamp(metadata.exactEvaluations / 20, kFewest, kMost);
   const SampleOptions half{
       .count = std::max<std::size_t>(1, points / 2), .seed = options.seed, .threads = options.threads};
   SampleOptions other = half;
@@ -170,7 +170,9 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
       addPoints(result, greatest, part.errors, allowed);
     }
     progress.update("measuring", 0.95);
-    if (surface) result.tornShare = tornShare(field, *surface, half);
+    SampleOptions quarter = half;
+    quarter.count = std::max<std::size_t>(1, points / 4);
+    if (surface) result.tornShare = tornShare(field, *surface, quarter);
     return result;
   });
 }

@@ -144,14 +144,7 @@ class Construction {
   }
 
   /// Returns true if twice the octree would not exceed the allowed memory.
-  bool hasMemoryForAnother() const {
-    try {
-      refiner_.requireMemory(2);
-      return true;
-    } catch (const MemoryLimitError&) {
-      return false;
-    }
-  }
+  bool hasMemoryForAnother() const { return detail::hasMemory(refiner_.memoryNeed(2), setup_.options); }
 
   void prune(BuildTree& tree) const {
     const BuildOptions& options = setup_.options;

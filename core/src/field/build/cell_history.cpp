@@ -13,6 +13,7 @@
 #include "field/build/tolerance_build.h"
 #include "field/cells/exact_lists.h"
 #include "field/query/leaves.h"
+#include "field/tolerance/tolerance_fit.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/random_points.h"
 #include "hpsdf/detail/triangle_list.h"
@@ -437,7 +438,10 @@ class ToleranceReplay {
   CellStep stepOf(const CellPlace& place, std::span<const LeafTrial> trials) const {
     CellStep step{.stage = CellStage::tolerance, .depth = int(place.depth), .box = setup_.tree.boxOf(place)};
     for (const LeafTrial& trial : trials) {
-      const CellAlternative alternative{.bytes = trial.bytes, .error = trial.ratio, .isRejected = trial.isRejected};
+      const CellAlternative alternative{.bytes = trial.bytes,
+                                        .error = trial.ratio,
+                                        .isRejected = trial.isRejected,
+                                        .isUnproven = trial.isRejected && trial.ratio <= kMostRatio};
       if (trial.bytes == std::numeric_limits<double>::infinity()) {
         step.listIsTooLong = true;
       } else if (trial.degree == kExactDegree) {

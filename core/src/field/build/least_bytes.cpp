@@ -71,6 +71,7 @@ bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioA
   }
   ToleranceFit polynomial = fitter_.fit(box, ratioAbove);
   cell.ratio = polynomial.ratio;
+  cell.jumps = polynomial.jumps;
   if (polynomial.fit) {
     const double bytes = polynomialBytes(*polynomial.fit);
     consider(cell, std::move(*polynomial.fit), bytes, polynomial.ratio, trials);

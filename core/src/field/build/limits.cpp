@@ -173,21 +173,34 @@ std::size_t ByteBudget::finalCoefficients(const Fit& fit) const {
   return fit.isFinal ? fit.coefficients.size() : finalCoefficients(fit.degree);
 }
 
-void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
+static double octreeBytes(const MemoryNeed& need) {
+  return kBytesPerNode * double(need.nodes) + kBytesPerCoefficient * double(need.coefficients);
+}
+
+/// Returns the factor by which the octree is taken to grow.
+static double growthFactor(const MemoryNeed& need, const BuildOptions& options) {
   // The likely memory is too great by a factor of 30 at times, while the facets of a smooth shape come into sight. It
   // serves to refuse a construction that chases noise soon after its start; the lower bound passes the allowed memory
   // only when most of the time is spent.
   constexpr double kLikelyTolerance = 50;
+  const double likely = double(need.fixedBytes) + octreeBytes(need) * need.likelyFactor;
+  const bool isLikelyTooMuch = likely > kLikelyTolerance * allowedMemory(options);
+  return isLikelyTooMuch ? std::max(need.likelyFactor, need.growthFactor) : need.growthFactor;
+}
+
+bool hasMemory(const MemoryNeed& need, const BuildOptions& options) {
+  const double fixed = double(need.fixedBytes), bytes = octreeBytes(need), most = allowedMemory(options);
+  return fixed + bytes <= most && fixed + bytes * growthFactor(need, options) <= kTolerance * most;
+}
+
+void requireMemory(const MemoryNeed& need, const BuildOptions& options) {
+  if (hasMemory(need, options)) return;
   constexpr double kRoomBesideDistance = 1e8;  // enough for most meshes at usual settings
   const double fixed = double(need.fixedBytes), most = allowedMemory(options);
   if (fixed > most)
     refuseMemory(fixed + kRoomBesideDistance, "the distance that the field is made from holds ", bytesText(fixed),
                  " of memory, more than the ", bytesText(most), " allowed: simplify the mesh");
-  const double bytes = kBytesPerNode * double(need.nodes) + kBytesPerCoefficient * double(need.coefficients);
-  const bool isLikelyTooMuch = fixed + bytes * need.likelyFactor > kLikelyTolerance * most;
-  const double factor = isLikelyTooMuch ? std::max(need.likelyFactor, need.growthFactor) : need.growthFactor;
-  const double finally = fixed + bytes * factor;
-  if (fixed + bytes <= most && finally <= kTolerance * most) return;
+  const double bytes = octreeBytes(need), factor = growthFactor(need, options), finally = fixed + bytes * factor;
   const bool isMostlyBaseGrid = baseCells(options) > 0.5 * double(need.nodes) * factor;
   refuseMemory(fixed + bytes * std::max(need.likelyFactor, need.growthFactor), "about ",
                cellsText(double(need.nodes) * factor), " and ", bytesText(finally),

@@ -41,7 +41,9 @@ struct MemoryNeed {
   std::size_t fixedBytes = 0;  ///< bytes besides the octree
 };
 
-/// Throws `Error` if the construction exceeds the allowed memory now, or will exceed it at the end.
+/// Returns true if the construction keeps to the allowed memory now and, as far as can be told, at the end.
+bool hasMemory(const MemoryNeed& need, const BuildOptions& options);
+/// Throws `Error` unless `hasMemory`.
 void requireMemory(const MemoryNeed& need, const BuildOptions& options);
 
 /// Returns the number of nodes that an estimated octree may have without being refused.

@@ -176,19 +176,18 @@ void Refiner::sumTotals() {
   state.lastSum = state.totals.weighted;
 }
 
-void Refiner::requireMemory(double leastFactor, double likelyFactor) const {
+MemoryNeed Refiner::memoryNeed(double leastFactor, double likelyFactor) const {
   // Estimate the memory. If pruning follows, the projections and the internal nodes that are kept for it need
   // about three times as much memory as the coefficients of the leaves.
   // Exact leaves are in memory twice when the arrays of the field are made. Their bytes count as coefficients.
   const bool keepsAll = setup.options.criterion == Criterion::optimal;
   const double exactBytes = state.exactSize.inTree + state.exactSize.inField;
-  detail::requireMemory({.nodes = state.tree.nodes.size(),
-                         .coefficients = (keepsAll ? 4 * state.coefficients : state.coefficients) +
-                                         static_cast<std::size_t>(exactBytes / sizeof(double)),
-                         .growthFactor = leastFactor,
-                         .likelyFactor = likelyFactor,
-                         .fixedBytes = setup.distance.bytes()},
-                        setup.options);
+  return {.nodes = state.tree.nodes.size(),
+          .coefficients = (keepsAll ? 4 * state.coefficients : state.coefficients) +
+                          static_cast<std::size_t>(exactBytes / sizeof(double)),
+          .growthFactor = leastFactor,
+          .likelyFactor = likelyFactor,
+          .fixedBytes = setup.distance.bytes()};
 }
 
 }  // namespace hpsdf::detail

@@ -108,9 +108,12 @@ struct Refiner {
   double bytes() const {
     return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)) + state.exactSize.inField;
   }
-  /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by `leastFactor` at
-  /// least and probably by `likelyFactor`.
-  void requireMemory(double leastFactor = 1, double likelyFactor = 1) const;
+  /// Returns the memory that the octree needs if it grows by `leastFactor` at least and probably by `likelyFactor`.
+  MemoryNeed memoryNeed(double leastFactor = 1, double likelyFactor = 1) const;
+  /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by these factors.
+  void requireMemory(double leastFactor = 1, double likelyFactor = 1) const {
+    detail::requireMemory(memoryNeed(leastFactor, likelyFactor), setup.options);
+  }
 };
 
 /// The weighted error that a refinement removes per additional coefficient; empty for one that was not tried.

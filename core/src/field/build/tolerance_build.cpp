@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <optional>
-#include <random>
+#include <ranges>
 #include <utility>
 #include <vector>
 
@@ -37,8 +38,8 @@ std::uint32_t greatestDepth(const BuildOptions& options) {
 using Clock = std::chrono::steady_clock;
 
 /// One construction within a tolerance. The cells of the first few depths are looked at depth by depth. Those that are
-/// divided further are the tasks of the construction, which are done in random order, so that the first ones tell what
-/// all of them will take.
+/// divided further are the tasks of the construction. The first ones that are done are a sample of all of them, which
+/// tells what all will take.
 class ToleranceBuild {
  public:
   ToleranceBuild(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
@@ -56,7 +57,7 @@ class ToleranceBuild {
     roots_.resize(tree_.nodes.size());
     lookAtFirstDepths();
     doTasks();
-    for (CheapCell& root : roots_) settleFirstDepths(root, 0);
+    for (CheapCell* cell : divided_ | std::views::reverse) cells_.settle(*cell);
     double worst = 0;
     for (std::uint32_t n = 0; n < roots_.size(); ++n) worst = std::max(worst, moveToTree(n, std::move(roots_[n])));
     FieldData field = layOut(std::move(tree_), metadata(worst), distance_.triangleSearch());
@@ -67,92 +68,100 @@ class ToleranceBuild {
   }
 
  private:
+  /// A cell to be solved, whose parent was divided.
   struct Task {
     CheapCell* cell;
     CellPlace place;
+    bool jumpsAbove;  ///< the distance jumps in the parent
     double ratioAbove;
+
+    /// Orders tasks by the error of the parent, which is greatest where the distance jumps.
+    std::pair<bool, double> error() const { return {jumpsAbove, ratioAbove}; }
   };
 
-  /// Makes leaves of the cells of a depth, and divides those whose children may take fewer bytes, until there are
-  /// enough cells that are not divided yet for tasks.
+  /// Looks at all cells of the first depths, until enough cells are left for tasks. A few of these may take most of the
+  /// work, usually those with the greatest errors: a part of them is divided further.
   void lookAtFirstDepths() {
-    constexpr std::size_t kEnough = 500;
-    for (std::uint32_t n = 0; n < roots_.size(); ++n) tasks_.push_back({&roots_[n], {0, tree_.nodes[n].cellIndex}, 0});
-    while (!tasks_.empty() && tasks_.size() < kEnough && firstDepths_ < int(setup_.maxDepth)) {
-      progress_.update("fitting first cells", 0);
-      std::vector<std::uint8_t> divides(tasks_.size());
-      tbb::parallel_for(std::size_t{0}, tasks_.size(), [&](std::size_t t) {
-        divides[t] = cells_.makeLeaf(*tasks_[t].cell, tasks_[t].place, tasks_[t].ratioAbove);
-      });
-      std::vector<Task> next;
-      for (std::size_t t = 0; t < tasks_.size(); ++t) {
-        if (divides[t] == 0) continue;
-        CheapCell& cell = *tasks_[t].cell;
-        LeastBytes::divide(cell);
-        for (std::uint32_t child = 0; child < 8; ++child)
-          next.push_back({&(*cell.children)[child], tasks_[t].place.child(child), cell.ratio});
-      }
-      tasks_ = std::move(next);
-      ++firstDepths_;
+    constexpr std::size_t kEnough = 500, kRounds = 3, kPart = 10;
+    for (std::uint32_t n = 0; n < roots_.size(); ++n)
+      tasks_.push_back({&roots_[n], {0, tree_.nodes[n].cellIndex}, false, 0});
+    while (!tasks_.empty() && tasks_.size() < kEnough) tasks_ = childrenOf(tasks_);
+    for (std::size_t round = 0; round < kRounds; ++round) {
+      std::ranges::stable_sort(tasks_, {}, &Task::error);
+      const std::vector<Task> greatest(tasks_.end() - std::ptrdiff_t(tasks_.size() / kPart), tasks_.end());
+      tasks_.resize(tasks_.size() - greatest.size());
+      std::ranges::copy(childrenOf(greatest), std::back_inserter(tasks_));
     }
     firstCells_ = cells_.cells();
   }
 
+  /// Makes leaves of cells, and divides those whose children may take fewer bytes. Returns these children.
+  std::vector<Task> childrenOf(const std::vector<Task>& looks) {
+    progress_.update("fitting first cells", 0);
+    std::vector<std::uint8_t> divides(looks.size());
+    tbb::parallel_for(std::size_t{0}, looks.size(), [&](std::size_t n) {
+      divides[n] = cells_.makeLeaf(*looks[n].cell, looks[n].place, looks[n].ratioAbove);
+    });
+    std::vector<Task> children;
+    for (std::size_t n = 0; n < looks.size(); ++n) {
+      CheapCell& cell = *looks[n].cell;
+      firstBytes_ += divides[n] != 0 ? setup_.budget.nodeBytes() : cell.bytes;
+      if (divides[n] == 0) continue;
+      LeastBytes::divide(cell);
+      divided_.push_back(&cell);
+      for (std::uint32_t child = 0; child < 8; ++child)
+        children.push_back({&(*cell.children)[child], looks[n].place.child(child), cell.jumps, cell.ratio});
+    }
+    return children;
+  }
+
   void doTasks() {
-    constexpr std::size_t kRounds = 50, kFewestAtOnce = 16;
+    constexpr std::size_t kRounds = 60, kFewestAtOnce = 64;
     tasksBegan_ = Clock::now();
-    shuffleTasks();
-    const std::size_t atOnce = std::max(kFewestAtOnce, tasks_.size() / kRounds);
+    const std::size_t sample = orderTasks(), atOnce = std::max(kFewestAtOnce, tasks_.size() / kRounds);
     for (std::size_t done = 0; done < tasks_.size();) {
       progress_.update("fitting cells", double(done) / double(tasks_.size()));
-      const std::size_t end = std::min(done + atOnce, tasks_.size());
+      const std::size_t end = std::min(done + atOnce, done < sample ? sample : tasks_.size());
       tbb::parallel_for(
           done, end, [&](std::size_t t) { cells_.solve(*tasks_[t].cell, tasks_[t].place, tasks_[t].ratioAbove); },
           tbb::simple_partitioner{});
       done = end;
-      forecast(done);
+      forecast(done, sample);
     }
   }
 
-  void shuffleTasks() {
-    std::mt19937_64 random;  // always with the same seed
-    for (std::size_t t = tasks_.size(); t > 1; --t) std::swap(tasks_[t - 1], tasks_[random() % t]);
+  /// Puts the tasks into an order in which the first ones are a systematic sample: one of so many tasks of a list
+  /// sorted by the errors of the parents. The others follow in as many passes through the list. Returns the size of the
+  /// sample.
+  std::size_t orderTasks() {
+    constexpr std::size_t kSmallestSample = 100, kMostPasses = 15;
+    std::ranges::stable_sort(tasks_, {}, &Task::error);
+    // The number of passes is odd, so that each meets all eight children of a cell evenly.
+    const std::size_t passes = std::min(tasks_.size() / kSmallestSample, kMostPasses) | 1;
+    std::vector<Task> ordered;
+    ordered.reserve(tasks_.size());
+    std::size_t sample = 0;
+    for (std::size_t pass = 0; pass < passes; ++pass) {
+      for (std::size_t t = (pass + passes / 2) % passes; t < tasks_.size(); t += passes) ordered.push_back(tasks_[t]);
+      if (pass == 0) sample = ordered.size();
+    }
+    tasks_ = std::move(ordered);
+    return sample;
   }
 
   /// Estimates what the whole construction takes from the tasks that are done. Reports it once, and throws `Error` if
   /// it is more than the memory allows.
-  void forecast(std::size_t done) {
-    constexpr std::size_t kShare = 14;  // the forecast is made after one of so many tasks
+  void forecast(std::size_t done, std::size_t sample) {
     for (; summed_ < done; ++summed_) taskBytes_ += tasks_[summed_].cell->bytes;
     const double scale = double(tasks_.size()) / double(done), bytes = taskBytes_ * scale;
     // Cells are in memory as they are built, and again as the arrays of the field are made.
     requireRoom(double(firstCells_) + double(cells_.cells() - firstCells_) * scale, 2 * bytes);
-    if (hasForecast_ || done * kShare < tasks_.size()) return;
+    if (hasForecast_ || done < sample) return;
     hasForecast_ = true;
     if (!progress_.forecast) return;
     const double firstSeconds = std::chrono::duration<double>(tasksBegan_ - began_).count();
     const double seconds = std::chrono::duration<double>(Clock::now() - tasksBegan_).count();
-    progress_.forecast({bytes + firstBytes(), firstSeconds + seconds * scale});
-  }
-
-  /// Returns the bytes of the leaves of the first depths, which are no tasks, and of the cells that were divided there.
-  double firstBytes() const {
-    double bytes = 0;
-    for (const CheapCell& root : roots_) bytes += firstBytesOf(root, 0);
-    return bytes;
-  }
-  double firstBytesOf(const CheapCell& cell, int depth) const {
-    if (depth == firstDepths_) return 0;
-    if (!cell.children) return cell.bytes;
-    double bytes = setup_.budget.nodeBytes();
-    for (const CheapCell& child : *cell.children) bytes += firstBytesOf(child, depth + 1);
-    return std::min(bytes, cell.bytes);
-  }
-
-  void settleFirstDepths(CheapCell& cell, int depth) {
-    if (depth == firstDepths_ || !cell.children) return;
-    for (CheapCell& child : *cell.children) settleFirstDepths(child, depth + 1);
-    cells_.settle(cell);
+    progress_.forecast({bytes + firstBytes_, firstSeconds + seconds * scale});
   }
 
   /// Moves a cell with its descendants into the tree. Returns the greatest error ratio of its polynomials.
@@ -204,9 +213,10 @@ class ToleranceBuild {
   LeastBytes cells_;
   std::vector<CheapCell> roots_;
   std::vector<Task> tasks_;
-  int firstDepths_ = 0;  ///< number of depths that `lookAtFirstDepths` looked at
-  std::uint64_t firstCells_ = 0;
-  std::size_t summed_ = 0;  ///< number of tasks whose bytes are in `taskBytes_`
+  std::vector<CheapCell*> divided_;  ///< the cells above the tasks, parents before their children
+  std::uint64_t firstCells_ = 0;     ///< number of cells that are no tasks
+  double firstBytes_ = 0;            ///< bytes of the field without the tasks
+  std::size_t summed_ = 0;           ///< number of tasks whose bytes are in `taskBytes_`
   double taskBytes_ = 0;
   bool hasForecast_ = false;
 };

@@ -9,10 +9,6 @@
 namespace hpsdf::detail {
 namespace {
 
-/// Greatest ratio of an error to the allowed error that a polynomial may have at the checked points. The rest is for
-/// errors between them and for the rounding of coefficients.
-constexpr double kMostRatio = 0.93;
-
 /// Where a parent's error is so many times the allowed error, not even the error of a smooth distance, which falls by
 /// 2^6 in a cell of half the size, would be within the tolerance.
 constexpr double kHopeless = 200;

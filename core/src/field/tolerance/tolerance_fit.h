@@ -16,6 +16,10 @@
 
 namespace hpsdf::detail {
 
+/// Greatest ratio of an error to the allowed error that a polynomial may have at the checked points. The rest is for
+/// errors between them and for the rounding of coefficients.
+inline constexpr double kMostRatio = 0.93;
+
 /// The result of fitting polynomials to a cell.
 struct ToleranceFit {
   std::optional<Fit> fit;  ///< the polynomial of the lowest degree within the tolerance, if there is one
