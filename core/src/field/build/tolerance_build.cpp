@@ -8,7 +8,6 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
-#include <ranges>
 #include <utility>
 #include <vector>
 
@@ -57,7 +56,7 @@ class ToleranceBuild {
     roots_.resize(tree_.nodes.size());
     lookAtFirstDepths();
     doTasks();
-    for (CheapCell* cell : divided_ | std::views::reverse) cells_.settle(*cell);
+    std::for_each(divided_.rbegin(), divided_.rend(), [this](CheapCell* cell) { cells_.settle(*cell); });
     double worst = 0;
     for (std::uint32_t n = 0; n < roots_.size(); ++n) worst = std::max(worst, moveToTree(n, std::move(roots_[n])));
     FieldData field = layOut(std::move(tree_), metadata(worst), distance_.triangleSearch());
