@@ -460,9 +460,10 @@ TEST_F(Tradeoff, tolerancesAreMeasured) {
   for (const Json& point : points) {
     EXPECT_GT(point["tolerance_ratio"], 0.5);
     EXPECT_LE(point["tolerance_ratio"], 1);
+    EXPECT_EQ(point["kept"], true);
   }
   EXPECT_THAT(readTextFile(at("out/tradeoff.csv")), HasSubstr("mesh,tolerance,bytes"));
-  EXPECT_THAT(readTextFile(at("out/tradeoff.csv")), HasSubstr(",torn_share,tolerance_ratio\n"));
+  EXPECT_THAT(readTextFile(at("out/tradeoff.csv")), HasSubstr(",torn_share,tolerance_ratio,kept\n"));
   EXPECT_EQ(countOf(readTextFile(at("out/index.html")), "<td>yes</td>"), 2u);
   EXPECT_THAT(readTextFile(at("out/index.html")), HasSubstr("for a range of tolerances"));
   const Json recommended = study({"--budget", points[0]["bytes"].dump()})["recommended"];
@@ -510,7 +511,7 @@ TEST_F(Tradeoff, mistakesAreRefused) {
   refused({"--target-error", "1e-3"}, "target-error: is for");
   refused({"--max-bytes", "1000"}, "max-bytes: is for");
   refused({"--budget", "0"}, "budget");
-  refused({"--max-degree", "3"}, "leave out max-degree, or give a target error in place of a tolerance");
+  refused({"--max-degree", "3"}, "leave out max-degree, or give target-errors");
 }
 
 }  // namespace compare_test

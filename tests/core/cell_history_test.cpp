@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -221,17 +222,29 @@ TEST(CellHistory, refusesSettingsOutOfRange) {
 TEST(CellHistory, rejectsWhatIsNotWithinTheTolerance) {
   const TriangleMesh mesh = loadMesh("builtin:torus,major=0.7,minor=0.25,segments=24,sides=12");
   const ExactDistance distance(mesh);
-  const Field field = build(distance, domainAround(mesh), {.grid = {2, 2, 2}, .tolerance = 0.02});
-  std::size_t rejected = 0, taken = 0;
-  for (const Vector3& x : kPlaces)
-    for (const CellStep& step : cellHistory(field, distance, x).steps) {
-      EXPECT_TRUE(!step.exactTrial || step.triangles > 0);
-      if (!step.degreeTrial) continue;
-      EXPECT_EQ(step.degreeTrial->isRejected, step.degreeTrial->error > 0.93) << step.degreeTrial->error;
-      ++(step.degreeTrial->isRejected ? rejected : taken);
-    }
-  EXPECT_GT(rejected, 0U);
-  EXPECT_GT(taken, 0U);
+  const auto counts = [&](bool certified) {
+    const BuildOptions options{.grid = {2, 2, 2}, .tolerance = 0.02, .certified = certified};
+    const Field field = build(distance, domainAround(mesh), options);
+    std::size_t rejected = 0, unproven = 0, taken = 0;
+    for (const Vector3& x : kPlaces)
+      for (const CellStep& step : cellHistory(field, distance, x).steps) {
+        EXPECT_TRUE(!step.exactTrial || step.triangles > 0);
+        if (!step.degreeTrial) continue;
+        const bool isTooGreat = step.degreeTrial->error > 0.93;
+        EXPECT_EQ(step.degreeTrial->isUnproven, step.degreeTrial->isRejected && !isTooGreat);
+        if (isTooGreat || !certified) {
+          EXPECT_EQ(step.degreeTrial->isRejected, isTooGreat) << step.degreeTrial->error;
+        }
+        ++(step.degreeTrial->isUnproven ? unproven : step.degreeTrial->isRejected ? rejected : taken);
+      }
+    return std::array{rejected, unproven, taken};
+  };
+  const auto checked = counts(false), certified = counts(true);
+  EXPECT_GT(checked[0], 0U);
+  EXPECT_EQ(checked[1], 0U);
+  EXPECT_GT(checked[2], 0U);
+  EXPECT_GT(certified[1], 0U);
+  EXPECT_GT(certified[2], 0U);
 }
 
 TEST(CellHistory, refusesPlacesOutside) {

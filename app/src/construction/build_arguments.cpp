@@ -82,13 +82,11 @@ bool isAnyGiven(const Arguments& arguments, std::initializer_list<BuildSetting::
 
 /// Throws `Error` for a setting that is given and has no effect on a construction within a tolerance.
 void requireEffect(const Arguments& arguments) {
-  for (const BuildSetting& setting : buildSettings())
-    if (setting.isOffered && arguments.given(setting.name) && !setting.hasEffectWithTolerance &&
-        setting.ending != BuildSetting::Ending::target)
-      throw Error(
-          fmt::format("{0} has no effect with tolerance, which decides how the field is built: leave out {0}, or give "
-                      "a target error in place of a tolerance",
-                      setting.name));
+  if (const std::string name = givenWithoutEffectWithinTolerance(arguments); !name.empty())
+    throw Error(
+        fmt::format("{0} has no effect with tolerance, which decides how the field is built: leave out {0}, or give a "
+                    "target error in place of a tolerance",
+                    name));
   if (arguments.flag("paper")) throw Error("paper and tolerance exclude each other: give one of them");
 }
 
@@ -106,6 +104,14 @@ InsideTest insideTestOf(const std::string& name) {
 }
 
 }  // namespace
+
+std::string givenWithoutEffectWithinTolerance(const Arguments& arguments) {
+  for (const BuildSetting& setting : buildSettings())
+    if (setting.isOffered && arguments.given(setting.name) && !setting.hasEffectWithTolerance &&
+        setting.ending != BuildSetting::Ending::target)
+      return std::string(setting.name);
+  return "";
+}
 
 ParameterKind settingKind(const char* name) { return kindOf(buildSetting(name)); }
 

@@ -60,6 +60,9 @@ Box domainFrom(const Arguments& arguments, const Box& surface);
 /// on the surface.
 void requireConsistent(const Arguments& arguments);
 
+/// Returns the name of a setting that is given and has no effect on a construction within a tolerance, or "".
+std::string givenWithoutEffectWithinTolerance(const Arguments& arguments);
+
 /// Returns the error of a construction that needs more memory, with the option of the command line that allows more.
 Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& arguments);
 

@@ -49,7 +49,11 @@ Json optionalJson(const std::optional<double>& number) { return number ? Json(*n
 
 Json alternativeJson(const std::optional<CellAlternative>& alternative) {
   if (!alternative) return {};
-  return {{"bytes", alternative->bytes}, {"error", alternative->error}, {"gain", optionalJson(alternative->gain)}};
+  return {{"bytes", alternative->bytes},
+          {"error", alternative->error},
+          {"gain", optionalJson(alternative->gain)},
+          {"rejected", alternative->isRejected},
+          {"unproven", alternative->isUnproven}};
 }
 
 Json stepJson(const CellStep& step) {

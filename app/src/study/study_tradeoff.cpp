@@ -19,6 +19,7 @@
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"
+#include "session/field_summary.h"
 #include "session/session.h"
 #include "study/study_command.h"
 #include "text/json.h"
@@ -47,6 +48,7 @@ struct TradeoffPoint {
   FieldStatistics counts;
   double seconds;  ///< time to set up the exact distance and to build the field
   Measurement measured;
+  bool isMissed;      ///< some cell or some point misses the tolerance
   double leastError;  ///< error at which the field equals the surface but for rounding
 };
 
@@ -114,16 +116,19 @@ TradeoffPoint tradeoffPoint(const Console& console, const BuildInput& input, con
   const auto start = std::chrono::steady_clock::now();
   const BuildOptions options = buildOptions(buildArguments, input.exact->source().box.sizes().maxCoeff());
   return withProgress(console, [&](const Progress& progress) {
-    const Field field = build(*input.exact, input.domain, options, progress);
+    Field field = build(*input.exact, input.domain, options, progress);
     const double seconds = input.setUpSeconds + secondsSince(start);
     const MeasureOptions measuring{.points = static_cast<std::size_t>(arguments.number("points")),
                                    .seed = static_cast<std::uint64_t>(arguments.number("seed")),
                                    .threads = options.threads};
+    const Measurement measured = measure(field, *input.exact, measuring, progress);
+    field = withMeasurement(std::move(field), measured);
     return TradeoffPoint{.end = end,
                          .command = {},
                          .counts = statistics(field),
                          .seconds = seconds,
-                         .measured = measure(field, *input.exact, measuring, progress),
+                         .measured = measured,
+                         .isMissed = missesTolerance(field),
                          .leastError = 1e-6 * field.metadata().referenceLength};
   });
 }
@@ -172,8 +177,10 @@ Tradeoff tradeoffOf(Session& session, const Arguments& arguments, std::size_t me
   Tradeoff tradeoff{arguments.texts("mesh")[mesh], name, rangeOf(arguments)};
   Console console = session.console();
   const TradeoffRange& range = tradeoff.range;
-  const BuildInput input =
-      buildInput(console, tradeoff.mesh, pointArguments(session, arguments, mesh, range, range.values.front()));
+  const Arguments first = pointArguments(session, arguments, mesh, range, range.values.front());
+  if (const std::string idle = givenWithoutEffectWithinTolerance(first); range.isOfTolerances() && !idle.empty())
+    throw Error(fmt::format("{0} has no effect within a tolerance: leave out {0}, or give target-errors", idle));
+  const BuildInput input = buildInput(console, tradeoff.mesh, first);
   for (const std::string& value : range.values) {
     const Arguments point = pointArguments(session, arguments, mesh, range, value);
     console.work = fmt::format("{} of {}, {}: ", tradeoff.points.size() + 1, range.values.size(), range.named(value));
@@ -202,7 +209,10 @@ Json pointJson(const TradeoffRange& range, const TradeoffPoint& point) {
                {"domain_max", m.domain.max},
                {"wrong_signs", m.wrongSigns},
                {"torn_share", m.tornShare}};
-  if (range.isOfTolerances()) json["tolerance_ratio"] = m.toleranceRatio;
+  if (range.isOfTolerances()) {
+    json["tolerance_ratio"] = m.toleranceRatio;
+    json["kept"] = !point.isMissed;
+  }
   return json;
 }
 
@@ -219,7 +229,7 @@ std::string tradeoffCsv(const std::vector<Tradeoff>& tradeoffs) {
   std::string text = fmt::format(
       "mesh,{},bytes,leaves,exact_leaves,seconds,near_rms,near_max,domain_rms,domain_max,wrong_signs,"
       "torn_share{}\n",
-      tradeoffs.front().range.key(), tradeoffs.front().range.isOfTolerances() ? ",tolerance_ratio" : "");
+      tradeoffs.front().range.key(), tradeoffs.front().range.isOfTolerances() ? ",tolerance_ratio,kept" : "");
   for (const Tradeoff& tradeoff : tradeoffs)
     for (const TradeoffPoint& point : tradeoff.points)
       text += fmt::format("{},{}\n", tradeoff.name, rowText(pointJson(tradeoff.range, point)));
@@ -238,7 +248,7 @@ std::vector<std::string> tradeoffCells(const TradeoffRange& range, const Tradeof
                                     shortNumber(m.domain.rms),
                                     shortNumber(m.domain.max),
                                     shortNumber(100 * m.tornShare) + " %"};
-  if (range.isOfTolerances()) cells.push_back(m.toleranceRatio > 1 ? "no" : "yes");
+  if (range.isOfTolerances()) cells.push_back(point.isMissed ? "no" : "yes");
   return cells;
 }
 
@@ -307,8 +317,9 @@ std::string tradeoffSection(const Tradeoff& tradeoff) {
   html += "</table>\n";
   html += fmt::format(
       "<p>Errors are measured at random points, half of them within {} of the surface, and are in the units of the "
-      "field. Time is that of the construction on this machine.</p>\n",
-      shortNumber(tradeoff.points.front().measured.nearDistance));
+      "field. Time is that of the construction on this machine.{}</p>\n",
+      shortNumber(tradeoff.points.front().measured.nearDistance),
+      tradeoff.range.isOfTolerances() ? " A tolerance is kept if no cell and no point misses it." : "");
   if (!tradeoff.recommendation.empty()) html += fmt::format("<p>{}</p>\n", htmlEscaped(tradeoff.recommendation));
   if (tradeoff.recommended) html += fmt::format("<code>{}</code>\n", htmlEscaped(tradeoff.best()->command));
   html += tradeoffChart(tradeoff, "memory [bytes]", [](const TradeoffPoint& p) { return double(p.counts.bytes); });
@@ -370,7 +381,8 @@ Study tradeoffStudy() {
       .help = paragraphs(R"(
 bytes, time and measured errors of a mesh's fields for a range of tolerances, or of target errors. Use it to choose the
 --tolerance, or the --target-error, of 'hpsdf build' for a mesh. With --budget or --within-seconds it names the most exact field of the range that keeps them, and
-the command that builds it; the field with the least RMS error near the surface is the most exact. Half of the points at
+the command that builds it; the field with the least RMS error near the surface is the most exact. The column "kept" says
+whether a tolerance was kept by all cells and at all points. Half of the points at
 which errors are measured lie near the surface. Writes index.html with the table and the curves, tradeoff.csv and
 tradeoff.json.)"),
       .parameters = joined(

@@ -43,7 +43,7 @@ struct CellAlternative {
   std::optional<double> gain = {};
   /// Within a tolerance: the polynomial's error is too great or, if that is certified, not proven to be small enough.
   bool isRejected = false;
-  bool isUnproven = false;  ///< rejected only because there is no proof for it
+  bool isUnproven = false;  ///< rejected although its error is small enough, because there is no proof for it
 };
 
 /// One decision of the construction, about the cell that held the point at that time.

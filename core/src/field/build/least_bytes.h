@@ -24,7 +24,7 @@ struct CheapCell {
   double bytes = 0;       ///< of the leaf, or of all descendants, in the finished field
   double ratio = 0;       ///< error of the cell's best polynomial over the allowed error
   double leafRatio = 0;   ///< error of the leaf over the allowed error, 0 for an exact leaf
-  bool jumps = false;     ///< the distance jumps in the cell
+  bool jumps = false;     ///< a jump of the distance was found; none is sought where the parent's error is very great
   bool isMissed = false;  ///< the leaf is a polynomial that misses the tolerance, in a cell that is not divided further
   std::unique_ptr<std::array<CheapCell, 8>> children = {};
 };

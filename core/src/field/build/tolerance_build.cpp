@@ -8,6 +8,7 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -67,25 +68,28 @@ class ToleranceBuild {
   }
 
  private:
-  /// A cell to be solved, whose parent was divided.
+  /// A cell to be solved.
   struct Task {
     CheapCell* cell;
     CellPlace place;
-    bool jumpsAbove;  ///< the distance jumps in the parent
-    double ratioAbove;
+    const CheapCell* parent = nullptr;  ///< nullptr for a cell of the base grid
 
-    /// Orders tasks by the error of the parent, which is greatest where the distance jumps.
-    std::pair<bool, double> error() const { return {jumpsAbove, ratioAbove}; }
+    double ratioAbove() const { return parent ? parent->ratio : 0; }
+    /// Orders tasks by the work that they are likely to take: first by whether a jump of the distance was found in the
+    /// parent, then by the parent's error.
+    std::pair<bool, double> error() const { return {parent && parent->jumps, ratioAbove()}; }
+    /// Returns the bytes of a cell that is done. The parent stays a leaf if its children take more.
+    double bytes() const { return parent ? std::min(cell->bytes, parent->bytes / 8) : cell->bytes; }
   };
 
   /// Looks at all cells of the first depths, until enough cells are left for tasks. A few of these may take most of the
   /// work, usually those with the greatest errors: a part of them is divided further.
   void lookAtFirstDepths() {
-    constexpr std::size_t kEnough = 500, kRounds = 3, kPart = 10;
-    for (std::uint32_t n = 0; n < roots_.size(); ++n)
-      tasks_.push_back({&roots_[n], {0, tree_.nodes[n].cellIndex}, false, 0});
+    constexpr std::size_t kEnough = 500, kTimes = 3, kPart = 10;
+    for (std::uint32_t n = 0; n < roots_.size(); ++n) tasks_.push_back({&roots_[n], {0, tree_.nodes[n].cellIndex}});
+    shuffle(tasks_);
     while (!tasks_.empty() && tasks_.size() < kEnough) tasks_ = childrenOf(tasks_);
-    for (std::size_t round = 0; round < kRounds; ++round) {
+    for (std::size_t time = 0; time < kTimes; ++time) {
       std::ranges::stable_sort(tasks_, {}, &Task::error);
       const std::vector<Task> greatest(tasks_.end() - std::ptrdiff_t(tasks_.size() / kPart), tasks_.end());
       tasks_.resize(tasks_.size() - greatest.size());
@@ -94,12 +98,19 @@ class ToleranceBuild {
     firstCells_ = cells_.cells();
   }
 
+  /// Brings the cells of the base grid into a random order, always the same. In the order of the grid, a sample of
+  /// every so many cells might be a plane of the grid.
+  static void shuffle(std::vector<Task>& tasks) {
+    std::mt19937_64 random;
+    for (std::size_t t = tasks.size(); t > 1; --t) std::swap(tasks[t - 1], tasks[random() % t]);
+  }
+
   /// Makes leaves of cells, and divides those whose children may take fewer bytes. Returns these children.
   std::vector<Task> childrenOf(const std::vector<Task>& looks) {
     progress_.update("fitting first cells", 0);
     std::vector<std::uint8_t> divides(looks.size());
     tbb::parallel_for(std::size_t{0}, looks.size(), [&](std::size_t n) {
-      divides[n] = cells_.makeLeaf(*looks[n].cell, looks[n].place, looks[n].ratioAbove);
+      divides[n] = cells_.makeLeaf(*looks[n].cell, looks[n].place, looks[n].ratioAbove());
     });
     std::vector<Task> children;
     for (std::size_t n = 0; n < looks.size(); ++n) {
@@ -109,7 +120,7 @@ class ToleranceBuild {
       LeastBytes::divide(cell);
       divided_.push_back(&cell);
       for (std::uint32_t child = 0; child < 8; ++child)
-        children.push_back({&(*cell.children)[child], looks[n].place.child(child), cell.jumps, cell.ratio});
+        children.push_back({&(*cell.children)[child], looks[n].place.child(child), &cell});
     }
     return children;
   }
@@ -122,7 +133,7 @@ class ToleranceBuild {
       progress_.update("fitting cells", double(done) / double(tasks_.size()));
       const std::size_t end = std::min(done + atOnce, done < sample ? sample : tasks_.size());
       tbb::parallel_for(
-          done, end, [&](std::size_t t) { cells_.solve(*tasks_[t].cell, tasks_[t].place, tasks_[t].ratioAbove); },
+          done, end, [&](std::size_t t) { cells_.solve(*tasks_[t].cell, tasks_[t].place, tasks_[t].ratioAbove()); },
           tbb::simple_partitioner{});
       done = end;
       forecast(done, sample);
@@ -133,10 +144,10 @@ class ToleranceBuild {
   /// sorted by the errors of the parents. The others follow in as many passes through the list. Returns the size of the
   /// sample.
   std::size_t orderTasks() {
-    constexpr std::size_t kSmallestSample = 100, kMostPasses = 15;
+    constexpr std::size_t kUsualSample = 100, kMostPasses = 15;
     std::ranges::stable_sort(tasks_, {}, &Task::error);
     // The number of passes is odd, so that each meets all eight children of a cell evenly.
-    const std::size_t passes = std::min(tasks_.size() / kSmallestSample, kMostPasses) | 1;
+    const std::size_t passes = std::min(tasks_.size() / kUsualSample, kMostPasses) | 1;
     std::vector<Task> ordered;
     ordered.reserve(tasks_.size());
     std::size_t sample = 0;
@@ -151,7 +162,7 @@ class ToleranceBuild {
   /// Estimates what the whole construction takes from the tasks that are done. Reports it once, and throws `Error` if
   /// it is more than the memory allows.
   void forecast(std::size_t done, std::size_t sample) {
-    for (; summed_ < done; ++summed_) taskBytes_ += tasks_[summed_].cell->bytes;
+    for (; summed_ < done; ++summed_) taskBytes_ += tasks_[summed_].bytes();
     const double scale = double(tasks_.size()) / double(done), bytes = taskBytes_ * scale;
     // Cells are in memory as they are built, and again as the arrays of the field are made.
     requireRoom(double(firstCells_) + double(cells_.cells() - firstCells_) * scale, 2 * bytes);
