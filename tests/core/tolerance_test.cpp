@@ -83,6 +83,22 @@ TEST(Tolerance, seesKinksThatPassBetweenThePoints) {
   }
 }
 
+TEST(Tolerance, seesKinksBesideOtherCrestsOfTheError) {
+  const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
+  for (int i = 0; i < 40; ++i) {
+    const double at = -0.975 + i * 0.05;
+    SCOPED_TRACE(at);
+    const auto halfway = [&](const Vector3& x) { return std::abs(x.z() - at) - 0.25; };  // between two parallel faces
+    for (const double tolerance : {0.005, 0.01, 0.02, 0.04, 0.08}) {
+      const Field field = build(halfway, domain, {.grid = {1, 1, 1}, .tolerance = tolerance, .within = 10});
+      double worst = 0;
+      for (double z = -1; z <= 1; z += 0.0005)
+        worst = std::max(worst, std::abs(field.value({0.1, 0.3, z}) - halfway({0.1, 0.3, z})));
+      EXPECT_LE(worst, tolerance) << "of a tolerance of " << tolerance;
+    }
+  }
+}
+
 TEST(Tolerance, isKeptAtAnyScale) {
   const TriangleMesh mesh = shapes::mesh("gear,teeth=5");
   const TriangleMesh large = support::moved(mesh, {1e4, 0, 0}, 1000);

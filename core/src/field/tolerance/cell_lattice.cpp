@@ -75,7 +75,7 @@ CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (Pr
     indicesBetween.at(x, y, z) = static_cast<std::uint32_t>(between_.size());
     between_.push_back(spacing_ * Vector3(between(x), between(y), between(z)) - Vector3::Constant(reach));
   });
-  rowsBetween_ = indicesBetween.rows(1, kAcross - 1);
+  rowsBetween_ = indicesBetween.rows(0, kAcross);
 
   for (int degree = 1; degree <= kMostDegree; ++degree) {
     Matrices& matrices = matrices_[degree];

@@ -26,28 +26,33 @@ bool hasJump(const CellLattice& lattice, const Box& cell, std::span<const double
   });
 }
 
-/// A place between the middle ones of four points in a row at which the error is greatest if it rises there as steeply
-/// as beside them, and the ratio of that error to the allowed one.
+/// A place at which a kink of the distance is suspected, and the ratio of the error there to the allowed one.
 struct Peak {
   double ratio = 0;
   Vector3 local = Vector3::Zero();
 };
 
-/// Appends the peaks of rows of four points. Where the distance has a kink, such as on the planes halfway between two
-/// faces, the error has a sharp peak, which all points of the lattices may miss. Its true height is often greater than
-/// this estimate, because the error becomes steeper towards the kink; the distance itself is evaluated there.
+/// Appends the kinks that rows of four points suggest. Where the distance has a kink, such as on the planes halfway
+/// between two faces, the error has a sharp peak, which all points of the lattices may miss. Beside a kink the distance
+/// is nearly linear, which the error is not, so that the place of the kink and the distance there follow from the two
+/// slopes beside it.
 template <typename Points>
-void findPeaks(const Points& points, std::span<const CellLattice::Row> rows, std::vector<Peak>& peaks) {
+void findPeaks(const Fit& fit, const AllowedError& allowed, const Points& points,
+               std::span<const CellLattice::Row> rows, std::vector<Peak>& peaks) {
   constexpr double kLeast = 0.7;  // lower peaks are not within reach of the greatest allowed ratio
-  for (const CellLattice::Row& row : rows)
-    for (const int sign : {1, -1}) {
-      const auto at = [&](int i) { return sign * points[row[i]].signedRatio; };
-      const double rise = at(1) - at(0), fall = at(2) - at(3);
-      if (rise <= 0 || fall <= 0) continue;
-      const double t = (at(2) + fall - at(1)) / (rise + fall), ratio = at(1) + rise * t;
-      if (t <= 0 || t >= 1 || ratio <= kLeast) continue;
-      peaks.push_back({ratio, points[row[1]].local + t * (points[row[2]].local - points[row[1]].local)});
-    }
+  constexpr double kKink = 0.1;   // change of slope over the allowed error; smaller ones add less than 3 % to a ratio
+  for (const CellLattice::Row& row : rows) {
+    const auto step = [&](int i) { return (points[row[i + 1]].local - points[row[i]].local).sum(); };  // along an axis
+    const auto change = [&](int i) { return points[row[i + 1]].distance - points[row[i]].distance; };
+    const double width = step(1), before = change(0) / step(0) * width, after = change(2) / step(2) * width;
+    if (std::abs(before - after) < kKink * allowed.at(points[row[1]].distance)) continue;
+    const double t = (change(1) - after) / (before - after);
+    if (t <= 0 || t >= 1) continue;
+    const double distance = points[row[1]].distance + t * before;
+    const Vector3 local = points[row[1]].local + t * (points[row[2]].local - points[row[1]].local);
+    const double ratio = std::abs(fit.valueAt(local) - distance) / allowed.at(distance);
+    if (ratio > kLeast) peaks.push_back({ratio, local});
+  }
 }
 
 Fit polynomial(std::vector<double> coefficients, int degree, const Box& cell) {
@@ -94,23 +99,50 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::check(const Fit& fit
   const std::vector<double> exact = distances(cell, local);
   std::vector<CheckedPoint> points(local.size());
   for (std::size_t i = 0; i < local.size(); ++i)
-    points[i] = {local[i], (fit.valueAt(local[i]) - exact[i]) / allowed_.at(exact[i])};
+    points[i] = {local[i], exact[i], std::abs(fit.valueAt(local[i]) - exact[i]) / allowed_.at(exact[i])};
   return points;
 }
 
-/// Returns the worst ones of the points, which lie apart from each other.
-std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::vector<CheckedPoint> points) const {
+/// Returns the worst point of each layer of the lattices, across each axis, whose two neighbouring layers are not
+/// worse. On a kink along a plane all points are as bad as one another, and the worst points of all may lie on another
+/// one.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::crests(std::span<const CheckedPoint> points) const {
+  std::vector<CheckedPoint> crests;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::array<const CheckedPoint*, CellLattice::kLayers> worst{};
+    for (const CheckedPoint& point : points) {
+      const CheckedPoint*& of = worst[lattice_.layer(point.local[axis])];
+      if (of == nullptr || point.ratio > of->ratio) of = &point;
+    }
+    for (std::size_t i = 0; i < worst.size(); ++i) {
+      const bool isCrest = (i == 0 || worst[i]->ratio > worst[i - 1]->ratio) &&
+                           (i + 1 == worst.size() || worst[i]->ratio >= worst[i + 1]->ratio);
+      if (isCrest) crests.push_back(*worst[i]);
+    }
+  }
+  return crests;
+}
+
+/// Returns bad points that lie apart from each other: the crests of the lattices, and the worst ones of all points.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::span<const CheckedPoint> lattices,
+                                                                   std::vector<CheckedPoint> others) const {
   constexpr std::size_t kMost = 16;
   constexpr double kLeast = 0.5, kApart = 0.8;  // ratio of the error, and distance in spacings of the lattice
-  std::erase_if(points, [](const CheckedPoint& point) { return point.ratio() < kLeast; });
-  std::ranges::stable_sort(points, std::greater(), &CheckedPoint::ratio);
   std::vector<CheckedPoint> tops;
-  for (const CheckedPoint& point : points) {
-    if (tops.size() == kMost) break;
-    const bool isApart = std::ranges::all_of(
-        tops, [&](const CheckedPoint& top) { return (top.local - point.local).norm() >= kApart * lattice_.spacing(); });
-    if (isApart) tops.push_back(point);
-  }
+  const auto take = [&](std::vector<CheckedPoint> points) {
+    std::erase_if(points, [](const CheckedPoint& point) { return point.ratio < kLeast; });
+    std::ranges::stable_sort(points, std::greater(), &CheckedPoint::ratio);
+    for (const CheckedPoint& point : points) {
+      if (tops.size() == kMost) break;
+      const bool isApart = std::ranges::all_of(tops, [&](const CheckedPoint& top) {
+        return (top.local - point.local).norm() >= kApart * lattice_.spacing();
+      });
+      if (isApart) tops.push_back(point);
+    }
+  };
+  take(crests(lattices));
+  others.insert(others.end(), lattices.begin(), lattices.end());
+  take(std::move(others));
   return tops;
 }
 
@@ -121,7 +153,7 @@ double ToleranceFitter::climb(const Fit& fit, const Box& cell, std::vector<Check
   constexpr int kDirections = 6;
   std::vector<double> steps(tops.size(), lattice_.spacing() / 2);
   double greatest = 0;
-  for (const CheckedPoint& top : tops) greatest = std::max(greatest, top.ratio());
+  for (const CheckedPoint& top : tops) greatest = std::max(greatest, top.ratio);
   for (int round = 0; round < kRounds && !tops.empty() && greatest <= kMostRatio; ++round) {
     std::vector<Vector3> around;
     for (std::size_t t = 0; t < tops.size(); ++t)
@@ -135,11 +167,11 @@ double ToleranceFitter::climb(const Fit& fit, const Box& cell, std::vector<Check
     for (std::size_t t = 0; t < tops.size(); ++t) {
       const auto own = std::span(checked).subspan(kDirections * t, kDirections);
       const auto best = std::ranges::max_element(own, {}, &CheckedPoint::ratio);
-      if (best->ratio() > tops[t].ratio())
+      if (best->ratio > tops[t].ratio)
         tops[t] = *best;
       else
         steps[t] /= 2;
-      greatest = std::max(greatest, tops[t].ratio());
+      greatest = std::max(greatest, tops[t].ratio);
     }
   }
   return greatest;
@@ -152,36 +184,35 @@ void ToleranceFitter::addSurfacePoints(const Fit& fit, const Box& cell, std::vec
   const Vector3 half = cell.sizes() / 2;
   surface_->forEachIn(cell, [&](const Vector3& point) {
     const Vector3 local = (point - cell.center()).cwiseQuotient(half);
-    points.push_back({local, (fit.valueAt(local) + surface_->offset()) / allowed_.at(surface_->offset())});
+    const double distance = -surface_->offset();
+    points.push_back({local, distance, std::abs(fit.valueAt(local) - distance) / allowed_.at(distance)});
   });
 }
 
-/// Adds the highest peaks that the errors at the lattice and between its points suggest.
-void ToleranceFitter::addPeaks(const Fit& fit, const Box& cell, std::span<const CheckedPoint> lattice,
-                               std::span<const CheckedPoint> between, std::vector<CheckedPoint>& points) const {
+/// Checks the highest peaks that the distances at the lattice and between its points suggest.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::peaks(const Fit& fit, const Box& cell,
+                                                                  std::span<const CheckedPoint> lattice,
+                                                                  std::span<const CheckedPoint> between) const {
   constexpr std::size_t kMost = 96;
   std::vector<Peak> peaks;
-  findPeaks(lattice, lattice_.rows(), peaks);
-  findPeaks(between, lattice_.rowsBetween(), peaks);
-  if (peaks.empty()) return;
+  findPeaks(fit, allowed_, lattice, lattice_.rows(), peaks);
+  findPeaks(fit, allowed_, between, lattice_.rowsBetween(), peaks);
   std::ranges::stable_sort(peaks, std::greater(), &Peak::ratio);
   std::vector<Vector3> local(std::min(kMost, peaks.size()));
   for (std::size_t i = 0; i < local.size(); ++i) local[i] = peaks[i].local;
-  const std::vector<CheckedPoint> checked = check(fit, cell, local);
-  points.insert(points.end(), checked.begin(), checked.end());
+  return local.empty() ? std::vector<CheckedPoint>() : check(fit, cell, local);
 }
 
 /// Returns the greatest ratio found in a cell, or one that is too great. `points` are the points of the lattice.
 double ToleranceFitter::greatestRatio(const Fit& fit, const Box& cell, std::vector<CheckedPoint> points) const {
-  const std::size_t latticePoints = points.size();
   const std::vector<CheckedPoint> between = check(fit, cell, lattice_.pointsBetween());
+  std::vector<CheckedPoint> others = peaks(fit, cell, points, between);
+  addSurfacePoints(fit, cell, others);
   points.insert(points.end(), between.begin(), between.end());
-  std::vector<CheckedPoint> peaks;
-  addPeaks(fit, cell, std::span(points).first(latticePoints), between, peaks);
-  points.insert(points.end(), peaks.begin(), peaks.end());
-  addSurfacePoints(fit, cell, points);
-  const double greatest = std::ranges::max_element(points, {}, &CheckedPoint::ratio)->ratio();
-  return greatest > kMostRatio ? greatest : std::max(greatest, climb(fit, cell, topsOf(std::move(points))));
+  double greatest = 0;
+  for (const auto& list : {std::span(std::as_const(points)), std::span(std::as_const(others))})
+    for (const CheckedPoint& point : list) greatest = std::max(greatest, point.ratio);
+  return greatest > kMostRatio ? greatest : std::max(greatest, climb(fit, cell, topsOf(points, std::move(others))));
 }
 
 ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {
@@ -221,7 +252,8 @@ ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {
     double ratio = latticeRatio(errors, allowed);
     if (ratio <= kMostRatio) {
       std::vector<CheckedPoint> points(exact.size());
-      for (std::size_t i = 0; i < exact.size(); ++i) points[i] = {lattice_.points()[i], errors[i] / allowed[i]};
+      for (std::size_t i = 0; i < exact.size(); ++i)
+        points[i] = {lattice_.points()[i], exact[i], std::abs(errors[i]) / allowed[i]};
       ratio = greatestRatio(fit, cell, std::move(points));
       if (ratio <= kMostRatio && (!certified_ || isProven(fit, cell))) {
         result.ratio = ratio;

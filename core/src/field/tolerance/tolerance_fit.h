@@ -29,8 +29,8 @@ struct ToleranceFit {
 };
 
 /// Fits polynomials to cells by samples at a lattice of 512 points. The error is checked at these points, at 729 points
-/// between them, at the peaks that these points suggest, at points of the surface and, from the worst ones of all, by a
-/// search uphill. Thread-safe.
+/// between them, where these points suggest kinks of the distance, at points of the surface and, from the worst ones of
+/// all, by a search uphill. Thread-safe.
 class ToleranceFitter {
  public:
   /// Keeps references to the distance and to the progress. `certified` takes only polynomials for which
@@ -49,20 +49,20 @@ class ToleranceFitter {
  private:
   struct CheckedPoint {
     Vector3 local;
-    double signedRatio;  ///< error f − Φ over the allowed error
-
-    double ratio() const { return std::abs(signedRatio); }
+    double distance;  ///< Φ
+    double ratio;     ///< |f − Φ| over the allowed error
   };
 
   std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const;
   std::vector<CheckedPoint> check(const Fit& fit, const Box& cell, std::span<const Vector3> local) const;
   double latticeRatio(std::span<const double> errors, std::span<const double> allowed) const;
-  void addPeaks(const Fit& fit, const Box& cell, std::span<const CheckedPoint> lattice,
-                std::span<const CheckedPoint> between, std::vector<CheckedPoint>& points) const;
+  std::vector<CheckedPoint> peaks(const Fit& fit, const Box& cell, std::span<const CheckedPoint> lattice,
+                                  std::span<const CheckedPoint> between) const;
   void addSurfacePoints(const Fit& fit, const Box& cell, std::vector<CheckedPoint>& points) const;
   double greatestRatio(const Fit& fit, const Box& cell, std::vector<CheckedPoint> points) const;
   double climb(const Fit& fit, const Box& cell, std::vector<CheckedPoint> tops) const;
-  std::vector<CheckedPoint> topsOf(std::vector<CheckedPoint> points) const;
+  std::vector<CheckedPoint> crests(std::span<const CheckedPoint> points) const;
+  std::vector<CheckedPoint> topsOf(std::span<const CheckedPoint> lattices, std::vector<CheckedPoint> others) const;
   bool isProven(const Fit& fit, const Box& cell) const;
 
   const DistanceFunction& distance_;
