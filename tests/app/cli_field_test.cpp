@@ -147,7 +147,11 @@ TEST_F(FieldFile, badPointsAreRefusedByLine) {
   const Outcome first = run({{"query", field()}, "nan,nan,nan\n"});
   EXPECT_EQ(first.status, 2);
   EXPECT_THAT(first.err, HasSubstr("stdin:1: expected three finite numbers"));
+  EXPECT_EQ(run({{"query", field(), "0.1,-2e-1,0.3"}}).out, run({{"query", field()}, "0.1 -2e-1 0.3\n"}).out);
+  EXPECT_EQ(run({{"query", field(), "-0.1,0.2,0.3"}}).out, run({{"query", field()}, "-0.1 0.2 0.3\n"}).out);
+  expectRefused({{"query", field(), "1,2"}}, "1,2:1: expected three finite");
   expectRefused({{"query", field(), at("none.txt")}}, "none.txt: no such file");
+  expectRefused({{"query", field(), "a,b,c"}}, "a,b,c: no such file");
   expectRefused({{"query", field(), folder_.path().string()}}, "is a folder");
 }
 

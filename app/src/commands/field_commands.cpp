@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "batch/batch.h"
 #include "commands/commands.h"
@@ -158,18 +160,40 @@ void runInfo(Session& session, const Arguments& arguments) {
   session.console().out << fieldText(session.current());
 }
 
+/// The points of a query: a single one that is given as X,Y,Z, those of a file or, named "-", those of an open stream.
+class PointSource {
+ public:
+  PointSource(const std::string& points, std::istream& in) : name_(points) {
+    if (points == "-") {
+      name_ = "stdin";
+      in_ = &in;
+    } else if (points.find_first_not_of("0123456789+-.eE,") == std::string::npos && !std::filesystem::exists(points)) {
+      point_.str(points);
+      in_ = &point_;
+    } else {
+      file_ = openFile(points, "a file of points");
+      in_ = &file_;
+    }
+  }
+
+  std::istream& in() const { return *in_; }
+  const std::string& name() const { return name_; }
+
+ private:
+  std::string name_;
+  std::istringstream point_;
+  std::ifstream file_;
+  std::istream* in_ = nullptr;
+};
+
 void runQuery(Session& session, const Arguments& arguments) {
   useField(session, arguments);
-  std::ifstream file;
-  const bool fromFile = arguments.has("points") && arguments.text("points") != "-";
-  if (fromFile) file = openFile(arguments.text("points"), "a file of points");
-  std::istream& in = fromFile ? static_cast<std::istream&>(file) : session.console().in;
-  const std::string name = fromFile ? arguments.text("points") : "stdin";
+  const PointSource source(arguments.textOr("points", "-"), session.console().in);
   const PointFormat format = session.wantsJson(arguments) ? PointFormat::json : PointFormat::csv;
   const Field& field = session.current().field;
   std::optional<OutputFile> output;
   if (arguments.has("output")) output.emplace(arguments.text("output"));
-  const std::size_t count = queryPoints(field, in, name, format, [&](std::string_view text) {
+  const std::size_t count = queryPoints(field, source.in(), source.name(), format, [&](std::string_view text) {
     if (output) return output->write(text);
     std::ostream& out = session.console().out;
     out << text << std::flush;
@@ -373,14 +397,16 @@ void addReadingCommands(Registry& registry) {
       .name = "query",
       .summary = "Compute distances and gradients at points.",
       .help = paragraphs(R"(
-Reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments and a header line are
-ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an array of
+Takes one point, or reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments
+and a header line are ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an array of
 objects.
 
 Distances are negative inside. Outside the domain the field is continued continuously.)"),
-      .examples = {"echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf", "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
+      .examples = {"hpsdf query bunny.hpsdf 0.1,0.2,0.3", "echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
+                   "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
       .parameters = {fieldParameter(),
-                     {"points", file("POINTS").positional(), "File of points; - or nothing for standard input."},
+                     {"points", file("POINTS").positional(),
+                      "A point X,Y,Z, or a file of points; - or nothing for standard input."},
                      {"output", outputFile().as('o'), "File to write; standard output when left out."}},
       .action = runQuery,
   });
