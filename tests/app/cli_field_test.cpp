@@ -151,7 +151,8 @@ TEST_F(FieldFile, badPointsAreRefusedByLine) {
   EXPECT_EQ(run({{"query", field(), "-0.1,0.2,0.3"}}).out, run({{"query", field()}, "-0.1 0.2 0.3\n"}).out);
   expectRefused({{"query", field(), "1,2"}}, "1,2:1: expected three finite");
   expectRefused({{"query", field(), at("none.txt")}}, "none.txt: no such file");
-  expectRefused({{"query", field(), "a,b,c"}}, "a,b,c: no such file");
+  for (const std::string name : {"a,b,c", "E,1,2", "e", "123"})
+    expectRefused({{"query", field(), name}}, name + ": no such file");
   expectRefused({{"query", field(), folder_.path().string()}}, "is a folder");
 }
 

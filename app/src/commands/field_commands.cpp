@@ -160,14 +160,21 @@ void runInfo(Session& session, const Arguments& arguments) {
   session.console().out << fieldText(session.current());
 }
 
-/// The points of a query: a single one that is given as X,Y,Z, those of a file or, named "-", those of an open stream.
+/// Returns true for a text that is meant as a point X,Y,Z. It may still be none, such as 1,2.
+bool looksLikePoint(const std::string& text) {
+  return text.find(',') != std::string::npos && text.front() != 'e' && text.front() != 'E' &&
+         text.find_first_not_of("0123456789+-.eE,") == std::string::npos;
+}
+
+/// Opens the points of a query: a single point X,Y,Z, a file, or the given stream if the name is "-". A file whose name
+/// looks like a point is read as a file.
 class PointSource {
  public:
   PointSource(const std::string& points, std::istream& in) : name_(points) {
     if (points == "-") {
       name_ = "stdin";
       in_ = &in;
-    } else if (points.find_first_not_of("0123456789+-.eE,") == std::string::npos && !std::filesystem::exists(points)) {
+    } else if (std::error_code unknown; looksLikePoint(points) && !std::filesystem::exists(points, unknown)) {
       point_.str(points);
       in_ = &point_;
     } else {
@@ -398,8 +405,8 @@ void addReadingCommands(Registry& registry) {
       .summary = "Compute distances and gradients at points.",
       .help = paragraphs(R"(
 Takes one point, or reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments
-and a header line are ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an array of
-objects.
+and a header line are ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with
+--json an array of objects.
 
 Distances are negative inside. Outside the domain the field is continued continuously.)"),
       .examples = {"hpsdf query bunny.hpsdf 0.1,0.2,0.3", "echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",

@@ -18,10 +18,11 @@ namespace hpsdf::detail {
 /// coordinates of the cell.
 class CellLattice {
  public:
-  /// The indices of four successive points along an axis.
+  /// The indices of four successive points along an axis. Their distances are equal, except at the ends of
+  /// `pointsBetween()`.
   using Row = std::array<std::uint32_t, 4>;
 
-  static constexpr int kLayers = 2 * ProbeLattice::kAcross - 1;  ///< layers of all points across an axis
+  static constexpr int kLayers = 2 * ProbeLattice::kAcross - 1;  ///< planes across an axis that hold points
   static constexpr int kMostDegree = 5;  ///< 56 coefficients; with more of them, errors between the points grow
 
   /// The lattice reaches from −`reach` to `reach` along each axis.

@@ -26,8 +26,8 @@ bool hasJump(const CellLattice& lattice, const Box& cell, std::span<const double
   });
 }
 
-/// A place at which a kink of the distance is suspected, and the ratio of the error there to the allowed one.
-struct Peak {
+/// A place at which a kink of the distance is suspected, and the estimated ratio of the error there to the allowed one.
+struct Kink {
   double ratio = 0;
   Vector3 local = Vector3::Zero();
 };
@@ -37,21 +37,21 @@ struct Peak {
 /// is nearly linear, which the error is not, so that the place of the kink and the distance there follow from the two
 /// slopes beside it.
 template <typename Points>
-void findPeaks(const Fit& fit, const AllowedError& allowed, const Points& points,
-               std::span<const CellLattice::Row> rows, std::vector<Peak>& peaks) {
-  constexpr double kLeast = 0.7;  // lower peaks are not within reach of the greatest allowed ratio
-  constexpr double kKink = 0.1;   // change of slope over the allowed error; smaller ones add less than 3 % to a ratio
+void findKinks(const Fit& fit, const AllowedError& allowed, const Points& points,
+               std::span<const CellLattice::Row> rows, std::vector<Kink>& kinks) {
+  constexpr double kLeast = 0.7;      // lower peaks are not within reach of the greatest allowed ratio
+  constexpr double kLeastBend = 0.1;  // change of slope times interval, over the allowed error; it adds a quarter of it
   for (const CellLattice::Row& row : rows) {
     const auto step = [&](int i) { return (points[row[i + 1]].local - points[row[i]].local).sum(); };  // along an axis
     const auto change = [&](int i) { return points[row[i + 1]].distance - points[row[i]].distance; };
     const double width = step(1), before = change(0) / step(0) * width, after = change(2) / step(2) * width;
-    if (std::abs(before - after) < kKink * allowed.at(points[row[1]].distance)) continue;
+    if (std::abs(before - after) < kLeastBend * allowed.at(points[row[1]].distance)) continue;
     const double t = (change(1) - after) / (before - after);
     if (t <= 0 || t >= 1) continue;
     const double distance = points[row[1]].distance + t * before;
     const Vector3 local = points[row[1]].local + t * (points[row[2]].local - points[row[1]].local);
     const double ratio = std::abs(fit.valueAt(local) - distance) / allowed.at(distance);
-    if (ratio > kLeast) peaks.push_back({ratio, local});
+    if (ratio > kLeast) kinks.push_back({ratio, local});
   }
 }
 
@@ -104,35 +104,36 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::check(const Fit& fit
 }
 
 /// Returns the worst point of each layer of the lattices, across each axis, whose two neighbouring layers are not
-/// worse. On a kink along a plane all points are as bad as one another, and the worst points of all may lie on another
-/// one.
-std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::crests(std::span<const CheckedPoint> points) const {
-  std::vector<CheckedPoint> crests;
+/// worse. Where the distance has a kink along a plane, all points of the plane have about the same error. If another
+/// plane is worse, the worst points of the cell all lie there.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::localMaxima(std::span<const CheckedPoint> points) const {
+  std::vector<CheckedPoint> maxima;
   for (int axis = 0; axis < 3; ++axis) {
     std::array<const CheckedPoint*, CellLattice::kLayers> worst{};
     for (const CheckedPoint& point : points) {
-      const CheckedPoint*& of = worst[lattice_.layer(point.local[axis])];
-      if (of == nullptr || point.ratio > of->ratio) of = &point;
+      const CheckedPoint*& worstOfLayer = worst[lattice_.layer(point.local[axis])];
+      if (worstOfLayer == nullptr || point.ratio > worstOfLayer->ratio) worstOfLayer = &point;
     }
     for (std::size_t i = 0; i < worst.size(); ++i) {
-      const bool isCrest = (i == 0 || worst[i]->ratio > worst[i - 1]->ratio) &&
-                           (i + 1 == worst.size() || worst[i]->ratio >= worst[i + 1]->ratio);
-      if (isCrest) crests.push_back(*worst[i]);
+      const bool isMaximum = (i == 0 || worst[i]->ratio > worst[i - 1]->ratio) &&
+                             (i + 1 == worst.size() || worst[i]->ratio >= worst[i + 1]->ratio);
+      if (isMaximum) maxima.push_back(*worst[i]);
     }
   }
-  return crests;
+  return maxima;
 }
 
-/// Returns bad points that lie apart from each other: the crests of the lattices, and the worst ones of all points.
-std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::span<const CheckedPoint> lattices,
-                                                                   std::vector<CheckedPoint> others) const {
+/// Returns bad points that lie apart from each other: the local maxima of the lattices, whose points come first, and
+/// the worst ones of all points.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::vector<CheckedPoint> points,
+                                                                   std::size_t latticePoints) const {
   constexpr std::size_t kMost = 16;
   constexpr double kLeast = 0.5, kApart = 0.8;  // ratio of the error, and distance in spacings of the lattice
   std::vector<CheckedPoint> tops;
-  const auto take = [&](std::vector<CheckedPoint> points) {
-    std::erase_if(points, [](const CheckedPoint& point) { return point.ratio < kLeast; });
-    std::ranges::stable_sort(points, std::greater(), &CheckedPoint::ratio);
-    for (const CheckedPoint& point : points) {
+  const auto take = [&](std::vector<CheckedPoint> candidates) {
+    std::erase_if(candidates, [](const CheckedPoint& point) { return point.ratio < kLeast; });
+    std::ranges::stable_sort(candidates, std::greater(), &CheckedPoint::ratio);
+    for (const CheckedPoint& point : candidates) {
       if (tops.size() == kMost) break;
       const bool isApart = std::ranges::all_of(tops, [&](const CheckedPoint& top) {
         return (top.local - point.local).norm() >= kApart * lattice_.spacing();
@@ -140,9 +141,8 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::span<con
       if (isApart) tops.push_back(point);
     }
   };
-  take(crests(lattices));
-  others.insert(others.end(), lattices.begin(), lattices.end());
-  take(std::move(others));
+  take(localMaxima(std::span(points).first(latticePoints)));
+  take(std::move(points));
   return tops;
 }
 
@@ -189,30 +189,31 @@ void ToleranceFitter::addSurfacePoints(const Fit& fit, const Box& cell, std::vec
   });
 }
 
-/// Checks the highest peaks that the distances at the lattice and between its points suggest.
-std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::peaks(const Fit& fit, const Box& cell,
-                                                                  std::span<const CheckedPoint> lattice,
-                                                                  std::span<const CheckedPoint> between) const {
+/// Returns the places at which kinks are suspected, with their errors; of many, those with the greatest estimates.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::checkedKinks(const Fit& fit, const Box& cell,
+                                                                         std::span<const CheckedPoint> lattice,
+                                                                         std::span<const CheckedPoint> between) const {
   constexpr std::size_t kMost = 96;
-  std::vector<Peak> peaks;
-  findPeaks(fit, allowed_, lattice, lattice_.rows(), peaks);
-  findPeaks(fit, allowed_, between, lattice_.rowsBetween(), peaks);
-  std::ranges::stable_sort(peaks, std::greater(), &Peak::ratio);
-  std::vector<Vector3> local(std::min(kMost, peaks.size()));
-  for (std::size_t i = 0; i < local.size(); ++i) local[i] = peaks[i].local;
+  std::vector<Kink> kinks;
+  findKinks(fit, allowed_, lattice, lattice_.rows(), kinks);
+  findKinks(fit, allowed_, between, lattice_.rowsBetween(), kinks);
+  std::ranges::stable_sort(kinks, std::greater(), &Kink::ratio);
+  std::vector<Vector3> local(std::min(kMost, kinks.size()));
+  for (std::size_t i = 0; i < local.size(); ++i) local[i] = kinks[i].local;
   return local.empty() ? std::vector<CheckedPoint>() : check(fit, cell, local);
 }
 
 /// Returns the greatest ratio found in a cell, or one that is too great. `points` are the points of the lattice.
 double ToleranceFitter::greatestRatio(const Fit& fit, const Box& cell, std::vector<CheckedPoint> points) const {
   const std::vector<CheckedPoint> between = check(fit, cell, lattice_.pointsBetween());
-  std::vector<CheckedPoint> others = peaks(fit, cell, points, between);
-  addSurfacePoints(fit, cell, others);
+  const std::vector<CheckedPoint> kinks = checkedKinks(fit, cell, points, between);
   points.insert(points.end(), between.begin(), between.end());
-  double greatest = 0;
-  for (const auto& list : {std::span(std::as_const(points)), std::span(std::as_const(others))})
-    for (const CheckedPoint& point : list) greatest = std::max(greatest, point.ratio);
-  return greatest > kMostRatio ? greatest : std::max(greatest, climb(fit, cell, topsOf(points, std::move(others))));
+  const std::size_t latticePoints = points.size();
+  points.insert(points.end(), kinks.begin(), kinks.end());
+  addSurfacePoints(fit, cell, points);
+  const double greatest = std::ranges::max_element(points, {}, &CheckedPoint::ratio)->ratio;
+  if (greatest > kMostRatio) return greatest;
+  return std::max(greatest, climb(fit, cell, topsOf(std::move(points), latticePoints)));
 }
 
 ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {

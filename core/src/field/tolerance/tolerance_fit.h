@@ -29,8 +29,8 @@ struct ToleranceFit {
 };
 
 /// Fits polynomials to cells by samples at a lattice of 512 points. The error is checked at these points, at 729 points
-/// between them, where these points suggest kinks of the distance, at points of the surface and, from the worst ones of
-/// all, by a search uphill. Thread-safe.
+/// between them, where the distances at these points suggest kinks, and at points of the surface. A search uphill
+/// starts from local maxima of the error across each axis and from the worst points. Thread-safe.
 class ToleranceFitter {
  public:
   /// Keeps references to the distance and to the progress. `certified` takes only polynomials for which
@@ -56,13 +56,13 @@ class ToleranceFitter {
   std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const;
   std::vector<CheckedPoint> check(const Fit& fit, const Box& cell, std::span<const Vector3> local) const;
   double latticeRatio(std::span<const double> errors, std::span<const double> allowed) const;
-  std::vector<CheckedPoint> peaks(const Fit& fit, const Box& cell, std::span<const CheckedPoint> lattice,
-                                  std::span<const CheckedPoint> between) const;
+  std::vector<CheckedPoint> checkedKinks(const Fit& fit, const Box& cell, std::span<const CheckedPoint> lattice,
+                                         std::span<const CheckedPoint> between) const;
   void addSurfacePoints(const Fit& fit, const Box& cell, std::vector<CheckedPoint>& points) const;
   double greatestRatio(const Fit& fit, const Box& cell, std::vector<CheckedPoint> points) const;
   double climb(const Fit& fit, const Box& cell, std::vector<CheckedPoint> tops) const;
-  std::vector<CheckedPoint> crests(std::span<const CheckedPoint> points) const;
-  std::vector<CheckedPoint> topsOf(std::span<const CheckedPoint> lattices, std::vector<CheckedPoint> others) const;
+  std::vector<CheckedPoint> localMaxima(std::span<const CheckedPoint> points) const;
+  std::vector<CheckedPoint> topsOf(std::vector<CheckedPoint> points, std::size_t latticePoints) const;
   bool isProven(const Fit& fit, const Box& cell) const;
 
   const DistanceFunction& distance_;
