@@ -149,6 +149,8 @@ TEST_F(FieldFile, badPointsAreRefusedByLine) {
   EXPECT_THAT(first.err, HasSubstr("stdin:1: expected three finite numbers"));
   EXPECT_EQ(run({{"query", field(), "0.1,-2e-1,0.3"}}).out, run({{"query", field()}, "0.1 -2e-1 0.3\n"}).out);
   EXPECT_EQ(run({{"query", field(), "-0.1,0.2,0.3"}}).out, run({{"query", field()}, "-0.1 0.2 0.3\n"}).out);
+  EXPECT_EQ(run({{"query", field(), "-.1,.2,0.3"}}).out, run({{"query", field()}, "-0.1 0.2 0.3\n"}).out);
+  EXPECT_EQ(run({{"query", field(), "0,0,0", "-o", at("one.csv")}}).err, at("one.csv") + ": 1 point\n");
   expectRefused({{"query", field(), "1,2"}}, "1,2:1: expected three finite");
   expectRefused({{"query", field(), at("none.txt")}}, "none.txt: no such file");
   for (const std::string name : {"a,b,c", "E,1,2", "e", "123"})

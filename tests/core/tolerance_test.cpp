@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <set>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "field/cells/cell_bounds.h"
@@ -83,20 +87,30 @@ TEST(Tolerance, seesKinksThatPassBetweenThePoints) {
   }
 }
 
-TEST(Tolerance, seesKinksBesideOtherCrestsOfTheError) {
+/// Returns the greatest error, over the tolerance, of a field of a distance whose kink is the plane z = `at`. The field
+/// begins with a single cell.
+double greatestRatioAtKink(double at, double tolerance) {
   const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
-  for (int i = 0; i < 40; ++i) {
-    const double at = -0.975 + i * 0.05;
-    SCOPED_TRACE(at);
-    const auto halfway = [&](const Vector3& x) { return std::abs(x.z() - at) - 0.25; };  // between two parallel faces
+  const auto halfway = [&](const Vector3& x) { return std::abs(x.z() - at) - 0.25; };  // between two parallel faces
+  const Field field = build(halfway, domain, {.grid = {1, 1, 1}, .tolerance = tolerance, .within = 10});
+  double worst = 0;
+  for (double z = -1; z <= 1; z += 0.0005)
+    worst = std::max(worst, std::abs(field.value({0.1, 0.3, z}) - halfway({0.1, 0.3, z})));
+  return worst / tolerance;
+}
+
+TEST(Tolerance, seesKinksWhereTheErrorIsGreaterElsewhereInTheCell) {
+  for (int i = 0; i < 40; ++i)
     for (const double tolerance : {0.005, 0.01, 0.02, 0.04, 0.08}) {
-      const Field field = build(halfway, domain, {.grid = {1, 1, 1}, .tolerance = tolerance, .within = 10});
-      double worst = 0;
-      for (double z = -1; z <= 1; z += 0.0005)
-        worst = std::max(worst, std::abs(field.value({0.1, 0.3, z}) - halfway({0.1, 0.3, z})));
-      EXPECT_LE(worst, tolerance) << "of a tolerance of " << tolerance;
+      const double at = -0.975 + i * 0.05;
+      EXPECT_LE(greatestRatioAtKink(at, tolerance), 1) << "kink at " << at << ", tolerance " << tolerance;
     }
-  }
+}
+
+TEST(Tolerance, seesKinksBesideFacesOfACell) {
+  for (const auto& [at, tolerance] : {std::pair(0.98125, 0.025), {0.96875, 0.04}, {0.01875, 0.025}, {0.95625, 0.06}})
+    for (const double side : {1, -1})
+      EXPECT_LE(greatestRatioAtKink(side * at, tolerance), 1) << "kink at " << side * at << ", tolerance " << tolerance;
 }
 
 TEST(Tolerance, isKeptAtAnyScale) {
@@ -322,6 +336,35 @@ TEST(CellLattice, fitsPolynomialsExactly) {
     EXPECT_DOUBLE_EQ(greatest, reach);
     for (const auto& [a, b] : lattice.neighbours())
       EXPECT_NEAR((lattice.points()[a] - lattice.points()[b]).norm(), lattice.spacing(), 1e-12);
+  }
+}
+
+/// Checks rows of four points: successive along one axis, each once, from face to face.
+void checkRows(std::span<const detail::CellLattice::Row> rows, std::span<const Vector3> points, double reach,
+               double spacing) {
+  std::set<std::array<std::uint32_t, 4>> seen;
+  for (const detail::CellLattice::Row& row : rows) {
+    ASSERT_TRUE(seen.insert(row.points).second) << "a row is there twice";
+    const Vector3 first = points[row.points[0]], last = points[row.points[3]];
+    const Vector3 direction = (last - first).normalized();
+    EXPECT_NEAR(direction.maxCoeff(), 1, 1e-12) << "a row does not run along an axis";
+    for (int i = 1; i < 4; ++i) {
+      const double step = (points[row.points[i]] - points[row.points[i - 1]]).dot(direction);
+      const bool isAtFace = (i == 1 && row.beginsAtFace) || (i == 3 && row.endsAtFace);
+      EXPECT_TRUE(std::abs(step - spacing) < 1e-12 || (isAtFace && std::abs(step - spacing / 2) < 1e-12)) << step;
+    }
+    EXPECT_EQ(row.beginsAtFace, first.dot(direction) < -reach + 1e-12);
+    EXPECT_EQ(row.endsAtFace, last.dot(direction) > reach - 1e-12);
+  }
+}
+
+TEST(CellLattice, hasRowsOfFourPoints) {
+  for (const double reach : {1.0, 1.08}) {
+    const detail::CellLattice lattice(reach);
+    EXPECT_EQ(lattice.rows().size(), 3U * 8 * 8 * 5);
+    EXPECT_EQ(lattice.rowsBetween().size(), 3U * 9 * 9 * 6);
+    checkRows(lattice.rows(), lattice.points(), reach, lattice.spacing());
+    checkRows(lattice.rowsBetween(), lattice.pointsBetween(), reach, lattice.spacing());
   }
 }
 

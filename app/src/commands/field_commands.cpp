@@ -208,7 +208,8 @@ void runQuery(Session& session, const Arguments& arguments) {
   });
   if (!output) return;
   output->commit();
-  session.console().err << fmt::format("{}: {} points\n", arguments.text("output"), grouped(count));
+  session.console().err << fmt::format("{}: {} point{}\n", arguments.text("output"), grouped(count),
+                                       count == 1 ? "" : "s");
 }
 
 void runSmooth(Session& session, const Arguments& arguments) {
@@ -297,7 +298,7 @@ children, until the weighted squared error over the domain falls below the targe
 a mesh whose longest side is 2. A mesh with the longest side L is built for τ·(L/2)^5, so that the same τ gives the same
 cells whether its units are metres or millimetres. One hundredth of τ gives about one tenth of the RMS error.
 
-The finished field is measured against the exact distance at 20,000 to 100,000 random points: the RMS and the greatest
+The finished field is measured against the exact distance at 8,000 to 100,000 random points: the RMS and the greatest
 error near the surface and over the domain, points on the wrong side, and the share of the surface that cracks between
 cells tear. The field keeps these figures, and 'hpsdf info' shows them. Where the tolerance is missed, or a measured error
 exceeds --near-error, --far-error or --max-error, the field is written all the same, the last line says so, and the exit
@@ -404,8 +405,8 @@ void addReadingCommands(Registry& registry) {
       .name = "query",
       .summary = "Compute distances and gradients at points.",
       .help = paragraphs(R"(
-Takes one point, or reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments
-and a header line are ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with
+Takes one point (in a script points=X,Y,Z), or reads points from a file or standard input, one a line as x,y,z or x y z;
+empty lines, # comments and a header line are ignored. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with
 --json an array of objects.
 
 Distances are negative inside. Outside the domain the field is continued continuously.)"),

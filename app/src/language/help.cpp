@@ -209,7 +209,7 @@ A first session:
   hpsdf info bunny.hpsdf                             see its size, its settings and its error
   hpsdf slice bunny.hpsdf -o degree.png              draw a plane through it
   hpsdf render bunny.hpsdf -o surface.png            draw its surface
-  echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf         compute distance and gradient at a point
+  hpsdf query bunny.hpsdf 0.1,0.2,0.3                compute distance and gradient at a point
   hpsdf report builtin:torus -o torus                do all of this for a built-in shape, on one page
   hpsdf bunny.hpsdf                                  look at it in a window, as 'hpsdf view' does
 

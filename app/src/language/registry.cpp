@@ -237,6 +237,12 @@ class ArgumentReader {
     return option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 
+  /// Returns a word of the command line as CLI11 takes it: a number such as -.5, which it takes for an option, as -0.5.
+  static std::string normalizedWord(const std::string& word) {
+    const bool isNumber = word.size() > 2 && word.starts_with("-.") && word[2] >= '0' && word[2] <= '9';
+    return isNumber ? "-0" + word.substr(1) : word;
+  }
+
   /// Converts the words of a script from the spelling name=value to --name=value. A value with blanks stays
   /// part of one word.
   std::vector<std::string> normalizedWords() const {
@@ -244,7 +250,7 @@ class ArgumentReader {
     for (std::size_t i = 0; i < words_.size(); ++i) {
       const Word& word = words_[i];
       if (origin_ == Origin::commandLine || word.equals == std::string::npos) {
-        result.push_back(word.text);
+        result.push_back(normalizedWord(word.text));
         continue;
       }
       const std::string name = word.text.substr(0, word.equals);

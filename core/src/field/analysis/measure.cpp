@@ -134,11 +134,19 @@ ExactSamples samplesNear(const DistanceFunction& distance, const std::optional<T
   }
 }
 
+/// Returns the number of points at which a field is measured by default, by the number of evaluations of Φ that its
+/// construction took.
+std::size_t usualPoints(std::uint64_t evaluations, InsideTest insideTest) {
+  // Winding numbers at random points take longer than at the points of a cell, which are evaluated together.
+  const bool isSlow = insideTest == InsideTest::winding || insideTest == InsideTest::outerHull;
+  return isSlow ? std::clamp<std::uint64_t>(evaluations / 40, 8'000, 50'000)
+                : std::clamp<std::uint64_t>(evaluations / 20, 20'000, 100'000);
+}
+
 }  // namespace
 
 Measurement measure(const Field& field, const DistanceFunction& distance, const MeasureOptions& options,
                     const Progress& progress) {
-  constexpr std::uint64_t kFewest = 20'000, kMost = 100'000;
   // Signs near a surface that is exact but for rounding to float do not count as wrong.
   constexpr double kLeastThreshold = 1e-6;
   const FieldMetadata& metadata = field.metadata();
@@ -148,7 +156,7 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
   const double usual = metadata.settings.tolerance > 0 ? within : 0.01 * length;
   result.nearDistance = options.near > 0 ? options.near : usual;
   const std::size_t points =
-      options.points > 0 ? options.points : std::clamp(metadata.exactEvaluations / 20, kFewest, kMost);
+      options.points > 0 ? options.points : usualPoints(metadata.exactEvaluations, distance.source().insideTest);
   const SampleOptions half{
       .count = std::max<std::size_t>(1, points / 2), .seed = options.seed, .threads = options.threads};
   SampleOptions other = half;

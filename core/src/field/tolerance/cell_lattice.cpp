@@ -35,17 +35,18 @@ class LatticeIndices {
 
   std::uint32_t& at(int x, int y, int z) { return indices_[(std::size_t(z) * across_ + y) * across_ + x]; }
 
-  /// Returns all rows of four points along an axis whose positions on this axis are `first` to `last`.
-  std::vector<CellLattice::Row> rows(int first, int last) {
+  /// Returns all rows of four points.
+  std::vector<CellLattice::Row> rows() {
     std::vector<CellLattice::Row> rows;
-    for (int from = first; from + 3 <= last; ++from)
+    for (int from = 0; from + 4 <= across_; ++from)
       for (int a = 0; a < across_; ++a)
         for (int b = 0; b < across_; ++b) {
           std::array<CellLattice::Row, 3> along;
+          along.fill({.points = {}, .beginsAtFace = from == 0, .endsAtFace = from + 4 == across_});
           for (int i = 0; i < 4; ++i) {
-            along[0][i] = at(from + i, a, b);
-            along[1][i] = at(a, from + i, b);
-            along[2][i] = at(a, b, from + i);
+            along[0].points[i] = at(from + i, a, b);
+            along[1].points[i] = at(a, from + i, b);
+            along[2].points[i] = at(a, b, from + i);
           }
           rows.insert(rows.end(), along.begin(), along.end());
         }
@@ -65,7 +66,7 @@ CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (Pr
   LatticeIndices indices(kAcross);
   std::uint32_t next = 0;
   forEachInBlocks(kAcross, [&](int x, int y, int z) { indices.at(x, y, z) = next++; });
-  rows_ = indices.rows(0, kAcross - 1);
+  rows_ = indices.rows();
 
   // Along each axis there are the two ends and the middles of all intervals.
   const auto between = [&](int n) { return n == 0 ? 0.0 : n == kAcross ? double(kAcross - 1) : n - 0.5; };
@@ -75,7 +76,7 @@ CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (Pr
     indicesBetween.at(x, y, z) = static_cast<std::uint32_t>(between_.size());
     between_.push_back(spacing_ * Vector3(between(x), between(y), between(z)) - Vector3::Constant(reach));
   });
-  rowsBetween_ = indicesBetween.rows(0, kAcross);
+  rowsBetween_ = indicesBetween.rows();
 
   for (int degree = 1; degree <= kMostDegree; ++degree) {
     Matrices& matrices = matrices_[degree];

@@ -18,11 +18,12 @@ namespace hpsdf::detail {
 /// coordinates of the cell.
 class CellLattice {
  public:
-  /// The indices of four successive points along an axis. Their distances are equal, except at the ends of
-  /// `pointsBetween()`.
-  using Row = std::array<std::uint32_t, 4>;
+  /// Four successive points along an axis. Their distances are equal, except at the ends of `pointsBetween()`.
+  struct Row {
+    std::array<std::uint32_t, 4> points;  ///< their indices
+    bool beginsAtFace = false, endsAtFace = false;
+  };
 
-  static constexpr int kLayers = 2 * ProbeLattice::kAcross - 1;  ///< planes across an axis that hold points
   static constexpr int kMostDegree = 5;  ///< 56 coefficients; with more of them, errors between the points grow
 
   /// The lattice reaches from −`reach` to `reach` along each axis.
@@ -37,8 +38,6 @@ class CellLattice {
   /// All rows of four in `points()`, and in `pointsBetween()`.
   std::span<const Row> rows() const { return rows_; }
   std::span<const Row> rowsBetween() const { return rowsBetween_; }
-  /// Returns the layer, 0 to `kLayers` − 1, of a point of one of the lattices by its coordinate across the layers.
-  std::size_t layer(double coordinate) const { return std::size_t(2 * (coordinate + reach_) / spacing_ + 0.5); }
   /// Distance between two neighbours along an axis.
   double spacing() const { return spacing_; }
   double reach() const { return reach_; }

@@ -1,6 +1,5 @@
 #include "field/tolerance/tolerance_fit.h"
 
-#include <array>
 #include <limits>
 #include <utility>
 
@@ -35,23 +34,31 @@ struct Kink {
 /// Appends the kinks that rows of four points suggest. Where the distance has a kink, such as on the planes halfway
 /// between two faces, the error has a sharp peak, which all points of the lattices may miss. Beside a kink the distance
 /// is nearly linear, which the error is not, so that the place of the kink and the distance there follow from the two
-/// slopes beside it.
+/// slopes beside it. Beyond the faces of the cell there are no points: in an interval that ends at a face, the slope on
+/// the outer side of a kink is taken to be the opposite of that on the inner side.
 template <typename Points>
 void findKinks(const Fit& fit, const AllowedError& allowed, const Points& points,
                std::span<const CellLattice::Row> rows, std::vector<Kink>& kinks) {
   constexpr double kLeast = 0.7;      // lower peaks are not within reach of the greatest allowed ratio
   constexpr double kLeastBend = 0.1;  // change of slope times interval, over the allowed error; it adds a quarter of it
   for (const CellLattice::Row& row : rows) {
-    const auto step = [&](int i) { return (points[row[i + 1]].local - points[row[i]].local).sum(); };  // along an axis
-    const auto change = [&](int i) { return points[row[i + 1]].distance - points[row[i]].distance; };
-    const double width = step(1), before = change(0) / step(0) * width, after = change(2) / step(2) * width;
-    if (std::abs(before - after) < kLeastBend * allowed.at(points[row[1]].distance)) continue;
-    const double t = (change(1) - after) / (before - after);
-    if (t <= 0 || t >= 1) continue;
-    const double distance = points[row[1]].distance + t * before;
-    const Vector3 local = points[row[1]].local + t * (points[row[2]].local - points[row[1]].local);
-    const double ratio = std::abs(fit.valueAt(local) - distance) / allowed.at(distance);
-    if (ratio > kLeast) kinks.push_back({ratio, local});
+    const auto point = [&](int i) -> const auto& { return points[row.points[i]]; };
+    const auto width = [&](int i) { return (point(i + 1).local - point(i).local).sum(); };  // along an axis
+    const auto slope = [&](int i) { return (point(i + 1).distance - point(i).distance) / width(i); };
+    const auto bends = [&](int i, double one, double other) {
+      return std::abs(one - other) * width(i) >= kLeastBend * allowed.at(point(i).distance);
+    };
+    const auto find = [&](int i, double before, double after) {  // in interval i, by the slopes beside the kink
+      const double t = (slope(i) - after) / (before - after);
+      if (!(t > 0 && t < 1)) return;
+      const double distance = point(i).distance + t * width(i) * before;
+      const Vector3 local = point(i).local + t * (point(i + 1).local - point(i).local);
+      const double ratio = std::abs(fit.valueAt(local) - distance) / allowed.at(distance);
+      if (ratio > kLeast) kinks.push_back({ratio, local});
+    };
+    if (bends(1, slope(0), slope(2))) find(1, slope(0), slope(2));
+    if (row.beginsAtFace && bends(0, slope(0), slope(1))) find(0, -slope(1), slope(1));
+    if (row.endsAtFace && bends(2, slope(2), slope(1))) find(2, slope(1), -slope(1));
   }
 }
 
@@ -103,46 +110,19 @@ std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::check(const Fit& fit
   return points;
 }
 
-/// Returns the worst point of each layer of the lattices, across each axis, whose two neighbouring layers are not
-/// worse. Where the distance has a kink along a plane, all points of the plane have about the same error. If another
-/// plane is worse, the worst points of the cell all lie there.
-std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::localMaxima(std::span<const CheckedPoint> points) const {
-  std::vector<CheckedPoint> maxima;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::array<const CheckedPoint*, CellLattice::kLayers> worst{};
-    for (const CheckedPoint& point : points) {
-      const CheckedPoint*& worstOfLayer = worst[lattice_.layer(point.local[axis])];
-      if (worstOfLayer == nullptr || point.ratio > worstOfLayer->ratio) worstOfLayer = &point;
-    }
-    for (std::size_t i = 0; i < worst.size(); ++i) {
-      const bool isMaximum = (i == 0 || worst[i]->ratio > worst[i - 1]->ratio) &&
-                             (i + 1 == worst.size() || worst[i]->ratio >= worst[i + 1]->ratio);
-      if (isMaximum) maxima.push_back(*worst[i]);
-    }
-  }
-  return maxima;
-}
-
-/// Returns bad points that lie apart from each other: the local maxima of the lattices, whose points come first, and
-/// the worst ones of all points.
-std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::vector<CheckedPoint> points,
-                                                                   std::size_t latticePoints) const {
+/// Returns the worst of the points that lie apart from each other.
+std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::topsOf(std::vector<CheckedPoint> points) const {
   constexpr std::size_t kMost = 16;
   constexpr double kLeast = 0.5, kApart = 0.8;  // ratio of the error, and distance in spacings of the lattice
+  std::erase_if(points, [](const CheckedPoint& point) { return point.ratio < kLeast; });
+  std::ranges::stable_sort(points, std::greater(), &CheckedPoint::ratio);
   std::vector<CheckedPoint> tops;
-  const auto take = [&](std::vector<CheckedPoint> candidates) {
-    std::erase_if(candidates, [](const CheckedPoint& point) { return point.ratio < kLeast; });
-    std::ranges::stable_sort(candidates, std::greater(), &CheckedPoint::ratio);
-    for (const CheckedPoint& point : candidates) {
-      if (tops.size() == kMost) break;
-      const bool isApart = std::ranges::all_of(tops, [&](const CheckedPoint& top) {
-        return (top.local - point.local).norm() >= kApart * lattice_.spacing();
-      });
-      if (isApart) tops.push_back(point);
-    }
-  };
-  take(localMaxima(std::span(points).first(latticePoints)));
-  take(std::move(points));
+  for (const CheckedPoint& point : points) {
+    if (tops.size() == kMost) break;
+    const bool isApart = std::ranges::all_of(
+        tops, [&](const CheckedPoint& top) { return (top.local - point.local).norm() >= kApart * lattice_.spacing(); });
+    if (isApart) tops.push_back(point);
+  }
   return tops;
 }
 
@@ -208,12 +188,11 @@ double ToleranceFitter::greatestRatio(const Fit& fit, const Box& cell, std::vect
   const std::vector<CheckedPoint> between = check(fit, cell, lattice_.pointsBetween());
   const std::vector<CheckedPoint> kinks = checkedKinks(fit, cell, points, between);
   points.insert(points.end(), between.begin(), between.end());
-  const std::size_t latticePoints = points.size();
   points.insert(points.end(), kinks.begin(), kinks.end());
   addSurfacePoints(fit, cell, points);
   const double greatest = std::ranges::max_element(points, {}, &CheckedPoint::ratio)->ratio;
   if (greatest > kMostRatio) return greatest;
-  return std::max(greatest, climb(fit, cell, topsOf(std::move(points), latticePoints)));
+  return std::max(greatest, climb(fit, cell, topsOf(std::move(points))));
 }
 
 ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {

@@ -30,7 +30,7 @@ struct ToleranceFit {
 
 /// Fits polynomials to cells by samples at a lattice of 512 points. The error is checked at these points, at 729 points
 /// between them, where the distances at these points suggest kinks, and at points of the surface. A search uphill
-/// starts from local maxima of the error across each axis and from the worst points. Thread-safe.
+/// starts from the worst points. Thread-safe.
 class ToleranceFitter {
  public:
   /// Keeps references to the distance and to the progress. `certified` takes only polynomials for which
@@ -61,8 +61,7 @@ class ToleranceFitter {
   void addSurfacePoints(const Fit& fit, const Box& cell, std::vector<CheckedPoint>& points) const;
   double greatestRatio(const Fit& fit, const Box& cell, std::vector<CheckedPoint> points) const;
   double climb(const Fit& fit, const Box& cell, std::vector<CheckedPoint> tops) const;
-  std::vector<CheckedPoint> localMaxima(std::span<const CheckedPoint> points) const;
-  std::vector<CheckedPoint> topsOf(std::vector<CheckedPoint> points, std::size_t latticePoints) const;
+  std::vector<CheckedPoint> topsOf(std::vector<CheckedPoint> points) const;
   bool isProven(const Fit& fit, const Box& cell) const;
 
   const DistanceFunction& distance_;
