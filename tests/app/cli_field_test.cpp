@@ -150,6 +150,7 @@ TEST_F(FieldFile, badPointsAreRefusedByLine) {
   EXPECT_EQ(run({{"query", field(), "0.1,-2e-1,0.3"}}).out, run({{"query", field()}, "0.1 -2e-1 0.3\n"}).out);
   EXPECT_EQ(run({{"query", field(), "-0.1,0.2,0.3"}}).out, run({{"query", field()}, "-0.1 0.2 0.3\n"}).out);
   EXPECT_EQ(run({{"query", field(), "-.1,.2,0.3"}}).out, run({{"query", field()}, "-0.1 0.2 0.3\n"}).out);
+  expectRefused({{"info", "-.5x.hpsdf"}}, "unknown option '-.5x.hpsdf'");
   EXPECT_EQ(run({{"query", field(), "0,0,0", "-o", at("one.csv")}}).err, at("one.csv") + ": 1 point\n");
   expectRefused({{"query", field(), "1,2"}}, "1,2:1: expected three finite");
   expectRefused({{"query", field(), at("none.txt")}}, "none.txt: no such file");

@@ -43,6 +43,15 @@ TEST(Measure, agreesWithManyMorePoints) {
   EXPECT_EQ(found.wrongSigns, 0U);
 }
 
+TEST(Measure, takesFewerPointsWhereWindingNumbersDecide) {
+  const Torus torus;
+  for (const auto& [test, points] : {std::pair(InsideTest::pseudonormal, 20'000U), {InsideTest::winding, 8'000U}}) {
+    const ExactDistance distance(torus.mesh, {.insideTest = test});
+    EXPECT_EQ(measure(torus.field, distance).points, points);
+    EXPECT_EQ(measure(torus.field, distance, {.points = 1000}).points, 1000U);
+  }
+}
+
 /// Where a field is exact in most of its domain, its error is in a few other leaves.
 TEST(Measure, agreesWithManyMorePointsOfAFieldThatIsExactAlmostEverywhere) {
   const TriangleMesh mesh = shapes::mesh("gear,teeth=5");

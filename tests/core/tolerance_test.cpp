@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <set>
 #include <span>
 #include <string>
@@ -87,30 +87,50 @@ TEST(Tolerance, seesKinksThatPassBetweenThePoints) {
   }
 }
 
-/// Returns the greatest error, over the tolerance, of a field of a distance whose kink is the plane z = `at`. The field
-/// begins with a single cell.
-double greatestRatioAtKink(double at, double tolerance) {
+/// Returns the greatest error, over the tolerance, of a field of a distance with a kink, on the line through `from`
+/// along an axis. The field begins with a single cell.
+double greatestRatioOnLine(const std::function<double(const Vector3&)>& distance, double tolerance, const Vector3& from,
+                           int axis) {
   const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
-  const auto halfway = [&](const Vector3& x) { return std::abs(x.z() - at) - 0.25; };  // between two parallel faces
-  const Field field = build(halfway, domain, {.grid = {1, 1, 1}, .tolerance = tolerance, .within = 10});
+  const Field field = build(distance, domain, {.grid = {1, 1, 1}, .tolerance = tolerance, .within = 10});
   double worst = 0;
-  for (double z = -1; z <= 1; z += 0.0005)
-    worst = std::max(worst, std::abs(field.value({0.1, 0.3, z}) - halfway({0.1, 0.3, z})));
+  for (double t = -1; t <= 1; t += 0.0005) {
+    Vector3 x = from;
+    x[axis] = t;
+    worst = std::max(worst, std::abs(field.value(x) - distance(x)));
+  }
   return worst / tolerance;
+}
+
+/// Returns the distance between two parallel faces, whose kink is the plane halfway.
+std::function<double(const Vector3&)> halfway(int axis, double at) {
+  return [axis, at](const Vector3& x) { return std::abs(x[axis] - at) - 0.25; };
 }
 
 TEST(Tolerance, seesKinksWhereTheErrorIsGreaterElsewhereInTheCell) {
   for (int i = 0; i < 40; ++i)
     for (const double tolerance : {0.005, 0.01, 0.02, 0.04, 0.08}) {
       const double at = -0.975 + i * 0.05;
-      EXPECT_LE(greatestRatioAtKink(at, tolerance), 1) << "kink at " << at << ", tolerance " << tolerance;
+      EXPECT_LE(greatestRatioOnLine(halfway(2, at), tolerance, {0.1, 0.3, 0}, 2), 1)
+          << "kink at " << at << ", tolerance " << tolerance;
     }
 }
 
 TEST(Tolerance, seesKinksBesideFacesOfACell) {
   for (const auto& [at, tolerance] : {std::pair(0.98125, 0.025), {0.96875, 0.04}, {0.01875, 0.025}, {0.95625, 0.06}})
     for (const double side : {1, -1})
-      EXPECT_LE(greatestRatioAtKink(side * at, tolerance), 1) << "kink at " << side * at << ", tolerance " << tolerance;
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_LE(greatestRatioOnLine(halfway(axis, side * at), tolerance, {0.1, 0.3, 0.2}, axis), 1)
+            << "kink at " << side * at << " on axis " << axis << ", tolerance " << tolerance;
+}
+
+/// Halfway between two thin wires, the distance is curved on both sides of its kink, and bends elsewhere.
+TEST(Tolerance, seesKinksWhereTheDistanceIsCurved) {
+  const auto wires = [](const Vector3& x) {
+    return std::min(std::hypot(x.y() + 1.3421, x.z() + 3.3505), std::hypot(x.y() + 0.2485, x.z() + 3.3505));
+  };
+  for (const double tolerance : {0.0075, 0.0078, 0.008, 0.0083})
+    EXPECT_LE(greatestRatioOnLine(wires, tolerance, {0.1, 0, -1}, 1), 1) << "tolerance " << tolerance;
 }
 
 TEST(Tolerance, isKeptAtAnyScale) {
@@ -339,32 +359,29 @@ TEST(CellLattice, fitsPolynomialsExactly) {
   }
 }
 
-/// Checks rows of four points: successive along one axis, each once, from face to face.
-void checkRows(std::span<const detail::CellLattice::Row> rows, std::span<const Vector3> points, double reach,
-               double spacing) {
-  std::set<std::array<std::uint32_t, 4>> seen;
-  for (const detail::CellLattice::Row& row : rows) {
-    ASSERT_TRUE(seen.insert(row.points).second) << "a row is there twice";
-    const Vector3 first = points[row.points[0]], last = points[row.points[3]];
-    const Vector3 direction = (last - first).normalized();
-    EXPECT_NEAR(direction.maxCoeff(), 1, 1e-12) << "a row does not run along an axis";
-    for (int i = 1; i < 4; ++i) {
-      const double step = (points[row.points[i]] - points[row.points[i - 1]]).dot(direction);
-      const bool isAtFace = (i == 1 && row.beginsAtFace) || (i == 3 && row.endsAtFace);
-      EXPECT_TRUE(std::abs(step - spacing) < 1e-12 || (isAtFace && std::abs(step - spacing / 2) < 1e-12)) << step;
+/// Checks that lines go through all points along each axis, each from one end of the lattice to the other.
+void checkLines(std::span<const detail::CellLattice::Line> lines, std::span<const Vector3> points, double reach,
+                double spacing, double spacingAtEnds) {
+  std::set<std::pair<int, std::uint32_t>> seen;
+  for (const auto& [axis, line] : lines) {
+    EXPECT_EQ(points[line.front()][axis], -reach);
+    EXPECT_NEAR(points[line.back()][axis], reach, 1e-15);
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      EXPECT_TRUE(seen.insert({axis, line[i]}).second) << "two lines along one axis share a point";
+      if (i == 0) continue;
+      const bool isAtEnd = i == 1 || i + 1 == line.size();
+      const Vector3 step = (isAtEnd ? spacingAtEnds : spacing) * Vector3::Unit(axis);
+      EXPECT_LT((points[line[i]] - points[line[i - 1]] - step).norm(), 1e-12);
     }
-    EXPECT_EQ(row.beginsAtFace, first.dot(direction) < -reach + 1e-12);
-    EXPECT_EQ(row.endsAtFace, last.dot(direction) > reach - 1e-12);
   }
+  EXPECT_EQ(seen.size(), 3 * points.size());
 }
 
-TEST(CellLattice, hasRowsOfFourPoints) {
+TEST(CellLattice, hasLinesOfPoints) {
   for (const double reach : {1.0, 1.08}) {
     const detail::CellLattice lattice(reach);
-    EXPECT_EQ(lattice.rows().size(), 3U * 8 * 8 * 5);
-    EXPECT_EQ(lattice.rowsBetween().size(), 3U * 9 * 9 * 6);
-    checkRows(lattice.rows(), lattice.points(), reach, lattice.spacing());
-    checkRows(lattice.rowsBetween(), lattice.pointsBetween(), reach, lattice.spacing());
+    checkLines(lattice.lines(), lattice.points(), reach, lattice.spacing(), lattice.spacing());
+    checkLines(lattice.linesBetween(), lattice.pointsBetween(), reach, lattice.spacing(), lattice.spacing() / 2);
   }
 }
 

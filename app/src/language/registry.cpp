@@ -237,9 +237,11 @@ class ArgumentReader {
     return option->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 
-  /// Returns a word of the command line as CLI11 takes it: a number such as -.5, which it takes for an option, as -0.5.
+  /// Returns a word as CLI11 takes it: a number or a list of numbers that begins with -. as in -.5, which CLI11 takes
+  /// for an option, with -0. instead.
   static std::string normalizedWord(const std::string& word) {
-    const bool isNumber = word.size() > 2 && word.starts_with("-.") && word[2] >= '0' && word[2] <= '9';
+    const bool isNumber = word.size() > 2 && word.starts_with("-.") && word[2] >= '0' && word[2] <= '9' &&
+                          word.find_first_not_of("0123456789+-.eE,") == std::string::npos;
     return isNumber ? "-0" + word.substr(1) : word;
   }
 
@@ -290,7 +292,7 @@ class ArgumentReader {
   }
 
   std::size_t wordIndex(std::string_view text) const {
-    const auto found = std::ranges::find(words_, text, &Word::text);
+    const auto found = std::ranges::find(words_, text, [](const Word& word) { return normalizedWord(word.text); });
     return found == words_.end() ? 0 : static_cast<std::size_t>(found - words_.begin());
   }
 
@@ -300,7 +302,9 @@ class ArgumentReader {
     for (std::size_t i = words_.size(); i-- > 0;) {
       const std::string_view text = words_[i].text;
       const bool aliased = parameter.letter != 0 && text.starts_with(fmt::format("-{}", parameter.letter));
-      if (isNamedIn(words_[i], parameter) || aliased || (parameter.isPositional && text == value)) return i;
+      if (isNamedIn(words_[i], parameter) || aliased ||
+          (parameter.isPositional && normalizedWord(words_[i].text) == value))
+        return i;
     }
     return 0;
   }

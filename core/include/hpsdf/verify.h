@@ -76,10 +76,10 @@ struct WorstPoint {
 
 /// Options of `measure`. The points depend on the seed, not on the number of threads.
 struct MeasureOptions {
-  /// Number of random points, half of them near the surface; 0: a twentieth of the points at which the
-  /// construction evaluated Φ, but 20,000 to 100,000, or, where winding numbers decide what is inside, a fortieth, but
-  /// 8,000 to 50,000, so that measuring takes less than a tenth of its time if that is seconds. The share of the
-  /// surface that is torn is measured at half as many points as are near it.
+  /// Number of random points, half of them near the surface; 0: a twentieth of the points at which the construction
+  /// evaluated Φ, but 20,000 to 100,000. Where winding numbers decide what is inside, it is a fortieth, 8,000 to
+  /// 50,000. Measuring then takes about a tenth of the construction's time at most, if that is seconds. The share of
+  /// the surface that is torn is measured at half as many points as are near it.
   std::size_t points = 0;
   /// Greatest distance of points near the surface from it; 0: the distance up to which the field's tolerance holds, at
   /// most an eighth of the domain's diagonal, or, without a tolerance, 1 % of the surface's longest side.

@@ -134,8 +134,7 @@ ExactSamples samplesNear(const DistanceFunction& distance, const std::optional<T
   }
 }
 
-/// Returns the number of points at which a field is measured by default, by the number of evaluations of Φ that its
-/// construction took.
+/// Returns how many points `measure` takes by default for a field whose construction evaluated Φ so many times.
 std::size_t usualPoints(std::uint64_t evaluations, InsideTest insideTest) {
   // Winding numbers at random points take longer than at the points of a cell, which are evaluated together.
   const bool isSlow = insideTest == InsideTest::winding || insideTest == InsideTest::outerHull;

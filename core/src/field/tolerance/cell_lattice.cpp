@@ -35,22 +35,16 @@ class LatticeIndices {
 
   std::uint32_t& at(int x, int y, int z) { return indices_[(std::size_t(z) * across_ + y) * across_ + x]; }
 
-  /// Returns all rows of four points.
-  std::vector<CellLattice::Row> rows() {
-    std::vector<CellLattice::Row> rows;
-    for (int from = 0; from + 4 <= across_; ++from)
-      for (int a = 0; a < across_; ++a)
-        for (int b = 0; b < across_; ++b) {
-          std::array<CellLattice::Row, 3> along;
-          along.fill({.points = {}, .beginsAtFace = from == 0, .endsAtFace = from + 4 == across_});
-          for (int i = 0; i < 4; ++i) {
-            along[0].points[i] = at(from + i, a, b);
-            along[1].points[i] = at(a, from + i, b);
-            along[2].points[i] = at(a, b, from + i);
-          }
-          rows.insert(rows.end(), along.begin(), along.end());
+  std::vector<CellLattice::Line> lines() {
+    std::vector<CellLattice::Line> lines;
+    for (int a = 0; a < across_; ++a)
+      for (int b = 0; b < across_; ++b)
+        for (int axis = 0; axis < 3; ++axis) {
+          CellLattice::Line& line = lines.emplace_back(axis);
+          for (int i = 0; i < across_; ++i)
+            line.points.push_back(axis == 0 ? at(i, a, b) : axis == 1 ? at(a, i, b) : at(a, b, i));
         }
-    return rows;
+    return lines;
   }
 
  private:
@@ -66,7 +60,7 @@ CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (Pr
   LatticeIndices indices(kAcross);
   std::uint32_t next = 0;
   forEachInBlocks(kAcross, [&](int x, int y, int z) { indices.at(x, y, z) = next++; });
-  rows_ = indices.rows();
+  lines_ = indices.lines();
 
   // Along each axis there are the two ends and the middles of all intervals.
   const auto between = [&](int n) { return n == 0 ? 0.0 : n == kAcross ? double(kAcross - 1) : n - 0.5; };
@@ -76,7 +70,7 @@ CellLattice::CellLattice(double reach) : reach_(reach), spacing_(2 * reach / (Pr
     indicesBetween.at(x, y, z) = static_cast<std::uint32_t>(between_.size());
     between_.push_back(spacing_ * Vector3(between(x), between(y), between(z)) - Vector3::Constant(reach));
   });
-  rowsBetween_ = indicesBetween.rows();
+  linesBetween_ = indicesBetween.lines();
 
   for (int degree = 1; degree <= kMostDegree; ++degree) {
     Matrices& matrices = matrices_[degree];

@@ -18,12 +18,13 @@ namespace hpsdf::detail {
 /// coordinates of the cell.
 class CellLattice {
  public:
-  /// Four successive points along an axis. Their distances are equal, except at the ends of `pointsBetween()`.
-  struct Row {
-    std::array<std::uint32_t, 4> points;  ///< their indices
-    bool beginsAtFace = false, endsAtFace = false;
+  /// The points of a lattice on a line along an axis, from one end of the lattice to the other.
+  struct Line {
+    int axis = 0;
+    std::vector<std::uint32_t> points;  ///< their indices
   };
 
+  static constexpr int kLongestLine = ProbeLattice::kAcross + 1;
   static constexpr int kMostDegree = 5;  ///< 56 coefficients; with more of them, errors between the points grow
 
   /// The lattice reaches from −`reach` to `reach` along each axis.
@@ -35,9 +36,9 @@ class CellLattice {
   std::span<const Vector3> pointsBetween() const { return between_; }
   /// Pairs of neighbours in `points()`.
   std::span<const std::pair<std::uint32_t, std::uint32_t>> neighbours() const { return probeLattice().neighbours; }
-  /// All rows of four in `points()`, and in `pointsBetween()`.
-  std::span<const Row> rows() const { return rows_; }
-  std::span<const Row> rowsBetween() const { return rowsBetween_; }
+  /// All lines in `points()`, and in `pointsBetween()`, where the first and the last interval are half as long.
+  std::span<const Line> lines() const { return lines_; }
+  std::span<const Line> linesBetween() const { return linesBetween_; }
   /// Distance between two neighbours along an axis.
   double spacing() const { return spacing_; }
   double reach() const { return reach_; }
@@ -55,7 +56,7 @@ class CellLattice {
 
   double reach_, spacing_;
   std::vector<Vector3> points_, between_;
-  std::vector<Row> rows_, rowsBetween_;
+  std::vector<Line> lines_, linesBetween_;
   std::array<Matrices, kMostDegree + 1> matrices_;  ///< by degree; there are none for degree 0
 };
 

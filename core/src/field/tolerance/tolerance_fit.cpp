@@ -1,5 +1,6 @@
 #include "field/tolerance/tolerance_fit.h"
 
+#include <array>
 #include <limits>
 #include <utility>
 
@@ -31,36 +32,118 @@ struct Kink {
   Vector3 local = Vector3::Zero();
 };
 
-/// Appends the kinks that rows of four points suggest. Where the distance has a kink, such as on the planes halfway
-/// between two faces, the error has a sharp peak, which all points of the lattices may miss. Beside a kink the distance
-/// is nearly linear, which the error is not, so that the place of the kink and the distance there follow from the two
-/// slopes beside it. Beyond the faces of the cell there are no points: in an interval that ends at a face, the slope on
-/// the outer side of a kink is taken to be the opposite of that on the inner side.
-template <typename Points>
-void findKinks(const Fit& fit, const AllowedError& allowed, const Points& points,
-               std::span<const CellLattice::Row> rows, std::vector<Kink>& kinks) {
-  constexpr double kLeast = 0.7;      // lower peaks are not within reach of the greatest allowed ratio
-  constexpr double kLeastBend = 0.1;  // change of slope times interval, over the allowed error; it adds a quarter of it
-  for (const CellLattice::Row& row : rows) {
-    const auto point = [&](int i) -> const auto& { return points[row.points[i]]; };
-    const auto width = [&](int i) { return (point(i + 1).local - point(i).local).sum(); };  // along an axis
-    const auto slope = [&](int i) { return (point(i + 1).distance - point(i).distance) / width(i); };
-    const auto bends = [&](int i, double one, double other) {
-      return std::abs(one - other) * width(i) >= kLeastBend * allowed.at(point(i).distance);
-    };
-    const auto find = [&](int i, double before, double after) {  // in interval i, by the slopes beside the kink
-      const double t = (slope(i) - after) / (before - after);
-      if (!(t > 0 && t < 1)) return;
-      const double distance = point(i).distance + t * width(i) * before;
-      const Vector3 local = point(i).local + t * (point(i + 1).local - point(i).local);
-      const double ratio = std::abs(fit.valueAt(local) - distance) / allowed.at(distance);
-      if (ratio > kLeast) kinks.push_back({ratio, local});
-    };
-    if (bends(1, slope(0), slope(2))) find(1, slope(0), slope(2));
-    if (row.beginsAtFace && bends(0, slope(0), slope(1))) find(0, -slope(1), slope(1));
-    if (row.endsAtFace && bends(2, slope(2), slope(1))) find(2, slope(1), -slope(1));
+/// The distance along a line of points, with intervals from each point to the next.
+class Profile {
+ public:
+  template <typename Points>
+  Profile(const Points& points, const CellLattice::Line& line) : intervals_(int(line.points.size()) - 1) {
+    for (std::size_t i = 0; i < line.points.size(); ++i) {
+      positions_[i] = points[line.points[i]].local[line.axis];
+      distances_[i] = points[line.points[i]].distance;
+    }
+    for (int i = 0; i < intervals_; ++i) slopes_[i] = (distances_[i + 1] - distances_[i]) / width(i);
   }
+
+  int intervals() const { return intervals_; }
+  double width(int interval) const { return positions_[interval + 1] - positions_[interval]; }
+  double slope(int interval) const { return slopes_[interval]; }
+  /// Distance at the point at which an interval begins.
+  double distance(int interval) const { return distances_[interval]; }
+
+  /// Returns the slope of the interval before another one, or behind it, continued into a quarter of that interval:
+  /// linearly by the two nearest intervals, or as a constant.
+  double slopeBefore(int interval, bool isConstant) const {
+    return continued(interval - 1, interval - 2, positions_[interval] + width(interval) / 4, isConstant);
+  }
+  double slopeBehind(int interval, bool isConstant) const {
+    return continued(interval + 1, interval + 2, positions_[interval + 1] - width(interval) / 4, isConstant);
+  }
+
+ private:
+  double middle(int interval) const { return (positions_[interval] + positions_[interval + 1]) / 2; }
+
+  double continued(int nearest, int next, double position, bool isConstant) const {
+    if (isConstant || next < 0 || next >= intervals_) return slope(nearest);
+    const double bend = (slope(nearest) - slope(next)) / (middle(nearest) - middle(next));
+    return slope(nearest) + bend * (position - middle(nearest));
+  }
+
+  int intervals_;
+  std::array<double, CellLattice::kLongestLine> positions_{}, distances_{}, slopes_{};
+};
+
+/// The slopes of the distance on both sides of a kink in an interval.
+struct SlopesAtKink {
+  double before, after;
+  double bend;  ///< how much the slope changes in the interval
+};
+
+/// Returns the slopes at a kink by the intervals beside its own. Beyond the ends of a line there are no points: the
+/// slope on the outer side of the kink is taken to be the opposite of the slope on its inner side.
+SlopesAtKink slopesAtKink(const Profile& profile, int interval, bool isConstant) {
+  const bool isFirst = interval == 0, isLast = interval == profile.intervals() - 1;
+  const double before = isFirst ? 0 : profile.slopeBefore(interval, isConstant);
+  const double after = isLast ? 0 : profile.slopeBehind(interval, isConstant);
+  if (isFirst) return {-after, after, std::abs(after - profile.slope(interval))};
+  if (isLast) return {before, -before, std::abs(before - profile.slope(interval))};
+  return {before, after, std::abs(after - before)};
 }
+
+/// Seeks kinks of the distance in a cell. At a kink, such as on the planes halfway between two faces, the error has a
+/// sharp peak, which all points of the lattices may miss. On both sides of a kink the distance changes smoothly. The
+/// place of the kink and the distance there therefore follow from the slopes on its two sides.
+class KinkSearch {
+ public:
+  KinkSearch(const Fit& fit, const AllowedError& allowed) : fit_(fit), allowed_(allowed) {}
+
+  /// Seeks kinks along lines of points. Of all kinks in the same interval of parallel lines, the one with the greatest
+  /// error is kept for each way of continuing slopes. Smooth bends also look like kinks, and must not crowd out the
+  /// true ones of other intervals.
+  template <typename Points>
+  void search(const Points& points, std::span<const CellLattice::Line> lines) {
+    const std::size_t intervals = lines.front().points.size() - 1, first = greatest_.size();
+    greatest_.resize(first + 2 * 3 * intervals);
+    for (const CellLattice::Line& line : lines) {
+      const Profile profile(points, line);
+      for (std::size_t interval = 0; interval < intervals; ++interval)
+        for (const bool isConstant : {false, true}) {
+          const Vector3& begin = points[line.points[interval]].local;
+          const Kink kink = kinkIn(profile, int(interval), isConstant, begin, line.axis);
+          Kink& greatest =
+              greatest_[first + 2 * (std::size_t(line.axis) * intervals + interval) + (isConstant ? 1 : 0)];
+          if (kink.ratio > greatest.ratio) greatest = kink;
+        }
+    }
+  }
+
+  /// Returns the places of all kinks but those where the error is hardly greater than allowed.
+  std::vector<Vector3> places() const {
+    constexpr double kLeast = 0.7;  // less than 1, because the estimated ratio may be too small
+    std::vector<Vector3> places;
+    for (const Kink& kink : greatest_)
+      if (kink.ratio > kLeast) places.push_back(kink.local);
+    return places;
+  }
+
+ private:
+  /// Returns the kink in an interval, which begins at the point `begin`; with the ratio 0 if there is none.
+  Kink kinkIn(const Profile& profile, int interval, bool isConstant, const Vector3& begin, int axis) const {
+    constexpr double kLeastBend = 0.1;  // over the allowed error; a change of distance that hardly matters
+    const double width = profile.width(interval), slope = profile.slope(interval);
+    const auto [before, after, bend] = slopesAtKink(profile, interval, isConstant);
+    if (bend * width < kLeastBend * allowed_.at(profile.distance(interval))) return {};
+    const double share = (slope - after) / (before - after);  // of the interval that lies before the kink
+    if (!(share > 0 && share < 1)) return {};
+    const double distance = profile.distance(interval) + share * width * before;
+    Vector3 local = begin;
+    local[axis] += share * width;
+    return {std::abs(fit_.valueAt(local) - distance) / allowed_.at(distance), local};
+  }
+
+  const Fit& fit_;
+  const AllowedError& allowed_;
+  std::vector<Kink> greatest_;
+};
 
 Fit polynomial(std::vector<double> coefficients, int degree, const Box& cell) {
   Fit fit;
@@ -169,18 +252,15 @@ void ToleranceFitter::addSurfacePoints(const Fit& fit, const Box& cell, std::vec
   });
 }
 
-/// Returns the places at which kinks are suspected, with their errors; of many, those with the greatest estimates.
+/// Returns the places at which kinks are suspected, with their errors.
 std::vector<ToleranceFitter::CheckedPoint> ToleranceFitter::checkedKinks(const Fit& fit, const Box& cell,
                                                                          std::span<const CheckedPoint> lattice,
                                                                          std::span<const CheckedPoint> between) const {
-  constexpr std::size_t kMost = 96;
-  std::vector<Kink> kinks;
-  findKinks(fit, allowed_, lattice, lattice_.rows(), kinks);
-  findKinks(fit, allowed_, between, lattice_.rowsBetween(), kinks);
-  std::ranges::stable_sort(kinks, std::greater(), &Kink::ratio);
-  std::vector<Vector3> local(std::min(kMost, kinks.size()));
-  for (std::size_t i = 0; i < local.size(); ++i) local[i] = kinks[i].local;
-  return local.empty() ? std::vector<CheckedPoint>() : check(fit, cell, local);
+  KinkSearch search(fit, allowed_);
+  search.search(lattice, lattice_.lines());
+  search.search(between, lattice_.linesBetween());
+  const std::vector<Vector3> places = search.places();
+  return places.empty() ? std::vector<CheckedPoint>() : check(fit, cell, places);
 }
 
 /// Returns the greatest ratio found in a cell, or one that is too great. `points` are the points of the lattice.
