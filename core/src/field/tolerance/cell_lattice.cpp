@@ -40,9 +40,10 @@ class LatticeIndices {
     for (int a = 0; a < across_; ++a)
       for (int b = 0; b < across_; ++b)
         for (int axis = 0; axis < 3; ++axis) {
-          CellLattice::Line& line = lines.emplace_back(axis);
+          CellLattice::Line line{.axis = axis, .points = {}};
           for (int i = 0; i < across_; ++i)
             line.points.push_back(axis == 0 ? at(i, a, b) : axis == 1 ? at(a, i, b) : at(a, b, i));
+          lines.push_back(std::move(line));
         }
     return lines;
   }
