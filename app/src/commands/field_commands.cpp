@@ -406,8 +406,8 @@ void addReadingCommands(Registry& registry) {
       .summary = "Compute distances and gradients at points.",
       .help = paragraphs(R"(
 Takes one point, or reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments
-and a header line are ignored. In a script that leaves FIELD out, a point is given as points=X,Y,Z. Writes CSV with the header x,y,z,distance,gx,gy,gz and numbers in full precision, or with
---json an array of objects.
+and a header line are ignored. In a script that leaves FIELD out, a point is given as points=X,Y,Z. Writes CSV with the
+header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an array of objects.
 
 Distances are negative inside. Outside the domain the field is continued continuously.)"),
       .examples = {"hpsdf query bunny.hpsdf 0.1,0.2,0.3", "echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
