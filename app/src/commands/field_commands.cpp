@@ -208,8 +208,7 @@ void runQuery(Session& session, const Arguments& arguments) {
   });
   if (!output) return;
   output->commit();
-  session.console().err << fmt::format("{}: {} point{}\n", arguments.text("output"), grouped(count),
-                                       count == 1 ? "" : "s");
+  session.console().err << fmt::format("{}: {}\n", arguments.text("output"), countOf(count, "point", "points"));
 }
 
 void runSmooth(Session& session, const Arguments& arguments) {
