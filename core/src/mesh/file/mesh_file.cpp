@@ -1,67 +1,29 @@
 #include "hpsdf/mesh_file.h"
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <charconv>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <functional>
 #include <span>
-#include <sstream>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "hpsdf/detail/mesh_reading.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
-#include "mesh/file/assimp_import.h"
+#include "mesh/read/input.h"
+#include "mesh/read/ply_reader.h"
+#include "mesh/read/read_mesh.h"
 
 namespace hpsdf {
 namespace {
 
 namespace fs = std::filesystem;
-
-double largestCoordinate(const Box& box) { return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff(); }
-
-/// Returns the distance between adjacent `float` numbers near a coordinate.
-double floatSpacing(double coordinate) {
-  constexpr int kBits = std::numeric_limits<float>::digits, kSmallest = std::numeric_limits<float>::min_exponent;
-  const int exponent = coordinate > 0 ? std::ilogb(coordinate) + 1 : kSmallest;
-  return std::ldexp(1.0, std::max(exponent, kSmallest) - kBits);
-}
-
-/// Returns a hint for the error message about a mesh without area if rounding its coordinates to `float` is the
-/// probable cause, else an empty text.
-std::string spacingHint(const fs::path& file, const Box& box) {
-  constexpr double kFew = 16;
-  const double largest = largestCoordinate(box), spacing = floatSpacing(largest);
-  if (!mesh::mayExceedFloat(file) || box.sizes().maxCoeff() > kFew * spacing) return "";
-  std::ostringstream hint;
-  hint.precision(2);
-  hint << "; coordinates reach " << largest << ", where the reader keeps them " << spacing
-       << " apart: scale the mesh, or move it nearer to the origin, before it is exported";
-  return hint.str();
-}
-
-/// Returns true if any triangle has three different vertices. Only such a triangle can have lost its area by rounding.
-bool hasThreeCorners(const TriangleMesh& mesh) {
-  return std::ranges::any_of(mesh.triangles,
-                             [](const auto& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; });
-}
-
-ImportedMesh cleaned(TriangleMesh mesh, const fs::path& file) {
-  const Box box = boundingBox(mesh);
-  const bool mayBeRounded = hasThreeCorners(mesh);
-  try {
-    return hpsdf::cleaned(std::move(mesh));
-  } catch (const Error& error) {
-    throw Error(error.kind(), error.subject(), error.problem() + (mayBeRounded ? spacingHint(file, box) : ""));
-  }
-}
 
 /// Returns true for a PLY file and false for an OBJ file; throws `Error` for other extensions.
 bool isPly(const std::filesystem::path& file) {
@@ -73,7 +35,7 @@ bool isPly(const std::filesystem::path& file) {
 
 static_assert(std::endian::native == std::endian::little, "a PLY file is written as its numbers are in memory");
 
-constexpr std::size_t kPiece = 1 << 16;  ///< bytes of text written at a time
+constexpr std::size_t kPiece = 1 << 16;  ///< bytes written at a time
 
 /// Appends the shortest decimal text from which the same number is read back.
 void append(std::string& text, double number) {
@@ -82,13 +44,7 @@ void append(std::string& text, double number) {
   text.append(digits.data(), end);
 }
 
-/// The syntax of vertices and faces in a text format for meshes.
-struct TextForm {
-  std::string_view beforeVertex, beforeFace;
-  std::uint64_t firstVertex;  ///< index of the first vertex in the format: 0 or 1
-};
-
-void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) {
+void writeObj(const TriangleMesh& mesh, OutputFile& out) {
   std::string text;
   const auto writeIf = [&](bool full) {
     if (!full) return;
@@ -96,67 +52,36 @@ void writeText(const TriangleMesh& mesh, const TextForm& form, OutputFile& out) 
     text.clear();
   };
   for (const Vector3& v : mesh.vertices) {
-    text += form.beforeVertex;
-    append(text, v.x());
-    append(text += ' ', v.y());
-    append(text += ' ', v.z());
+    text += 'v';
+    for (const double x : v) append(text += ' ', x);
     text += '\n';
     writeIf(text.size() >= kPiece);
   }
   for (const auto& triangle : mesh.triangles) {
-    text += form.beforeFace;
-    for (const std::uint32_t v : triangle) text += ' ' + std::to_string(form.firstVertex + v);
+    text += 'f';
+    for (const std::uint32_t v : triangle) text += ' ' + std::to_string(std::uint64_t{v} + 1);
     text += '\n';
     writeIf(text.size() >= kPiece);
   }
   writeIf(!text.empty());
 }
 
-void writeObj(const TriangleMesh& mesh, OutputFile& out) { writeText(mesh, {"v ", "f", 1}, out); }
-
-/// Writes a PLY file, as text if binary data would begin with a line feed, else as binary data.
-void writePly(const TriangleMesh& mesh, OutputFile& out) {
-  static_assert(sizeof(Vector3) == 3 * sizeof(double));
-  const auto vertices = std::as_bytes(std::span(mesh.vertices));
-  // Choose text if binary data would begin with a line feed. assimp takes that byte for a part of the header and
-  // then reads all numbers shifted by one byte.
-  const bool asText = !vertices.empty() && vertices.front() == std::byte{'\n'};
-  out.write(std::string("ply\nformat ") + (asText ? "ascii" : "binary_little_endian") + " 1.0\nelement vertex " +
-            std::to_string(mesh.vertices.size()) +
-            "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-            std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n");
-  if (asText) return writeText(mesh, {"", "3", 0}, out);
-  out.write(vertices);
-  std::vector<std::byte> faces;
-  for (const auto& triangle : mesh.triangles) {
-    const auto corners = std::as_bytes(std::span(triangle));
-    faces.push_back(std::byte{3});
-    faces.insert(faces.end(), corners.begin(), corners.end());
-  }
-  out.write(faces);
-}
-
 }  // namespace
 
-double coordinateSpacing(const fs::path& file, const TriangleMesh& mesh) {
-  const Box box = boundingBox(mesh);
-  return box.isEmpty() || !mesh::mayExceedFloat(file) ? 0 : floatSpacing(largestCoordinate(box));
-}
+bool isMeshFileName(const fs::path& file) { return mesh::hasMeshExtension(file); }
 
-bool isMeshFileName(const fs::path& file) { return mesh::hasKnownExtension(file); }
-
-ImportedMesh importMesh(const fs::path& file) {
-  ImportedMesh result = cleaned(mesh::readByAssimp(file), file);
+ImportedMesh importMesh(const fs::path& file, const Progress& progress) {
+  ImportedMesh result = cleaned(mesh::readMesh(file, progress));
   result.mesh.name = file.filename().string();
   return result;
 }
 
-TriangleMesh loadMesh(const std::string& fileOrShape) {
+TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress) {
   if (fileOrShape.starts_with("builtin:")) return shapes::mesh(fileOrShape);
   if (fileOrShape.starts_with("analytic:"))
     throw Error(ErrorKind::option, fileOrShape,
                 "a mesh is expected here; use builtin:" + fileOrShape.substr(9) + " or a mesh file");
-  return importMesh(fileOrShape).mesh;
+  return importMesh(fileOrShape, progress).mesh;
 }
 
 void checkMeshWritable(const std::filesystem::path& file) {
@@ -167,8 +92,42 @@ void checkMeshWritable(const std::filesystem::path& file) {
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
   const bool ply = isPly(file);
   OutputFile out(file);
-  ply ? writePly(mesh, out) : writeObj(mesh, out);
+  ply ? detail::writePly(mesh, [&](std::span<const std::byte> bytes) { out.write(bytes); }) : writeObj(mesh, out);
   out.commit();
 }
 
+namespace detail {
+
+bool isReadByAssimp(const fs::path& file) { return mesh::isReadByAssimp(file); }
+
+TriangleMesh readMesh(const fs::path& file, const Progress& progress) { return mesh::readMesh(file, progress); }
+
+TriangleMesh readPly(std::string_view bytes, const std::string& name, const Progress& progress) {
+  mesh::Input input(bytes, name, progress);
+  return mesh::readPly(input);
+}
+
+void writePly(const TriangleMesh& mesh, const std::function<void(std::span<const std::byte>)>& write) {
+  static_assert(sizeof(Vector3) == 3 * sizeof(double));
+  const std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex " +
+                             std::to_string(mesh.vertices.size()) +
+                             "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+                             std::to_string(mesh.triangles.size()) +
+                             "\nproperty list uchar uint vertex_indices\nend_header\n";
+  write(std::as_bytes(std::span(header)));
+  write(std::as_bytes(std::span(mesh.vertices)));
+  std::vector<std::byte> faces;
+  faces.reserve(kPiece);
+  for (const auto& triangle : mesh.triangles) {
+    const auto corners = std::as_bytes(std::span(triangle));
+    faces.push_back(std::byte{3});
+    faces.insert(faces.end(), corners.begin(), corners.end());
+    if (faces.size() + sizeof(triangle) < kPiece) continue;
+    write(faces);
+    faces.clear();
+  }
+  write(faces);
+}
+
+}  // namespace detail
 }  // namespace hpsdf

@@ -1,4 +1,4 @@
-#include "mesh/file/triangulate.h"
+#include "mesh/read/triangulate.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -103,8 +103,9 @@ class CornerGrid {
 /// again after a neighbour, or the corner found in its triangle, has been cut off.
 class EarClipper {
  public:
-  explicit EarClipper(std::span<const Vector3> polygon)
-      : points_(flattened(polygon)),
+  EarClipper(std::span<const Vector3> polygon, const Progress& progress)
+      : progress_(progress),
+        points_(flattened(polygon)),
         grid_(points_),
         maybeClear_(points_.size()),
         maybe_(points_.size()),
@@ -119,7 +120,7 @@ class EarClipper {
   }
 
   std::vector<Triangle> clip() {
-    // Cut off thin ears only if there is no other ear. Rounding to float moves corners off a straight side. Ears as
+    // Cut off thin ears only if there is no other ear. Rounding, mostly to float, moves corners off a straight side. Ears as
     // thin as these rounding errors, and ears whose cut passes another corner as closely, would yield slivers with
     // random normals. The tolerance is relative to the length of the sides.
     constexpr double kRounding = 1e-4;
@@ -133,9 +134,21 @@ class EarClipper {
   }
 
  private:
+  /// Counts the corners that were looked at, and reports progress from time to time.
+  void work(std::size_t corners) {
+    constexpr std::size_t kBetweenReports = 100'000;
+    looked_ += corners;
+    if (looked_ < kBetweenReports) return;
+    looked_ = 0;
+    progress_.update("Triangulating a polygon of the mesh", 1 - double(left_) / double(points_.size()));
+  }
+
   std::optional<std::uint32_t> findEar(double tolerance, CornerSet& candidates) {
     std::optional<std::uint32_t> corner = candidates.next(start_);
-    for (; corner && !isEar(*corner, tolerance); corner = candidates.next(*corner)) candidates.remove(*corner);
+    for (; corner && !isEar(*corner, tolerance); corner = candidates.next(*corner)) {
+      candidates.remove(*corner);
+      work(1);
+    }
     return corner;
   }
 
@@ -178,7 +191,8 @@ class EarClipper {
 
   /// Returns the corner that makes the smallest triangle with its two neighbours. The clipper cuts this corner off if
   /// the polygon has no ear, because it is flat or intersects itself.
-  std::uint32_t flattestCorner() const {
+  std::uint32_t flattestCorner() {
+    work(left_);
     std::uint32_t best = start_;
     double least = std::numeric_limits<double>::infinity();
     std::uint32_t corner = start_;
@@ -214,6 +228,8 @@ class EarClipper {
     maybe_.add(corner);
   }
 
+  const Progress& progress_;
+  std::size_t looked_ = 0;  ///< corners looked at since the last report
   std::vector<Vector2> points_;
   CornerGrid grid_;
   CornerSet maybeClear_, maybe_;                     ///< corners to test as ears, with and without a tolerance
@@ -228,9 +244,9 @@ class EarClipper {
 
 }  // namespace
 
-std::vector<Triangle> triangulate(std::span<const Vector3> polygon) {
+std::vector<Triangle> triangulate(std::span<const Vector3> polygon, const Progress& progress) {
   if (polygon.size() == 3) return {{0, 1, 2}};
-  return EarClipper(polygon).clip();
+  return EarClipper(polygon, progress).clip();
 }
 
 }  // namespace hpsdf::mesh

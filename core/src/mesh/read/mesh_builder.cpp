@@ -1,0 +1,114 @@
+#include "mesh/read/mesh_builder.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "hpsdf/detail/memory.h"
+#include "hpsdf/error.h"
+#include "mesh/read/triangulate.h"
+
+namespace hpsdf::mesh {
+namespace {
+
+constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+
+std::string lineText(std::uint64_t line) { return line > 0 ? "line " + std::to_string(line) + ": " : ""; }
+
+void requireArrays(std::uint64_t vertices, std::uint64_t triangles) {
+  requireMemory("a mesh of this size", double(vertices) * sizeof(Vector3) + double(triangles) * sizeof(Triangle),
+                "simplify the mesh first");
+}
+
+}  // namespace
+
+MeshBuilder::MeshBuilder(const Input& input) : input_(input) { mesh_.name = input.file().string(); }
+
+void MeshBuilder::expect(std::uint64_t count, std::uint64_t bytes, const char* what) const {
+  if (count > input_.mostLeft() / bytes)
+    input_.refuse("its header promises " + std::to_string(count) + " " + what + ", but only " +
+                  std::to_string(input_.mostLeft()) + " bytes follow; export it again");
+  if (count > kMost)
+    throw Error(ErrorKind::limit, mesh_.name,
+                "more than " + std::to_string(kMost) + " " + what + "; simplify the mesh first");
+}
+
+void MeshBuilder::expectVertices(std::uint64_t count, std::uint64_t bytes) {
+  expect(count, bytes, "vertices");
+  requireArrays(vertices() + count, 0);
+  mesh_.vertices.reserve(vertices() + count);
+}
+
+void MeshBuilder::expectTriangles(std::uint64_t count, std::uint64_t bytes) {
+  expect(count, bytes, "faces");
+  requireArrays(vertices(), mesh_.triangles.size() + count);
+  mesh_.triangles.reserve(mesh_.triangles.size() + count);
+}
+
+/// Makes room for more elements: for as many as the rest of the file will hold if it goes on like the part that has
+/// been read since the first of them. Memory that is never written to is not taken from the machine.
+template <typename T>
+void MeshBuilder::grow(std::vector<T>& array, Beginning& beginning) const {
+  constexpr std::size_t kFirst = 1024;
+  constexpr double kReserve = 1.02;
+  if (array.size() >= kMost)
+    throw Error(ErrorKind::limit, mesh_.name,
+                "more than " + std::to_string(kMost) + " vertices or triangles; simplify the mesh first");
+  const std::size_t size = array.size();
+  const double share = input_.share();
+  if (beginning.share < 0) beginning.share = share;
+  const double read = share - beginning.share;
+  std::size_t capacity = std::max(kFirst, 2 * size);
+  if (read > 0 && size > 0) {
+    const double whole = kReserve * double(size) / read * (1 - beginning.share);
+    capacity = std::max(size + size / 4, std::size_t(std::min(whole, double(kMost))));
+  }
+  requireArrays(mesh_.vertices.size(), mesh_.triangles.size());
+  array.reserve(capacity);
+}
+
+void MeshBuilder::growVertices() { grow(mesh_.vertices, verticesBegin_); }
+void MeshBuilder::growTriangles() { grow(mesh_.triangles, trianglesBegin_); }
+
+void MeshBuilder::addFace(std::span<const std::uint32_t> corners, std::uint64_t line) {
+  if (corners.size() == 3) return addTriangle({corners[0], corners[1], corners[2]}, line);
+  ++faces_;
+  if (corners.size() < 3) return;
+  const auto isKnown = [&](std::uint32_t v) { return v < vertices(); };
+  std::ranges::all_of(corners, isKnown) ? addTriangulated(corners) : addLater(corners, line);
+}
+
+void MeshBuilder::addLater(std::span<const std::uint32_t> corners, std::uint64_t line) {
+  later_.push_back({{corners.begin(), corners.end()}, faces_, line});
+}
+
+void MeshBuilder::addTriangulated(std::span<const std::uint32_t> corners) {
+  polygon_.clear();
+  for (const std::uint32_t v : corners) polygon_.push_back(mesh_.vertices[v]);
+  for (const auto& [a, b, c] : triangulate(polygon_, input_.progress())) {
+    if (mesh_.triangles.size() == mesh_.triangles.capacity()) growTriangles();
+    mesh_.triangles.push_back({corners[a], corners[b], corners[c]});
+  }
+}
+
+void MeshBuilder::refuseVertexOf(std::uint64_t face, std::int64_t vertex, std::uint64_t line) const {
+  throw Error(ErrorKind::mesh, mesh_.name,
+              lineText(line) + "face " + std::to_string(face) + " refers to vertex " + std::to_string(vertex) +
+                  ", but there are only " + std::to_string(vertices()) + "; repair or export the mesh again");
+}
+
+void MeshBuilder::refuseVertex(std::int64_t vertex, std::uint64_t line) const {
+  refuseVertexOf(faces_ + 1, vertex, line);
+}
+
+TriangleMesh MeshBuilder::finish() {
+  for (const LaterFace& face : later_) {
+    for (const std::uint32_t v : face.corners)
+      if (v >= vertices()) refuseVertexOf(face.number, std::int64_t{v} + 1, face.line);
+    addTriangulated(face.corners);
+  }
+  later_.clear();
+  return std::move(mesh_);
+}
+
+}  // namespace hpsdf::mesh

@@ -1,0 +1,170 @@
+#include "mesh/read/text_scanner.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <system_error>
+
+#include "mesh/read/quoted.h"
+
+namespace hpsdf::mesh {
+namespace {
+
+constexpr std::size_t kLongestWord = 4096;
+static_assert(kLongestWord < Input::kLongestPiece);
+
+bool isLineEnd(char c) { return c == '\n' || c == '\r'; }
+bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+
+}  // namespace
+
+TextScanner::TextScanner(Input& input, char comment, std::uint64_t line)
+    : input_(input), comment_(comment), line_(line) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  input_.ensure(kByteOrderMark.size());
+  if (input_.offset() == 0 && input_.rest().starts_with(kByteOrderMark)) input_.skip(kByteOrderMark.size());
+}
+
+/// Returns true if a word cannot contain this character. `peek` gives '\0' at the file's end.
+bool TextScanner::endsWord(char c) const { return isBlank(c) || isLineEnd(c) || c == comment_ || c == '\0'; }
+
+char TextScanner::peek() {
+  if (input_.rest().size() <= kLongestWord) input_.ensure(kLongestWord + 1);
+  return input_.rest().empty() ? '\0' : input_.rest().front();
+}
+
+void TextScanner::skipLineEnd(char c) {
+  input_.skip(1);
+  ++line_;
+  if (c == '\r') take('\n');
+}
+
+/// Skips a continuation sign together with the line end behind it.
+bool TextScanner::skipContinuation() {
+  const std::string_view rest = input_.rest();
+  const std::size_t end = rest.find_first_not_of(" \t", 1);
+  if (end == rest.npos || !isLineEnd(rest[end])) return false;
+  input_.skip(end);
+  skipLineEnd(rest[end]);
+  return true;
+}
+
+/// Skips blanks and comments of this line. Returns false if nothing is left of the file then.
+bool TextScanner::skipBlanks() {
+  for (;;) {
+    const char c = peek();
+    if (input_.rest().empty()) return false;
+    if (isBlank(c)) {
+      input_.skip(1);
+    } else if (c == comment_ && c != '\0') {
+      while (!input_.rest().empty() && !isLineEnd(peek())) input_.skip(1);
+    } else if (c != continuation_ || c == '\0' || !skipContinuation()) {
+      return !input_.rest().empty();
+    }
+  }
+}
+
+bool TextScanner::toWord() {
+  while (skipBlanks()) {
+    const char c = input_.rest().front();
+    if (!isLineEnd(c)) return true;
+    skipLineEnd(c);
+  }
+  return false;
+}
+
+bool TextScanner::atLineEnd() { return !skipBlanks() || isLineEnd(input_.rest().front()); }
+
+void TextScanner::skipLine() {
+  for (;;) {
+    peek();
+    const std::string_view rest = input_.rest();
+    if (rest.empty()) return;
+    std::size_t length = 0;
+    while (length < rest.size() && !isLineEnd(rest[length]) && (rest[length] != continuation_ || length == 0)) ++length;
+    if (length > 0) {
+      input_.skip(length);
+    } else if (isLineEnd(rest.front())) {
+      return skipLineEnd(rest.front());
+    } else if (!skipContinuation()) {
+      input_.skip(1);
+    }
+  }
+}
+
+std::string_view TextScanner::word() {
+  peek();
+  const std::string_view rest = input_.rest();
+  std::size_t length = 0;
+  while (length < rest.size() && !endsWord(rest[length])) ++length;
+  if (length > kLongestWord) refuse("a word of more than " + std::to_string(kLongestWord) + " characters");
+  input_.skip(length);
+  return rest.substr(0, length);
+}
+
+bool TextScanner::take(char c) {
+  if (peek() != c || input_.rest().empty()) return false;
+  input_.skip(1);
+  return true;
+}
+
+double TextScanner::number() {
+  peek();
+  const std::string_view rest = input_.rest();
+  const char* const begin = rest.data() + (rest.starts_with('+') ? 1 : 0);
+  const char* const end = rest.data() + rest.size();
+  double value = 0;
+  auto [stop, error] = std::from_chars(begin, end, value);
+  if (error == std::errc::result_out_of_range) value = std::strtod(std::string(begin, stop).c_str(), nullptr);
+  const bool ends = stop == end || endsWord(*stop);
+  if (error == std::errc::invalid_argument || !ends || !std::isfinite(value)) refuseNumber("a number");
+  input_.skip(std::size_t(stop - rest.data()));
+  return value;
+}
+
+/// Throws the error for a word that is not the number that was expected.
+void TextScanner::refuseNumber(std::string_view expected) {
+  if (input_.rest().empty()) refuse("expected " + std::string(expected) + ", but the file ends");
+  if (isLineEnd(input_.rest().front())) refuse("expected " + std::string(expected) + ", but the line ends");
+  const std::string found(word());
+  double value = 0;
+  const auto [stop, error] = std::from_chars(found.data(), found.data() + found.size(), value);
+  const bool isNumber = error != std::errc::invalid_argument && stop == found.data() + found.size();
+  if (isNumber && expected == "a number")
+    refuse("'" + quoted(found) + "' is not a finite number (or beyond 1.8e308, where double ends)");
+  refuse("expected " + std::string(expected) + ", found '" + quoted(found) + "'");
+}
+
+Vector3 TextScanner::vector(std::string_view what) {
+  Vector3 v;
+  for (double& x : v) {
+    if (!toWord()) refuse("the file ends within " + std::string(what));
+    x = number();
+  }
+  return v;
+}
+
+std::int64_t TextScanner::wholeNumberBefore(std::string_view what) {
+  peek();
+  const std::string_view rest = input_.rest();
+  const char* const begin = rest.data() + (rest.starts_with('+') ? 1 : 0);
+  std::int64_t value = 0;
+  const auto [stop, error] = std::from_chars(begin, rest.data() + rest.size(), value);
+  if (error != std::errc()) refuseNumber("a whole number (" + std::string(what) + ")");
+  input_.skip(std::size_t(stop - rest.data()));
+  return value;
+}
+
+std::int64_t TextScanner::wholeNumber(std::string_view what) {
+  if (!toWord()) refuse("the file ends where " + std::string(what) + " should stand");
+  const std::int64_t value = wholeNumberBefore(what);
+  if (!endsWord())
+    refuse("'" + quoted(word()) + "' follows the number " + std::to_string(value) + " (" + std::string(what) + ")");
+  return value;
+}
+
+void TextScanner::refuse(const std::string& problem) const {
+  input_.refuse("line " + std::to_string(line_) + ": " + problem + "; check or export the file again");
+}
+
+}  // namespace hpsdf::mesh
