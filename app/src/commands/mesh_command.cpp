@@ -161,12 +161,6 @@ std::string defectsText(const MeshDefects& defects, const Box& mesh, std::size_t
   return text;
 }
 
-std::string spacingText(const std::string& surface, const TriangleMesh& mesh) {
-  const double spacing = coordinateSpacing(surface, mesh);
-  if (spacing == 0) return "";
-  return summaryRow("coordinates", fmt::format("the reader stores them in steps of {}", shortNumber(spacing)));
-}
-
 std::string checkText(const SignCheck& check) {
   std::string text = summaryRow(
       "sign checked", fmt::format("at {} points, {} of them nearer than {} to the surface", grouped(check.points),
@@ -226,7 +220,6 @@ void checkMesh(const Arguments& arguments) {
 
 Json resultsJson(const MeshResults& results, const Arguments& arguments) {
   Json json = meshJson(results.surface, results.report);
-  json["coordinate_spacing"] = coordinateSpacing(results.surface, results.mesh);
   json["verdict"] = verdictJson(results.report, results.defects);
   json["defects"] = defectsJson(results.defects, positionLimit(arguments, kPositionsInJson));
   json["sign"] = {{"by", insideTestName(results.choice.insideTest)}, {"because", results.choice.reason}};
@@ -239,7 +232,7 @@ Json resultsJson(const MeshResults& results, const Arguments& arguments) {
 
 std::string resultsText(const MeshResults& results, const Arguments& arguments) {
   const MeshReport& report = results.report;
-  std::string text = meshText(printable(results.surface), report) + spacingText(results.surface, results.mesh);
+  std::string text = meshText(printable(results.surface), report);
   text += defectsText(results.defects, report.box, positionLimit(arguments, kPositionsInText));
   text += summaryRow("verdict", verdictText(report, results.defects));
   text += summaryRow("sign", insideTestName(results.choice.insideTest) + ": " + reasonText(results.choice, report.box));

@@ -24,10 +24,9 @@
 #include <utility>
 #include <vector>
 
-#include "construction/mesh_reply.h"
 #include "files/other_program.h"
 #include "hpsdf/detail/memory.h"
-#include "hpsdf/detail/threads.h"
+#include "hpsdf/detail/mesh_reading.h"
 #include "language/registry.h"
 #include "text/text.h"
 
@@ -40,11 +39,15 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kCommand = "__read-mesh";  // hidden command, followed by FILE SECONDS BYTES
 constexpr const char* kSecondsVariable = "HPSDF_IMPORT_SECONDS";
 constexpr const char* kBytesVariable = "HPSDF_IMPORT_BYTES";
+// The process answers with a PLY file, or with one of these words; a reason follows the first of them.
+constexpr std::string_view kRefused = "refused: ";
+constexpr std::string_view kOutOfMemory = "out of memory";
+
 constexpr auto kInterruptInterval = std::chrono::milliseconds(50);  // longest time before Ctrl-C is noticed
 constexpr double kSilentSeconds = 2;  // progress is shown only after this time: processes may start slowly
 
-// Limits of time and memory for reading a mesh file. They are generous: an idle machine reads 20 MB/s and needs 4 to 9
-// bytes of memory for each byte of the file (docs/meshes.md).
+// Limits of time and memory for reading a mesh file. They are generous: with assimp an idle machine reads 20 MB/s and
+// needs 4 to 9 bytes of memory for each byte of the file.
 constexpr double kSeconds = 60;
 constexpr double kBytesASecond = 2e6;
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
@@ -92,13 +95,13 @@ std::string endText(int status) {
   return fmt::format("signal {}", WTERMSIG(status));
 }
 
-/// One run of the process that reads a mesh file, from its start to its reply.
+/// One run of the process that reads a mesh file, from its start to its answer.
 class Reading {
  public:
   Reading(const fs::path& program, const fs::path& file, const ReadingLimits& limits, const Progress& progress)
-      : limits_(limits),
+      : file_(file),
+        limits_(limits),
         progress_(progress),
-        task_("Reading " + printable(file.filename().string())),
         process_(
             {.program = program,
              .arguments = {kCommand, file.string(), fmt::format("{}", limits.seconds), fmt::format("{}", limits.bytes)},
@@ -107,12 +110,21 @@ class Reading {
     pipe_.closeInput();
   }
 
-  MeshReply reply() {
+  /// Returns the mesh that the process read. Nothing in its answer is believed, since the mesh file may have corrupted
+  /// the process: the answer is read as any PLY file is.
+  TriangleMesh mesh() {
     receive();
-    if (expected_ == 0 || bytes_.size() < expected_) throw died();
-    MeshReply reply = parseReply(bytes_);
-    if (reply.kind == MeshReply::Kind::outOfMemory) throw tooLarge();
-    return reply;
+    const int status = exitStatus();
+    const std::string_view answer = answer_;
+    if (status != 0) throw died(endText(status));
+    if (answer == kOutOfMemory) throw tooLarge();
+    if (answer.starts_with(kRefused)) throw Error(printable(answer.substr(kRefused.size())));
+    if (answer.empty()) throw died("it gave no answer");
+    try {
+      return detail::readPly(answer, file_.string(), progress_);
+    } catch (const Error& error) {
+      throw died("its answer was no mesh: " + error.problem());
+    }
   }
 
  private:
@@ -125,8 +137,16 @@ class Reading {
     return exceeded(bytesText(double(limits_.bytes)) + " of memory", kBytesVariable, std::to_string(limits_.bytes));
   }
 
+  static Error died(const std::string& cause) {
+    return Error(
+        fmt::format("the process that read it came down ({}): the file is damaged, or too much for assimp; check or "
+                    "export it again",
+                    printable(cause)));
+  }
+
+  /// Receives the answer until the process closes its output. The answer takes memory as it arrives, up to the limit.
   void receive() {
-    std::array<std::byte, 65536> buffer;
+    std::array<char, 65536> buffer;
     for (;;) {
       pause();
       pollfd output = {pipe_.ends[0], POLLIN, 0};
@@ -134,46 +154,33 @@ class Reading {
       const ssize_t count = read(output.fd, buffer.data(), buffer.size());
       if (count < 0 && errno == EINTR) continue;
       if (count <= 0) return;
-      bytes_.insert(bytes_.end(), buffer.begin(), buffer.begin() + count);
-      if (expected_ == 0 && bytes_.size() >= kReplyHeaderBytes) expectWhole();
-      if (expected_ > 0 && bytes_.size() > expected_) throw DamagedReply("it goes on too long");
+      answer_.append(buffer.data(), std::size_t(count));
+      if (answer_.size() > limits_.bytes) throw tooLarge();
     }
   }
 
-  /// Reads the length of the reply from the reply's header and reserves memory for the reply. Throws if the length
-  /// exceeds the memory limit: a reply may be long although the process that sends it needed little memory.
-  void expectWhole() {
-    expected_ = replyBytes(bytes_);
-    if (expected_ > limits_.bytes) throw tooLarge();
-    bytes_.reserve(expected_);
-  }
-
-  /// Checks for cancellation and the limit of time, and reports progress.
+  /// Checks for cancellation and the limit of time, and reports progress, whose fraction is unknown.
   void pause() const {
     progress_.throwIfCancelled();
     const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
     const std::string seconds = fmt::format("{}", limits_.seconds);
     if (elapsed > limits_.seconds) throw exceeded(seconds + " s", kSecondsVariable, seconds);
-    if (elapsed > kSilentSeconds && progress_.report) progress_.report(task_, 0);  // the fraction is unknown
+    if (elapsed > kSilentSeconds && progress_.report) progress_.report("Reading the mesh", 0);
   }
 
-  Error died() {
+  int exitStatus() {
     std::optional<int> status;
     for (; !(status = process_.ended()); pause()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    return Error(
-        fmt::format("the process that read it came down ({}): the file is damaged, or too much for assimp; check or "
-                    "export it again",
-                    endText(*status)));
+    return *status;
   }
 
+  const fs::path& file_;
   const ReadingLimits& limits_;
   const Progress& progress_;
-  std::string task_;
   Clock::time_point start_ = Clock::now();
   Pipe pipe_;
   OtherProcess process_;
-  std::vector<std::byte> bytes_;
-  std::uint64_t expected_ = 0;  ///< length of the reply; 0 until its header has arrived
+  std::string answer_;
 };
 
 // The following functions run in the separate process that reads a mesh file.
@@ -187,10 +194,12 @@ void toStandardOutput(std::span<const std::byte> bytes) {
   }
 }
 
+void toStandardOutput(std::string_view text) { toStandardOutput(std::as_bytes(std::span(text))); }
+
 /// Ends the process that reads a mesh file as soon as it runs out of memory. If bad_alloc were thrown instead, the
 /// importer assimp would catch the exception and report a damaged file, or continue.
 void onMemoryOut() {
-  writeOutOfMemory(toStandardOutput);
+  toStandardOutput(kOutOfMemory);
   _exit(0);
 }
 
@@ -237,19 +246,14 @@ ImportedMesh importInSubprocess(const fs::path& program, const fs::path& file, c
                                 const Progress& progress) {
   const auto refused = [&](const std::string& problem) { return Error(ErrorKind::file, file.string(), problem); };
   try {
-    MeshReply reply = Reading(program, file, limits, progress).reply();
-    if (reply.kind == MeshReply::Kind::refusal) throw Error(reply.refusal);
-    reply.imported.mesh.name = file.filename().string();
-    return std::move(reply.imported);
+    ImportedMesh imported = cleaned(Reading(program, file, limits, progress).mesh());
+    imported.mesh.name = file.filename().string();
+    return imported;
   } catch (const std::system_error& error) {
     throw refused(fmt::format("no process can be started to read it ({}); close other programs and try again",
                               error.code().message()));
-  } catch (const DamagedReply& damage) {
-    throw refused(
-        fmt::format("the process that read it gave a wrong answer ({}): the file is damaged; check or export it again",
-                    damage.what()));
   } catch (const Error& error) {
-    throw refused(error.what());
+    throw refused(error.problem());
   }
 }
 
@@ -261,14 +265,14 @@ int readForOtherProcess(std::span<const std::string> words) {
   if (!seconds || !bytes) return 2;
   confine(*seconds, *bytes);
   try {
-    // The file is read with one thread, because the stacks of more threads would count towards the memory limit.
-    writeMesh(withThreads(1, [&] { return importMesh(words[1]); }), toStandardOutput);
+    const TriangleMesh mesh = detail::readMesh(words[1]);
+    detail::writePly(mesh, [](std::span<const std::byte> piece) { toStandardOutput(piece); });
   } catch (const Error& error) {
-    writeRefusal(error.subject() == words[1] ? error.problem() : error.what(), toStandardOutput);
+    toStandardOutput(std::string(kRefused) + (error.subject() == words[1] ? error.problem() : error.what()));
   } catch (const std::bad_alloc&) {  // Eigen calls malloc directly and bypasses `onMemoryOut`
-    writeOutOfMemory(toStandardOutput);
+    toStandardOutput(kOutOfMemory);
   } catch (const std::exception& error) {
-    writeRefusal(fmt::format("{} (this is a fault of the program)", error.what()), toStandardOutput);
+    toStandardOutput(fmt::format("{}{} (this is a fault of the program)", kRefused, error.what()));
   }
   return 0;
 }

@@ -1,6 +1,7 @@
 #pragma once
-// Mesh files are read in a separate process, which runs this same program with a hidden command. If a file
-// crashes assimp, or keeps it busy for too long, the only effect is an error message of one line.
+// Mesh files of the formats that the library assimp reads are read in a separate process, which runs this same program
+// with a hidden command. If a file crashes assimp, or keeps it busy for too long, the only effect is an error message of
+// one line.
 
 #include <cstdint>
 #include <filesystem>
@@ -26,9 +27,9 @@ ReadingLimits readingLimits(const std::filesystem::path& file);
 /// Returns the path of the running program's executable file, or an empty path if it cannot be found out.
 std::filesystem::path ownProgram();
 
-/// Reads a mesh file in a separate process. The process runs `program`, which must come from the same build as this
-/// program. Throws `Error` naming the file if the file cannot be read, or if the process dies, sends a damaged reply
-/// or exceeds a limit. Throws `Cancelled` on cancellation. When the function returns or throws, the process has ended.
+/// Reads a mesh file in a separate process, as `importMesh` does in this one. The process runs `program`, which must come
+/// from the same build as this program. Throws `Error` naming the file if the file cannot be read, or if the process
+/// dies, answers with something else than a mesh, or exceeds a limit. Throws `Cancelled` on cancellation. When the function returns or throws, the process has ended.
 ImportedMesh importInSubprocess(const std::filesystem::path& program, const std::filesystem::path& file,
                                 const ReadingLimits& limits, const Progress& progress);
 
@@ -36,8 +37,8 @@ ImportedMesh importInSubprocess(const std::filesystem::path& program, const std:
 /// with this command.
 bool asksForReading(std::span<const std::string> words);
 
-/// Runs in the separate process: reads a mesh file and writes the mesh as a reply (mesh_reply.h) to standard output.
-/// `words` hold the name of the file and the limits of time and memory. Returns the exit status.
+/// Runs in the separate process: reads a mesh file, and writes the mesh to standard output as a PLY file, or the reason
+/// why there is none. `words` hold the name of the file and the limits of time and memory. Returns the exit status.
 int readForOtherProcess(std::span<const std::string> words);
 
 }  // namespace hpsdf::app

@@ -11,6 +11,7 @@
 #include "construction/mesh_process.h"
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/mesh_reading.h"
 #include "hpsdf/shapes.h"
 #include "text/text.h"
 
@@ -36,20 +37,9 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
   return DistanceFunction(std::move(evaluate), source);  // moved: a reference to the local variable would dangle
 }
 
-void warnOfSpacing(const Console& console, const std::string& surface, const TriangleMesh& mesh) {
-  constexpr double kNegligible = 1e-6;  // relative to the mesh's size; scans and fields have larger errors
-  const Box box = boundingBox(mesh);
-  const double spacing = coordinateSpacing(surface, mesh), size = box.sizes().maxCoeff();
-  if (!(spacing > kNegligible * size)) return;
-  warn(console, fmt::format("{}: coordinates reach {}, where the reader keeps them {} apart ({} of the mesh's longest "
-                            "side): move the mesh nearer to the origin before it is exported",
-                            surface, shortNumber(std::max(-box.min().minCoeff(), box.max().maxCoeff())),
-                            shortNumber(spacing), shortNumber(spacing / size)));
-}
-
 ImportedMesh readFile(const Console& console, const std::string& file) {
-  if (console.meshReader.empty()) return importMesh(file);
   return withProgress(console, [&](const Progress& progress) {
+    if (console.meshReader.empty() || !detail::isReadByAssimp(file)) return importMesh(file, progress);
     return importInSubprocess(console.meshReader, file, readingLimits(file), progress);
   });
 }
@@ -91,9 +81,7 @@ ImportedMesh importSurface(const Console& console, const std::string& surface) {
     const MeshReport report = inspect(mesh);
     return {std::move(mesh), report};
   }
-  ImportedMesh imported = readFile(console, surface);
-  warnOfSpacing(console, surface, imported.mesh);
-  return imported;
+  return readFile(console, surface);
 }
 
 PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes) {

@@ -22,9 +22,10 @@ namespace hpsdf {
 /// `kLargestCoordinate`, and if no triangle with an area is left.
 ImportedMesh cleaned(TriangleMesh mesh);
 
-/// Reads a mesh file (docs/meshes.md), triangulates its polygons, and passes the mesh to `cleaned`. The extension of the
-/// file's name tells the format: OBJ, PLY, STL and OFF, also compressed by gzip (`.ply.gz`); glTF (`.gltf`, `.glb`),
-/// whose meshes are joined under their node transforms; and 3DS. Coordinates keep all digits that the file has.
+/// Reads a mesh file (docs/meshes.md), triangulates its polygons, and passes the mesh to `cleaned`. The extension of
+/// the file's name tells the format: OBJ, PLY, STL and OFF, also compressed by gzip (`.ply.gz`); glTF (`.gltf`,
+/// `.glb`), whose meshes are joined under their node transforms; and 3DS. Coordinates keep all digits that the file
+/// has.
 ///
 /// 3DS files are read by the library assimp, in the caller's process and without a limit of time or memory. A damaged
 /// file can crash assimp or keep it busy for minutes. Read untrusted 3DS files in a subprocess, as the program `hpsdf`
@@ -33,7 +34,8 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// Throws `Error` (of the kind `file` or `mesh`, with the subject `file`) for a file that is missing, a folder,
 /// unreadable, empty or not a mesh; that holds less or more than its header promises; with indices out of range or
 /// numbers that are not finite; and for a mesh that has no area. The message names the line, the byte or the element.
-/// Throws `Error` of the kind `limit` for a mesh that does not fit into memory, and `Cancelled` when `progress` says so.
+/// Throws `Error` of the kind `limit` for a mesh that does not fit into memory, and `Cancelled` when `progress` says
+/// so.
 ImportedMesh importMesh(const std::filesystem::path& file, const Progress& progress = {});
 
 /// Tells whether a file's name ends as the names of mesh files that `importMesh` reads.
@@ -43,8 +45,8 @@ bool isMeshFileName(const std::filesystem::path& file);
 /// with this name (`importMesh`).
 TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress = {});
 
-/// Writes a mesh as OBJ or binary PLY, depending on the file's extension, with coordinates in full double precision. The
-/// file appears whole or not at all. Throws `Error` (of the kind `file`) for another extension, and as `OutputFile`
+/// Writes a mesh as OBJ or binary PLY, depending on the file's extension, with coordinates in full double precision.
+/// The file appears whole or not at all. Throws `Error` (of the kind `file`) for another extension, and as `OutputFile`
 /// does.
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file);
 

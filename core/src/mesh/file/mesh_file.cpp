@@ -109,11 +109,10 @@ TriangleMesh readPly(std::string_view bytes, const std::string& name, const Prog
 
 void writePly(const TriangleMesh& mesh, const std::function<void(std::span<const std::byte>)>& write) {
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
-  const std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                             std::to_string(mesh.vertices.size()) +
-                             "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-                             std::to_string(mesh.triangles.size()) +
-                             "\nproperty list uchar uint vertex_indices\nend_header\n";
+  const std::string header =
+      "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) +
+      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+      std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n";
   write(std::as_bytes(std::span(header)));
   write(std::as_bytes(std::span(mesh.vertices)));
   std::vector<std::byte> faces;

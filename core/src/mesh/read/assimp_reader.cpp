@@ -12,7 +12,7 @@
 
 #include "hpsdf/detail/text.h"
 #include "mesh/read/mesh_builder.h"
-#include "mesh/read/quoted.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -33,7 +33,7 @@ const aiScene& readScene(Assimp::Importer& importer, const Input& input) {
   } catch (const std::exception& error) {
     reason = error.what();
   }
-  input.refuse("cannot be read as a mesh (" + quoted(trimmed(reason)) + "); check or export the file again");
+  input.refuse("cannot be read as a mesh (" + wordText(trimmed(reason)) + "); check or export the file again");
 }
 
 void addPart(MeshBuilder& builder, const Input& input, const aiMesh& part, const Eigen::Affine3d& worldFromPart) {

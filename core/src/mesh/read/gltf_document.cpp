@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "hpsdf/detail/memory.h"
-#include "mesh/read/quoted.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -24,8 +24,9 @@ constexpr std::array<std::string_view, 3> kGeometryExtensions = {"KHR_mesh_quant
 
 /// Beginnings of the names of extensions that leave the geometry as it is: materials, textures, lights, metadata.
 constexpr std::array<std::string_view, 11> kHarmlessExtensions = {
-    "KHR_materials_", "KHR_texture_", "KHR_lights_",       "KHR_xmp",           "KHR_animation_",  "KHR_techniques_webgl",
-    "EXT_texture_",   "EXT_lights_",  "EXT_mesh_features", "EXT_structural_metadata", "MSFT_texture_dds"};
+    "KHR_materials_",  "KHR_texture_", "KHR_lights_", "KHR_xmp",           "KHR_animation_",
+    "KHR_technique",   "EXT_texture_", "EXT_lights_", "EXT_mesh_features", "EXT_structural_metadata",
+    "MSFT_texture_dds"};
 
 std::vector<std::byte> readBytes(Input& input, std::uint64_t count) {
   if (count > input.mostLeft())
@@ -94,9 +95,8 @@ std::string fromPercent(std::string_view uri) {
   for (std::size_t i = 0; i < uri.size(); ++i) {
     const std::string_view digits = uri.substr(i).substr(0, 3);
     unsigned value = 0;
-    const bool isEscape =
-        digits.size() == 3 && digits[0] == '%' &&
-        std::from_chars(digits.data() + 1, digits.data() + 3, value, 16).ptr == digits.data() + 3;
+    const bool isEscape = digits.size() == 3 && digits[0] == '%' &&
+                          std::from_chars(digits.data() + 1, digits.data() + 3, value, 16).ptr == digits.data() + 3;
     text += isEscape ? char(value) : uri[i];
     if (isEscape) i += 2;
   }
@@ -149,14 +149,15 @@ std::size_t componentsOf(const GltfValue& accessor) {
   const std::string type = accessor.text("type");
   for (const auto& [name, components] : kTypes)
     if (type == name) return components;
-  accessor.refuse("has the unknown type '" + quoted(type) + "'");
+  accessor.refuse("has the unknown type '" + wordText(type) + "'");
 }
 
 /// Returns the part of a buffer view that an accessor needs: `count` elements of `size` bytes, `stride` bytes apart.
 std::span<const std::byte> partOf(const GltfValue& object, std::span<const std::byte> view, std::uint64_t offset,
                                   std::uint64_t count, std::size_t size, std::uint64_t stride) {
-  const bool fits = offset <= view.size() && (count == 0 || (size <= view.size() - offset &&
-                                                             (count - 1) <= (view.size() - offset - size) / stride));
+  const bool fits =
+      offset <= view.size() &&
+      (count == 0 || (size <= view.size() - offset && (count - 1) <= (view.size() - offset - size) / stride));
   if (!fits) object.refuse("reaches beyond the end of its buffer view");
   return view.subspan(offset);
 }
@@ -223,7 +224,7 @@ void GltfDocument::requireKnownExtensions() const {
     if (std::ranges::find(kGeometryExtensions, name) == kGeometryExtensions.end() &&
         std::ranges::none_of(kHarmlessExtensions, begins))
       throw Error(ErrorKind::file, file_,
-                  "it requires the glTF extension " + quoted(name) + ", which is not known: export it without");
+                  "it requires the glTF extension " + wordText(name) + ", which is not known: export it without");
   }
 }
 
@@ -236,7 +237,8 @@ std::vector<std::byte> GltfDocument::bufferFile(const GltfValue& buffer, const s
     if (!decoded) buffer.refuse("has data that are not base64");
     return std::move(*decoded);
   }
-  if (uri.find("://") != uri.npos) buffer.refuse("lies elsewhere ('" + quoted(uri) + "'): only files beside it are read");
+  if (uri.find("://") != uri.npos)
+    buffer.refuse("lies elsewhere ('" + wordText(uri) + "'): only files beside it are read");
   const std::filesystem::path file = std::filesystem::path(file_).parent_path() / fromPercent(uri);
   try {
     Input input(file, progress_);
@@ -270,8 +272,7 @@ std::span<const std::byte> GltfDocument::view(std::uint64_t index) {
 
 std::vector<double> GltfDocument::numbers(std::uint64_t accessor, std::size_t components) {
   const GltfValue object = item("accessors", accessor);
-  if (componentsOf(object) != components)
-    object.refuse("does not have " + std::to_string(components) + " components");
+  if (componentsOf(object) != components) object.refuse("does not have " + std::to_string(components) + " components");
   const std::uint64_t count = object.whole("count");
   const ComponentType type = componentType(object);
   const std::size_t size = type.size * components;

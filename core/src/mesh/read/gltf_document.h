@@ -49,7 +49,7 @@ class GltfDocument {
   const Progress& progress_;
   std::uint64_t fileBytes_ = 0;  ///< length of the file, without the buffers beside it
   std::unique_ptr<const nlohmann::json> json_;
-  std::vector<std::byte> binary_;                                ///< the binary chunk of a .glb file
+  std::vector<std::byte> binary_;                                 ///< the binary chunk of a .glb file
   std::map<std::uint64_t, std::vector<std::byte>> buffers_ = {};  ///< buffers that are not in the binary chunk
 };
 

@@ -15,7 +15,7 @@
 
 #include "mesh/read/gltf_document.h"
 #include "mesh/read/mesh_builder.h"
-#include "mesh/read/quoted.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -67,7 +67,8 @@ Primitive decodeDraco(GltfDocument& document, const GltfValue& compressed) {
   buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   draco::Decoder decoder;
   const auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-  if (!decoded.ok()) compressed.refuse("cannot be decompressed (" + quoted(decoded.status().error_msg_string()) + ")");
+  if (!decoded.ok())
+    compressed.refuse("cannot be decompressed (" + wordText(decoded.status().error_msg_string()) + ")");
   const draco::Mesh& mesh = *decoded.value();
   const std::uint64_t id = compressed.get("attributes").whole("POSITION");
   const draco::PointAttribute* const positions =
@@ -81,7 +82,7 @@ Primitive decodeDraco(GltfDocument& document, const GltfValue& compressed) {
     primitive.positions.emplace_back(v.data());
   }
   for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
-    for (const draco::PointIndex corner : mesh.face(f)) primitive.corners.push_back(corner.value());
+    for (const draco::PointIndex& corner : mesh.face(f)) primitive.corners.push_back(corner.value());
   return primitive;
 }
 
@@ -164,7 +165,8 @@ class GltfReader {
     const auto numbers = [&](const char* name, std::size_t components) {
       return attributes.has(name) ? document_.numbers(attributes.whole(name), components) : std::vector<double>();
     };
-    const std::vector<Vector3> translations = vectorsOf(numbers("TRANSLATION", 3)), scales = vectorsOf(numbers("SCALE", 3));
+    const std::vector<Vector3> translations = vectorsOf(numbers("TRANSLATION", 3)),
+                               scales = vectorsOf(numbers("SCALE", 3));
     const std::vector<double> rotations = numbers("ROTATION", 4);
     const std::size_t count = std::max({translations.size(), scales.size(), rotations.size() / 4});
     for (const std::size_t size : {translations.size(), scales.size(), rotations.size() / 4})

@@ -43,7 +43,7 @@ void requireReadable(const fs::path& file) {
 
 /// The open file. The library zlib reads it, which passes files that are not compressed on as they are.
 struct Input::Source {
-  Source(const fs::path& file, std::uint64_t size) : size(size), stream(gzopen(file.c_str(), "rbe")) {}
+  explicit Source(const fs::path& file) : size(fs::file_size(file)), stream(gzopen(file.c_str(), "rbe")) {}
   ~Source() {
     if (stream) gzclose(stream);
   }
@@ -56,7 +56,7 @@ struct Input::Source {
 
 Input::Input(const fs::path& file, const Progress& progress) : file_(file), progress_(progress) {
   requireReadable(file);
-  source_ = std::make_unique<Source>(file, fs::file_size(file));
+  source_ = std::make_unique<Source>(file);
   if (!source_->stream) refuse("cannot be read; check its permissions");
   gzbuffer(source_->stream, kWindow / 4);
   window_ = std::make_unique_for_overwrite<char[]>(kWindow);

@@ -70,8 +70,7 @@ void MeshBuilder::grow(std::vector<T>& array, Beginning& beginning) const {
 void MeshBuilder::growVertices() { grow(mesh_.vertices, verticesBegin_); }
 void MeshBuilder::growTriangles() { grow(mesh_.triangles, trianglesBegin_); }
 
-void MeshBuilder::addFace(std::span<const std::uint32_t> corners, std::uint64_t line) {
-  if (corners.size() == 3) return addTriangle({corners[0], corners[1], corners[2]}, line);
+void MeshBuilder::addPolygon(std::span<const std::uint32_t> corners, std::uint64_t line) {
   ++faces_;
   if (corners.size() < 3) return;
   const auto isKnown = [&](std::uint32_t v) { return v < vertices(); };

@@ -30,10 +30,13 @@ class MeshBuilder {
     mesh_.vertices.push_back(v);
   }
 
-  /// Adds a face whose corners are indices of vertices, from 0; a face with more than three corners is triangulated, and
-  /// one with fewer is left out. The vertices may be added later. `line` is the line of the file where the face stands,
-  /// for errors, or 0 if the file has no lines.
-  void addFace(std::span<const std::uint32_t> corners, std::uint64_t line);
+  /// Adds a face whose corners are indices of vertices, from 0; a face with more than three corners is triangulated,
+  /// and one with fewer is left out. The vertices may be added later. `line` is the line of the file where the face
+  /// stands, for errors, or 0 if the file has no lines.
+  void addFace(std::span<const std::uint32_t> corners, std::uint64_t line) {
+    if (corners.size() == 3) return addTriangle({corners[0], corners[1], corners[2]}, line);
+    addPolygon(corners, line);
+  }
   void addTriangle(const Triangle& corners, std::uint64_t line) {
     ++faces_;
     const std::size_t known = mesh_.vertices.size();
@@ -49,7 +52,8 @@ class MeshBuilder {
   /// that vertex's number, counted from 1 or, if it is negative, back from the last vertex.
   [[noreturn]] void refuseVertex(std::int64_t vertex, std::uint64_t line) const;
 
-  /// Returns the mesh, whose name is the path of the file. Throws `Error` if a face refers to a vertex that was not added.
+  /// Returns the mesh, whose name is the path of the file. Throws `Error` if a face refers to a vertex that was not
+  /// added.
   TriangleMesh finish();
 
  private:
@@ -69,6 +73,7 @@ class MeshBuilder {
   void growTriangles();
   void expect(std::uint64_t count, std::uint64_t bytes, const char* what) const;
   [[noreturn]] void refuseVertexOf(std::uint64_t face, std::int64_t vertex, std::uint64_t line) const;
+  void addPolygon(std::span<const std::uint32_t> corners, std::uint64_t line);
   void addLater(std::span<const std::uint32_t> corners, std::uint64_t line);
   void addTriangulated(std::span<const std::uint32_t> corners);
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "mesh/read/mesh_builder.h"
-#include "mesh/read/quoted.h"
 #include "mesh/read/text_scanner.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -53,8 +53,9 @@ class ObjReader {
   /// Skips the numbers of the texture coordinate and of the normal, as in 1/2/3, 1//3 or 1/2.
   void skipFurtherIndices() {
     for (int i = 0; i < 2 && text_.take('/'); ++i)
-      if (!text_.endsWord() && !text_.isNext('/')) text_.wholeNumberBefore("the number of a normal or texture coordinate");
-    if (!text_.endsWord()) text_.refuse("'" + quoted(text_.word()) + "' follows the numbers of a corner");
+      if (!text_.endsWord() && !text_.isNext('/'))
+        text_.wholeNumberBefore("the number of a normal or texture coordinate");
+    if (!text_.endsWord()) text_.refuse("'" + wordText(text_.word()) + "' follows the numbers of a corner");
   }
 
   /// Returns the index of a vertex from 0.

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "mesh/read/mesh_builder.h"
-#include "mesh/read/quoted.h"
 #include "mesh/read/text_scanner.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -33,10 +33,11 @@ OffKeyword readKeyword(TextScanner& text) {
   const std::string keyword(text.word());
   std::string_view rest = keyword;
   OffKeyword result;
-  while (take(rest, "ST") || take(rest, "C") || take(rest, "N")) result.hasMore = true;  // in any order, as files have it
+  while (take(rest, "ST") || take(rest, "C") || take(rest, "N"))
+    result.hasMore = true;  // in any order, as files have it
   if (rest == "4OFF" || rest == "nOFF" || rest == "4nOFF")
     text.refuse("'" + keyword + "' has vertices of another dimension than 3");
-  if (rest != "OFF") text.refuse("expected 'OFF' (or COFF, NOFF, STOFF, …), found '" + quoted(keyword) + "'");
+  if (rest != "OFF") text.refuse("expected 'OFF' (or COFF, NOFF, STOFF, …), found '" + wordText(keyword) + "'");
   if (!text.atLineEnd() && text.input().rest().starts_with("BINARY"))
     text.refuse("binary OFF files are not read: export it as text, or as PLY");
   return result;
@@ -65,8 +66,9 @@ void readVertices(TextScanner& text, std::uint64_t count, const OffKeyword& keyw
     if (keyword.hasMore) text.skipLine();
   }
   if (count > 0 && !keyword.hasMore && !text.atLineEnd())
-    text.refuse("more numbers than the coordinates of the vertices: with colours or normals, the file begins with COFF "
-                "or NOFF");
+    text.refuse(
+        "more numbers than the coordinates of the vertices: with colours or normals, the file begins with COFF "
+        "or NOFF");
 }
 
 void readFaces(TextScanner& text, std::uint64_t count, MeshBuilder& builder) {

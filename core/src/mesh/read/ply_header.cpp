@@ -7,7 +7,7 @@
 #include <system_error>
 #include <utility>
 
-#include "mesh/read/quoted.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -34,8 +34,8 @@ class HeaderLines {
  public:
   explicit HeaderLines(Input& input) : input_(input) {}
 
-  /// Returns the words of the next line. All lines must end as the first one does: only thus is it known whether a line
-  /// feed behind `end_header\r` belongs to the header or to binary data.
+  /// Returns the words of the next line. Where the first line ends with \r alone, so do all others, and a line feed
+  /// behind `end_header\r` belongs to the binary data.
   std::vector<std::string> next() {
     constexpr std::size_t kLongest = 16384;
     static_assert(kLongest < Input::kLongestPiece);
@@ -44,9 +44,10 @@ class HeaderLines {
     const std::size_t end = rest.find_first_of("\r\n");
     if (end == rest.npos) input_.refuse("its header does not end; check or export the file again");
     ++number_;
-    if (lineEnd_.empty()) lineEnd_ = rest.substr(end).starts_with("\r\n") ? "\r\n" : rest.substr(end, 1);
+    const bool isPair = rest.substr(end).starts_with("\r\n");
+    if (number_ == 1) endsByReturn_ = rest[end] == '\r' && !isPair;
     const std::vector<std::string> words = wordsOf(rest.substr(0, end));
-    input_.skip(end + (rest.substr(end).starts_with(lineEnd_) ? lineEnd_.size() : 1));
+    input_.skip(end + (isPair && !endsByReturn_ ? 2 : 1));
     return words;
   }
 
@@ -69,13 +70,14 @@ class HeaderLines {
   }
 
   Input& input_;
-  std::string lineEnd_;
+  bool endsByReturn_ = false;  ///< lines end with \r alone
   std::uint64_t number_ = 0;
 };
 
 PlyType typeOf(const std::string& name, const HeaderLines& lines) {
-  const auto found = std::ranges::find(kTypeNames, std::string_view(name), &std::pair<std::string_view, PlyType>::first);
-  if (found == kTypeNames.end()) lines.refuse("unknown type '" + quoted(name) + "'");
+  const auto found =
+      std::ranges::find(kTypeNames, std::string_view(name), &std::pair<std::string_view, PlyType>::first);
+  if (found == kTypeNames.end()) lines.refuse("unknown type '" + wordText(name) + "'");
   return found->second;
 }
 
@@ -94,7 +96,7 @@ PlyElement elementOf(const std::vector<std::string>& words, const HeaderLines& l
   const std::string& number = words[2];
   const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), element.count);
   if (error != std::errc() || stop != number.data() + number.size())
-    lines.refuse("'" + quoted(number) + "' is no number of elements");
+    lines.refuse("'" + wordText(number) + "' is no number of elements");
   return element;
 }
 
@@ -145,13 +147,13 @@ PlyHeader readPlyHeader(Input& input) {
     } else if (words[0] == "element") {
       PlyElement element = elementOf(words, lines);
       if (std::ranges::find(header.elements, element.name, &PlyElement::name) != header.elements.end())
-        lines.refuse("a second element '" + quoted(element.name) + "'");
+        lines.refuse("a second element '" + wordText(element.name) + "'");
       header.elements.push_back(std::move(element));
     } else if (words[0] == "property") {
       if (header.elements.empty()) lines.refuse("a property before the first element");
       header.elements.back().properties.push_back(propertyOf(words, lines));
     } else {
-      lines.refuse("unknown word '" + quoted(words[0]) + "' in the header");
+      lines.refuse("unknown word '" + wordText(words[0]) + "' in the header");
     }
   }
   if (!hasFormat) input.refuse("its header has no line 'format'; check or export the file again");

@@ -18,7 +18,7 @@ std::size_t sizeOf(PlyType type);
 
 struct PlyProperty {
   std::string name;
-  PlyType type;                         ///< type of the number, or of the list's items
+  PlyType type;                       ///< type of the number, or of the list's items
   std::optional<PlyType> count = {};  ///< for a list: type of the number of its items
 };
 

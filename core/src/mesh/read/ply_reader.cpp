@@ -76,6 +76,29 @@ class PlyText {
 
 /// The numbers of a binary PLY file.
 class PlyBinary {
+  /// Calls `f` with a number of the C++ type for a type of PLY.
+  template <typename F>
+  static auto withType(PlyType type, const F& f) {
+    switch (type) {
+      case PlyType::int8:
+        return f(std::int8_t{});
+      case PlyType::uint8:
+        return f(std::uint8_t{});
+      case PlyType::int16:
+        return f(std::int16_t{});
+      case PlyType::uint16:
+        return f(std::uint16_t{});
+      case PlyType::int32:
+        return f(std::int32_t{});
+      case PlyType::uint32:
+        return f(std::uint32_t{});
+      case PlyType::float32:
+        return f(float{});
+      default:
+        return f(double{});
+    }
+  }
+
  public:
   PlyBinary(Input& input, const PlyHeader& header, const PlyPosition& position)
       : input_(input),
@@ -116,31 +139,9 @@ class PlyBinary {
   }
 
  private:
-  /// Calls `f` with a number of the C++ type for a type of PLY.
-  template <typename F>
-  static auto withType(PlyType type, const F& f) {
-    switch (type) {
-      case PlyType::int8:
-        return f(std::int8_t{});
-      case PlyType::uint8:
-        return f(std::uint8_t{});
-      case PlyType::int16:
-        return f(std::int16_t{});
-      case PlyType::uint16:
-        return f(std::uint16_t{});
-      case PlyType::int32:
-        return f(std::int32_t{});
-      case PlyType::uint32:
-        return f(std::uint32_t{});
-      case PlyType::float32:
-        return f(float{});
-      default:
-        return f(double{});
-    }
-  }
-
   void require(std::size_t bytes) {
-    if (!input_.ensure(bytes)) refuse("the file ends at " + position_.text());
+    if (!input_.ensure(bytes)) [[unlikely]]
+      refuse("the file ends at " + position_.text());
   }
 
   template <typename T>

@@ -49,8 +49,8 @@ const MeshFormat* formatOf(const fs::path& file) {
     if (format.mayBeCompressed) compressed += ", " + std::string(format.extension) + ".gz";
   }
   throw Error(ErrorKind::file, file.string(),
-              (extension.empty() ? "no extension" : "unknown format " + extension) +
-                  "; a mesh file ends in one of " + known + compressed);
+              (extension.empty() ? "no extension" : "unknown format " + extension) + "; a mesh file ends in one of " +
+                  known + compressed);
 }
 
 }  // namespace

@@ -10,8 +10,8 @@
 
 #include "hpsdf/detail/text.h"
 #include "mesh/read/mesh_builder.h"
-#include "mesh/read/quoted.h"
 #include "mesh/read/text_scanner.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -94,10 +94,11 @@ class StlText {
   }
 
  private:
-  /// Returns the next word in lower case.
-  std::string_view next(std::string_view expected) {
+  /// Reads the next word into `word_`, in lower case.
+  const std::string& next(std::string_view expected) {
     if (!text_.toWord()) text_.refuse("expected '" + std::string(expected) + "', but the file ends");
-    word_ = lowerCase(std::string(text_.word()));
+    word_ = text_.word();
+    if (word_ != expected) word_ = lowerCase(word_);
     return word_;
   }
 
@@ -106,14 +107,14 @@ class StlText {
   }
 
   [[noreturn]] void refuseWord(std::string_view expected) {
-    text_.refuse("expected '" + std::string(expected) + "', found '" + quoted(word_) + "'");
+    text_.refuse("expected '" + std::string(expected) + "', found '" + wordText(word_) + "'");
   }
 
   /// Reads `endsolid` with the name behind it, or `facet`. Returns false for `facet`.
   bool takeEnd() {
-    const std::string_view word = next("facet' or 'endsolid");
-    if (word == "facet") return false;
-    if (word != "endsolid" && word != "end") refuseWord("facet' or 'endsolid");
+    next("facet");
+    if (word_ == "facet") return false;
+    if (word_ != "endsolid" && word_ != "end") refuseWord("facet' or 'endsolid");
     text_.skipLine();
     return true;
   }

@@ -3,15 +3,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <system_error>
 
-#include "mesh/read/quoted.h"
+#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
-
-constexpr std::size_t kLongestWord = 4096;
-static_assert(kLongestWord < Input::kLongestPiece);
 
 bool isLineEnd(char c) { return c == '\n' || c == '\r'; }
 bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
@@ -20,17 +18,13 @@ bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
 TextScanner::TextScanner(Input& input, char comment, std::uint64_t line)
     : input_(input), comment_(comment), line_(line) {
+  for (const char c : {' ', '\t', '\v', '\f', '\n', '\r', '\0', comment})
+    endsWord_[static_cast<unsigned char>(c)] = true;
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   input_.ensure(kByteOrderMark.size());
+  for (const std::string_view utf16 : {"\xff\xfe", "\xfe\xff"})
+    if (input_.offset() == 0 && input_.rest().starts_with(utf16)) refuse("the text is UTF-16: convert it to UTF-8");
   if (input_.offset() == 0 && input_.rest().starts_with(kByteOrderMark)) input_.skip(kByteOrderMark.size());
-}
-
-/// Returns true if a word cannot contain this character. `peek` gives '\0' at the file's end.
-bool TextScanner::endsWord(char c) const { return isBlank(c) || isLineEnd(c) || c == comment_ || c == '\0'; }
-
-char TextScanner::peek() {
-  if (input_.rest().size() <= kLongestWord) input_.ensure(kLongestWord + 1);
-  return input_.rest().empty() ? '\0' : input_.rest().front();
 }
 
 void TextScanner::skipLineEnd(char c) {
@@ -64,7 +58,7 @@ bool TextScanner::skipBlanks() {
   }
 }
 
-bool TextScanner::toWord() {
+bool TextScanner::skipToWord() {
   while (skipBlanks()) {
     const char c = input_.rest().front();
     if (!isLineEnd(c)) return true;
@@ -131,8 +125,8 @@ void TextScanner::refuseNumber(std::string_view expected) {
   const auto [stop, error] = std::from_chars(found.data(), found.data() + found.size(), value);
   const bool isNumber = error != std::errc::invalid_argument && stop == found.data() + found.size();
   if (isNumber && expected == "a number")
-    refuse("'" + quoted(found) + "' is not a finite number (or beyond 1.8e308, where double ends)");
-  refuse("expected " + std::string(expected) + ", found '" + quoted(found) + "'");
+    refuse("'" + wordText(found) + "' is not a finite number (or beyond 1.8e308, where double ends)");
+  refuse("expected " + std::string(expected) + ", found '" + wordText(found) + "'");
 }
 
 Vector3 TextScanner::vector(std::string_view what) {
@@ -145,21 +139,24 @@ Vector3 TextScanner::vector(std::string_view what) {
 }
 
 std::int64_t TextScanner::wholeNumberBefore(std::string_view what) {
-  peek();
+  constexpr std::size_t kMostDigits = std::numeric_limits<std::int64_t>::digits10;
+  const char sign = peek();
   const std::string_view rest = input_.rest();
-  const char* const begin = rest.data() + (rest.starts_with('+') ? 1 : 0);
+  const std::size_t begin = sign == '-' || sign == '+' ? 1 : 0;
+  std::size_t end = begin;
   std::int64_t value = 0;
-  const auto [stop, error] = std::from_chars(begin, rest.data() + rest.size(), value);
-  if (error != std::errc()) refuseNumber("a whole number (" + std::string(what) + ")");
-  input_.skip(std::size_t(stop - rest.data()));
-  return value;
+  for (; end < rest.size() && rest[end] >= '0' && rest[end] <= '9' && end - begin <= kMostDigits; ++end)
+    value = 10 * value + (rest[end] - '0');
+  if (end == begin || end - begin > kMostDigits) refuseNumber("a whole number (" + std::string(what) + ")");
+  input_.skip(end);
+  return sign == '-' ? -value : value;
 }
 
 std::int64_t TextScanner::wholeNumber(std::string_view what) {
   if (!toWord()) refuse("the file ends where " + std::string(what) + " should stand");
   const std::int64_t value = wholeNumberBefore(what);
   if (!endsWord())
-    refuse("'" + quoted(word()) + "' follows the number " + std::to_string(value) + " (" + std::string(what) + ")");
+    refuse("'" + wordText(word()) + "' follows the number " + std::to_string(value) + " (" + std::string(what) + ")");
   return value;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 // The words and numbers of a mesh file that is text.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -19,7 +21,10 @@ class TextScanner {
   TextScanner(Input& input, char comment, std::uint64_t line = 1);
 
   /// Skips blanks, comments and line ends. Returns false if nothing is left then.
-  bool toWord();
+  bool toWord() {
+    if (peek() == ' ') input_.skip(1);  // Mostly there is one blank.
+    return beginsWord(peek()) || skipToWord();
+  }
 
   /// Skips blanks and comments of this line. Returns true if the line or the file ends then. With the sign of a
   /// continuation before the line end, the next line belongs to this one (`joinLinesAt`).
@@ -69,9 +74,20 @@ class TextScanner {
   [[noreturn]] void refuse(const std::string& problem) const;
 
  private:
-  /// Returns the next character, or '\0' at the file's end; a word of usual length follows it in the window.
-  char peek();
-  bool endsWord(char c) const;
+  static constexpr std::size_t kLongestWord = 4096;
+  static_assert(kLongestWord < Input::kLongestPiece);
+
+  /// Returns the next character, or '\0' at the file's end. The whole of the word that begins there is in the window.
+  char peek() {
+    if (input_.rest().size() <= kLongestWord) input_.ensure(kLongestWord + 1);
+    return input_.rest().empty() ? '\0' : input_.rest().front();
+  }
+
+  /// Returns true if a word cannot contain this character. `peek` gives '\0' at the file's end.
+  bool endsWord(char c) const { return endsWord_[static_cast<unsigned char>(c)]; }
+  /// Returns true if a word begins with this character.
+  bool beginsWord(char c) const { return !endsWord(c) && c != continuation_; }
+  bool skipToWord();
   bool skipBlanks();
   void skipLineEnd(char c);
   bool skipContinuation();
@@ -81,6 +97,7 @@ class TextScanner {
   char comment_;
   char continuation_ = '\0';
   std::uint64_t line_;
+  std::array<bool, 256> endsWord_ = {};  ///< for each character, whether a word ends before it
 };
 
 }  // namespace hpsdf::mesh

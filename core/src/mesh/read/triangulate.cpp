@@ -120,9 +120,9 @@ class EarClipper {
   }
 
   std::vector<Triangle> clip() {
-    // Cut off thin ears only if there is no other ear. Rounding, mostly to float, moves corners off a straight side. Ears as
-    // thin as these rounding errors, and ears whose cut passes another corner as closely, would yield slivers with
-    // random normals. The tolerance is relative to the length of the sides.
+    // Cut off thin ears only if there is no other ear. Rounding, mostly to float, moves corners off a straight side.
+    // Ears as thin as these rounding errors, and ears whose cut passes another corner as closely, would yield slivers
+    // with random normals. The tolerance is relative to the length of the sides.
     constexpr double kRounding = 1e-4;
     while (left_ > 3) {
       std::optional<std::uint32_t> ear = findEar(kRounding, maybeClear_);
