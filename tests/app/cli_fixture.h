@@ -41,19 +41,6 @@ inline constexpr std::string_view kTetrahedron =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
     "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
-/// An input on which assimp crashes: its JSON reader recurses at each bracket until its stack overflows.
-inline const std::string kBringsAssimpDown(200'000, '[');
-
-/// Returns an OBJ file with one polygon of collinear corners, whose triangulation takes tens of seconds.
-inline std::string slowPolygon() {
-  constexpr int kCorners = 100'000;
-  std::ostringstream file;
-  for (int i = 0; i < kCorners; ++i) file << "v " << (i % 2 == 0 ? kCorners - i : i) << " 0 0\n";
-  file << "f";
-  for (int i = 1; i <= kCorners; ++i) file << " " << i;
-  return file.str() + "\n";
-}
-
 /// Each test has a folder of its own; the tests of a suite share a small field, which the program builds once.
 class Cli : public testing::Test {
  protected:

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "cli_fixture.h"
+#include "support/assimp_files.h"
 
 namespace hpsdf::app {
 namespace cli_mesh_test {
@@ -116,23 +117,23 @@ TEST_F(MeshCommand, badMeshesAreRefused) {
 }
 
 TEST_F(MeshCommand, filesThatCrashTheImporterAreRefused) {
-  writeFile(at("down.gltf"), kBringsAssimpDown);
-  writeFile(at("slow.obj"), slowPolygon());
-  writeFile(at("t.obj"), kTetrahedron);
+  writeFile(at("down.3ds"), support::crashing3ds());
+  writeFile(at("slow.3ds"), support::slow3ds());
+  writeFile(at("t.3ds"), support::tetrahedron3ds());
   const auto before = namesIn(folder_.path());
-  for (const Call& call : {Call{{"mesh", at("down.gltf")}}, Call{{"build", at("down.gltf"), "-o", at("f.hpsdf")}},
-                           Call{{"verify", field(), at("down.gltf")}}})
-    expectRefused(call, "down.gltf: the process that read it came down (", before);
+  for (const Call& call : {Call{{"mesh", at("down.3ds")}}, Call{{"build", at("down.3ds"), "-o", at("f.hpsdf")}},
+                           Call{{"verify", field(), at("down.3ds")}}})
+    expectRefused(call, "down.3ds: the process that read it came down (", before);
   const auto mesh = [&](const char* name, const std::string& variable, const std::string& value) {
     return Call{.words = {"mesh", at(name)}, .environment = {{variable, value}}};
   };
-  const Outcome slow = run(mesh("slow.obj", "HPSDF_IMPORT_SECONDS", "0.5"));
+  const Outcome slow = run(mesh("slow.3ds", "HPSDF_IMPORT_SECONDS", "0.5"));
   EXPECT_EQ(slow.status, 2);
-  EXPECT_THAT(slow.err, HasSubstr("slow.obj: reading it takes more than 0.5 s"));
-  expectRefused(mesh("t.obj", "HPSDF_IMPORT_SECONDS", "soon"), "HPSDF_IMPORT_SECONDS: expected a number above 0",
+  EXPECT_THAT(slow.err, HasSubstr("slow.3ds: reading it takes more than 0.5 s"));
+  expectRefused(mesh("t.3ds", "HPSDF_IMPORT_SECONDS", "soon"), "HPSDF_IMPORT_SECONDS: expected a number above 0",
                 before);
-  expectRefused(mesh("t.obj", "HPSDF_IMPORT_BYTES", "-1"), "HPSDF_IMPORT_BYTES: expected a number above 0", before);
-  EXPECT_EQ(run(mesh("t.obj", "HPSDF_IMPORT_BYTES", "1e9")).status, 0);
+  expectRefused(mesh("t.3ds", "HPSDF_IMPORT_BYTES", "-1"), "HPSDF_IMPORT_BYTES: expected a number above 0", before);
+  EXPECT_EQ(run(mesh("t.3ds", "HPSDF_IMPORT_BYTES", "1e9")).status, 0);
 }
 
 TEST_F(MeshCommand, importerIsNotACommand) {
@@ -144,18 +145,18 @@ TEST_F(MeshCommand, importerIsNotACommand) {
 
 /// The process that reads a mesh file ends with the program, however the program ends.
 TEST_F(MeshCommand, importerEndsWithTheProgram) {
-  writeFile(at("slow.obj"), slowPolygon());
+  writeFile(at("slow.3ds"), support::slow3ds());
   const auto readers = [&] {
     std::size_t count = 0;
     for (const auto& entry : fs::directory_iterator("/proc")) {
       std::ifstream words(entry.path() / "cmdline");
       const std::string text{std::istreambuf_iterator<char>(words), {}};
-      count += text.find("__read-mesh") != std::string::npos && text.find(at("slow.obj")) != std::string::npos;
+      count += text.find("__read-mesh") != std::string::npos && text.find(at("slow.3ds")) != std::string::npos;
     }
     return count;
   };
   for (const auto& [signal, status] : {std::pair{SIGINT, 130}, {SIGKILL, -SIGKILL}}) {
-    Process process({{"mesh", at("slow.obj")}});
+    Process process({{"mesh", at("slow.3ds")}});
     process.waitForErrorLine();  // waits for the first report of progress
     EXPECT_EQ(readers(), 1u);
     process.send(signal);
@@ -165,6 +166,29 @@ TEST_F(MeshCommand, importerEndsWithTheProgram) {
     for (int i = 0; i < 500 && readers() > 0; ++i) usleep(10000);
     EXPECT_EQ(readers(), 0u);
   }
+}
+
+/// Returns an OBJ file with one polygon of corners back and forth on a line, which takes tens of seconds to
+/// triangulate.
+std::string slowPolygon() {
+  constexpr int kCorners = 100'000;
+  std::string file;
+  for (int i = 0; i < kCorners; ++i) file += "v " + std::to_string(i % 2 == 0 ? kCorners - i : i) + " 0 0\n";
+  file += "f";
+  for (int i = 1; i <= kCorners; ++i) file += " " + std::to_string(i);
+  return file + "\n";
+}
+
+/// Files of the other formats are read by the program itself, which tells how far it is and can be stopped.
+TEST_F(MeshCommand, readingShowsProgressAndIsCancelled) {
+  writeFile(at("slow.obj"), slowPolygon());
+  Process process({{"mesh", at("slow.obj")}});
+  process.waitForErrorLine();
+  process.send(SIGINT);
+  const Outcome outcome = process.finish();
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(outcome.err, HasSubstr("Triangulating a polygon of the mesh"));
+  EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing is half-written\n"));
 }
 
 }  // namespace cli_mesh_test

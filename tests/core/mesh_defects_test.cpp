@@ -334,12 +334,12 @@ TEST(MeshExport, isReadBackUnchanged) {
     EXPECT_EQ(again.report.faces, 12u);
     EXPECT_TRUE(again.report.closed());
     EXPECT_EQ(again.report.box.min().y(), -4) << name;
-    EXPECT_NEAR(again.report.box.max().z(), 1 + 1e-3, 1e-7) << name;
-    EXPECT_NEAR(again.report.volume, 8, 1e-6);  // assimp reads floats
+    EXPECT_EQ(again.mesh.vertices, mesh.vertices) << name;
+    EXPECT_EQ(again.mesh.triangles, mesh.triangles) << name;
   }
 }
 
-/// assimp takes a line feed at the beginning of the binary data for a part of the header.
+/// A line feed or a carriage return at the beginning of the binary data must not be taken for a part of the header.
 TEST(MeshExport, isReadBackWhateverByteThePlyDataBeginWith) {
   const support::TemporaryDirectory folder;
   const std::filesystem::path file = folder.path() / "box.ply";
@@ -348,13 +348,8 @@ TEST(MeshExport, isReadBackWhateverByteThePlyDataBeginWith) {
     double& first = mesh.vertices[0].x();
     first = std::bit_cast<double>((std::bit_cast<std::uint64_t>(first) & ~std::uint64_t{255}) | byte);
     saveMesh(mesh, file);
-    std::ifstream stream(file);
-    std::string line;
-    std::getline(stream, line);
-    std::getline(stream, line);
-    EXPECT_EQ(line, byte == '\n' ? "format ascii 1.0" : "format binary_little_endian 1.0") << byte;
     const ImportedMesh again = importMesh(file);
-    EXPECT_EQ(again.mesh.vertices, boxOfTwo().vertices) << byte << " is lost in the floats that assimp reads";
+    EXPECT_EQ(again.mesh.vertices, mesh.vertices) << byte;
     EXPECT_EQ(again.mesh.triangles, mesh.triangles) << byte;
   }
 }

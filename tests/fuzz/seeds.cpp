@@ -1,5 +1,5 @@
-// Writes the binary files of the fuzzing corpus: fields of every kind, states of constructions, replies about meshes,
-// and raw values. Usage: fuzz_seeds tests/fuzz/corpus
+// Writes the binary files of the fuzzing corpus: fields of every kind, states of constructions, and raw
+// values. Usage: fuzz_seeds tests/fuzz/corpus
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -9,7 +9,6 @@
 #include <string>
 
 #include "checkpoint.h"
-#include "construction/mesh_reply.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
@@ -105,26 +104,6 @@ void writeStates(const fs::path& folder) {
   }
 }
 
-void writeReplies(const fs::path& folder) {
-  std::string bytes;
-  const app::ReplySink sink = [&](std::span<const std::byte> piece) {
-    bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
-  };
-  const auto keep = [&](const std::string& name) { write(folder / name, std::exchange(bytes, {})); };
-  ImportedMesh mesh;
-  mesh.mesh.vertices = {{5, 6, 7}, {6, 6, 7}, {5, 8, 7}, {5, 6, -0.0}};
-  mesh.mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-  mesh.report = {.vertices = 4, .faces = 4, .components = 1, .reversed = true, .volume = 2.5, .area = 12.5, .box = {}};
-  app::writeMesh(mesh, sink);
-  keep("mesh");
-  app::writeRefusal("t.off: no mesh", sink);
-  keep("refusal");
-  app::writeRefusal("t.off: no\nmesh \x1b[2J", sink);
-  keep("refusal-with-escapes");
-  app::writeOutOfMemory(sink);
-  keep("out-of-memory");
-}
-
 void writeTables(const fs::path& folder) {
   const std::array<float, 6> values = {0.5f, -1.25f, 3e38f, NAN, INFINITY, 0};
   std::string bytes(sizeof values, '\0');
@@ -142,6 +121,5 @@ int main(int argc, char** argv) {
   const fs::path corpus = argv[1];
   writeFields(corpus / "field_file");
   writeStates(corpus / "checkpoint");
-  writeReplies(corpus / "mesh_reply");
   writeTables(corpus / "data_table");
 }

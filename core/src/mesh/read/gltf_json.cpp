@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "hpsdf/error.h"
-#include "mesh/read/word_text.h"
 
 namespace hpsdf::mesh {
 
@@ -62,7 +61,7 @@ std::vector<double> GltfValue::numbers(std::size_t count) const {
 }
 
 void GltfValue::refuse(const std::string& problem) const {
-  const std::string subject = name_.empty() ? "its JSON" : wordText(name_);
+  const std::string subject = name_.empty() ? "its JSON" : name_;
   throw Error(ErrorKind::file, *file_, subject + " " + problem + "; check or export the file again");
 }
 

@@ -1,5 +1,6 @@
 #include "mesh/read/text_scanner.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -89,7 +90,7 @@ void TextScanner::skipLine() {
 std::string_view TextScanner::word() {
   peek();
   const std::string_view rest = input_.rest();
-  std::size_t length = 0;
+  std::size_t length = std::min<std::size_t>(rest.size(), 1);
   while (length < rest.size() && !endsWord(rest[length])) ++length;
   if (length > kLongestWord) refuse("a word of more than " + std::to_string(kLongestWord) + " characters");
   input_.skip(length);

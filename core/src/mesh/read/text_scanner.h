@@ -31,13 +31,17 @@ class TextScanner {
   bool atLineEnd();
 
   /// From now on, a line whose last character is `sign` is continued by the next line.
-  void joinLinesAt(char sign) { continuation_ = sign; }
+  void joinLinesAt(char sign) {
+    continuation_ = sign;
+    endsWord_[static_cast<unsigned char>(sign)] = true;
+  }
 
   /// Skips the rest of the line, and its end.
   void skipLine();
 
-  /// Returns the word that begins here, up to the next blank, line end or comment, and skips it. It is valid until the
-  /// next call. Throws `Error` for a word that is longer than any in a mesh file.
+  /// Returns the word that begins here, up to the next blank, line end or comment, and skips it. It has at least one
+  /// character unless the file ends, and is valid until the next call. Throws `Error` for a word that is longer than
+  /// any in a mesh file.
   std::string_view word();
 
   /// Returns the number that begins here, and skips it. Throws `Error` if there is none, or if it is not finite or
@@ -86,7 +90,7 @@ class TextScanner {
   /// Returns true if a word cannot contain this character. `peek` gives '\0' at the file's end.
   bool endsWord(char c) const { return endsWord_[static_cast<unsigned char>(c)]; }
   /// Returns true if a word begins with this character.
-  bool beginsWord(char c) const { return !endsWord(c) && c != continuation_; }
+  bool beginsWord(char c) const { return !endsWord(c); }
   bool skipToWord();
   bool skipBlanks();
   void skipLineEnd(char c);
