@@ -1,9 +1,12 @@
 #include "mesh/connectivity.h"
 
-#include <tbb/parallel_sort.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
-#include <utility>
+#include <numeric>
+#include <tuple>
 
 namespace hpsdf::mesh {
 namespace {
@@ -62,17 +65,29 @@ void addPatch(std::uint32_t lowest, std::span<const Neighbours> neighbours, Patc
 }  // namespace
 
 std::vector<DirectedEdge> directedEdgesOf(std::span<const Triangle> triangles) {
-  std::vector<DirectedEdge> edges;
-  edges.reserve(3 * triangles.size());
-  for (std::size_t f = 0; f < triangles.size(); ++f)
-    for (int i = 0; i < 3; ++i) {
-      const std::uint32_t from = triangles[f][i], to = triangles[f][(i + 1) % 3];
-      if (from == to) continue;
-      const auto [low, high] = std::minmax(from, to);
-      edges.push_back({std::uint64_t{low} << 32 | high, static_cast<std::uint32_t>(f), from < to});
-    }
-  tbb::parallel_sort(edges.begin(), edges.end(), [](const DirectedEdge& a, const DirectedEdge& b) {
-    return std::pair(a.edge, a.face) < std::pair(b.edge, b.face);
+  std::uint32_t highest = 0;
+  for (const Triangle& triangle : triangles) highest = std::max(highest, std::ranges::max(triangle));
+  const auto forEach = [&](const auto& visit) {
+    for (std::size_t f = 0; f < triangles.size(); ++f)
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::uint32_t from = triangles[f][i], to = triangles[f][(i + 1) % 3];
+        const auto [low, high] = std::minmax(from, to);
+        if (from != to) visit(DirectedEdge{std::uint64_t{low} << 32 | high, std::uint32_t(f), from < to});
+      }
+  };
+  // A counting sort by the lower vertex, in linear time, leaves a few edges at each vertex to be sorted.
+  std::vector<std::size_t> ends(std::size_t{highest} + 2);
+  forEach([&](const DirectedEdge& edge) { ++ends[edge.low() + 1]; });
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  std::vector<DirectedEdge> edges(ends.back());
+  forEach([&](const DirectedEdge& edge) { edges[ends[edge.low()]++] = edge; });
+  constexpr std::size_t kVerticesATask = 4096;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, ends.size() - 1, kVerticesATask), [&](const auto& range) {
+    for (std::size_t v = range.begin(); v < range.end(); ++v)
+      std::sort(edges.begin() + std::ptrdiff_t(v == 0 ? 0 : ends[v - 1]), edges.begin() + std::ptrdiff_t(ends[v]),
+                [](const DirectedEdge& one, const DirectedEdge& other) {
+                  return std::tuple(one.edge, one.face, one.rising) < std::tuple(other.edge, other.face, other.rising);
+                });
   });
   return edges;
 }

@@ -1,5 +1,7 @@
 #include "mesh/duplicates.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
@@ -46,7 +48,7 @@ Groups groupsOf(std::span<const Triangle> triangles) {
     const auto [a, b, c] = sorted(triangles[f]);
     order[f] = {a, b, c, f};
   }
-  std::ranges::sort(order);
+  tbb::parallel_sort(order.begin(), order.end());
   Groups groups{.all = {}, .groupOf = std::vector<std::uint32_t>(triangles.size()), .edges = {}};
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::uint32_t f = order[i][3];

@@ -1,3 +1,4 @@
+#include <tbb/parallel_for.h>
 #include <xxhash.h>
 
 #include <algorithm>
@@ -20,8 +21,33 @@ namespace {
 
 using PositionBits = std::array<std::uint64_t, 3>;
 
-struct HashBits {
-  std::size_t operator()(const PositionBits& key) const { return XXH3_64bits(key.data(), sizeof key); }
+/// A hash table of the first vertex at each position.
+class PositionTable {
+ public:
+  /// Makes a table for the vertices of this list, which must outlive the table.
+  explicit PositionTable(const std::vector<Vector3>& vertices)
+      : vertices_(vertices), slots_(std::bit_ceil(2 * vertices.size() + 1), kEmpty) {}
+
+  /// Returns the first vertex that was asked for at the position of the vertex `v`, or `v` itself if it is the first.
+  std::uint32_t firstAt(std::uint32_t v) {
+    const PositionBits key = bitsOf(vertices_[v]);
+    for (std::size_t slot = XXH3_64bits(key.data(), sizeof key);; ++slot) {
+      std::uint32_t& found = slots_[slot & (slots_.size() - 1)];
+      if (found == kEmpty) found = v;
+      if (bitsOf(vertices_[found]) == key) return found;
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kEmpty = std::numeric_limits<std::uint32_t>::max();
+
+  static PositionBits bitsOf(const Vector3& v) {
+    return {std::bit_cast<std::uint64_t>(v.x()), std::bit_cast<std::uint64_t>(v.y()),
+            std::bit_cast<std::uint64_t>(v.z())};
+  }
+
+  const std::vector<Vector3>& vertices_;
+  std::vector<std::uint32_t> slots_;
 };
 
 void requireUsable(const TriangleMesh& mesh) {
@@ -39,19 +65,17 @@ void requireUsable(const TriangleMesh& mesh) {
 /// Welds vertices at the same position: all triangles use the first of these vertices. Returns the number of
 /// vertices that are replaced by another one.
 std::size_t weld(TriangleMesh& mesh) {
-  std::unordered_map<PositionBits, std::uint32_t, HashBits> firstAt;
-  firstAt.reserve(mesh.vertices.size());
+  for (Vector3& v : mesh.vertices) v.array() += 0.0;  // This turns -0 into 0, so that equal positions have equal bits.
+  PositionTable table(mesh.vertices);
   std::vector<std::uint32_t> representative(mesh.vertices.size());
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    Vector3& v = mesh.vertices[i];
-    v.array() += 0.0;  // Adding 0 turns -0 into 0, so that equal positions have equal bits.
-    const PositionBits key = {std::bit_cast<std::uint64_t>(v.x()), std::bit_cast<std::uint64_t>(v.y()),
-                              std::bit_cast<std::uint64_t>(v.z())};
-    representative[i] = firstAt.try_emplace(key, static_cast<std::uint32_t>(i)).first->second;
+  std::size_t welded = 0;
+  for (std::uint32_t v = 0; v < representative.size(); ++v) {
+    representative[v] = table.firstAt(v);
+    welded += representative[v] != v;
   }
   for (Triangle& triangle : mesh.triangles)
     for (std::uint32_t& v : triangle) v = representative[v];
-  return mesh.vertices.size() - firstAt.size();
+  return welded;
 }
 
 /// Returns true if the corners of a triangle are collinear up to rounding errors. The tolerance is relative to the
@@ -135,24 +159,32 @@ bool flip(TriangleMesh& mesh, EdgeMap& edges, std::uint32_t face) {
   return true;
 }
 
-/// Removes triangles with collinear corners by flipping their longest edges. Returns the number of flips.
+/// Returns the triangles without an area, in ascending order.
+std::vector<std::uint32_t> facesWithoutArea(const TriangleMesh& mesh) {
+  std::vector<char> isFlat(mesh.triangles.size());
+  tbb::parallel_for(std::size_t{0}, isFlat.size(),
+                    [&](std::size_t f) { isFlat[f] = hasNoArea(mesh, mesh.triangles[f]); });
+  std::vector<std::uint32_t> faces;
+  for (std::size_t f = 0; f < isFlat.size(); ++f)
+    if (isFlat[f]) faces.push_back(static_cast<std::uint32_t>(f));
+  return faces;
+}
+
+/// Removes triangles with collinear corners by flipping their longest edges. Returns the number of flips, and leaves in
+/// `flat` the triangles without an area that cannot be flipped.
 ///
 /// Collinear triangles come from polygons and CAD facets with corners along a straight side. Dropping them would open
 /// the mesh. A flip instead splits the neighbour across the longest edge into two triangles, at the collinear
 /// triangle's middle corner. The flip changes neither the surface nor the number of triangles. If a flip is impossible,
 /// the collinear triangle remains unchanged.
-std::size_t flipCollinearFaces(TriangleMesh& mesh) {
-  std::vector<std::uint32_t> pending;
-  for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
-    if (hasNoArea(mesh, mesh.triangles[f])) pending.push_back(static_cast<std::uint32_t>(f));
-  if (pending.empty()) return 0;
-
+std::size_t flipCollinearFaces(TriangleMesh& mesh, std::vector<std::uint32_t>& flat) {
+  if (flat.empty()) return 0;
   EdgeMap edges(mesh.triangles);
   std::size_t flips = 0;
   // Flip in rounds, because a flip may become possible only after a collinear neighbour is flipped. Each round
   // except the last flips at least one triangle.
   for (bool changed = true; changed;) {
-    const std::size_t flipped = std::erase_if(pending, [&](std::uint32_t face) { return flip(mesh, edges, face); });
+    const std::size_t flipped = std::erase_if(flat, [&](std::uint32_t face) { return flip(mesh, edges, face); });
     flips += flipped;
     changed = flipped > 0;
   }
@@ -165,11 +197,13 @@ struct Dropped {
   Vector3 position = Vector3::Zero();
 };
 
+/// Drops the triangles for which `isBad` returns true. It is called with each triangle and its index.
 template <typename IsBad>
 Dropped drop(TriangleMesh& mesh, const IsBad& isBad) {
   Dropped dropped;
+  std::uint32_t index = 0;
   std::erase_if(mesh.triangles, [&](const Triangle& t) {
-    if (!isBad(t)) return false;
+    if (!isBad(t, index++)) return false;
     if (dropped.faces++ == 0) dropped.position = (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3;
     return true;
   });
@@ -178,8 +212,7 @@ Dropped drop(TriangleMesh& mesh, const IsBad& isBad) {
 
 Dropped dropDuplicates(TriangleMesh& mesh) {
   const std::vector<char> redundant = redundantFaces(mesh.triangles);
-  auto next = redundant.begin();
-  return drop(mesh, [&](const Triangle&) { return *next++ != 0; });
+  return drop(mesh, [&](const Triangle&, std::uint32_t f) { return redundant[f] != 0; });
 }
 
 std::size_t dropUnusedVertices(TriangleMesh& mesh) {
@@ -216,9 +249,13 @@ ImportedMesh cleaned(TriangleMesh mesh) {
   requireUsable(mesh);
   const std::size_t facesBefore = mesh.triangles.size();
   const std::size_t welded = weld(mesh);
-  const Dropped collapsed = drop(mesh, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
-  const std::size_t flipped = flipCollinearFaces(mesh);
-  const Dropped withoutArea = drop(mesh, [&](const Triangle& t) { return hasNoArea(mesh, t); });
+  const Dropped collapsed =
+      drop(mesh, [](const Triangle& t, std::uint32_t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+  std::vector<std::uint32_t> flat = facesWithoutArea(mesh);
+  const std::size_t flipped = flipCollinearFaces(mesh, flat);
+  const Dropped withoutArea = drop(mesh, [&](const Triangle& t, std::uint32_t f) {
+    return std::ranges::binary_search(flat, f) && hasNoArea(mesh, t);
+  });
   const Dropped duplicates = dropDuplicates(mesh);
   requireFaces(mesh, facesBefore);
   const std::size_t unreferenced = dropUnusedVertices(mesh) - welded;
