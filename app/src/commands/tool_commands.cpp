@@ -129,6 +129,8 @@ Json diagnosis(const Session& session, const Arguments& arguments) {
   Json renderer, problem;
   try {
     renderer = render::glDescription(glChoice(arguments));
+  } catch (const render::GlError& error) {
+    problem = error.advising("with --cpu");
   } catch (const Error& error) {
     problem = error.what();
   }

@@ -219,6 +219,7 @@ the number of steps, once for the frames. In a script the finished field becomes
                   buildParameters()}),
       .action = [shared](Session& session, const Arguments& arguments) { runFrames(session, *shared, arguments); },
       .check = [shared](const Arguments& arguments) { checkFrames(*shared, arguments); },
+      .drawsOnCpuBy = "--of 'slice cpu'",
   };
 }
 
