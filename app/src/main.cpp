@@ -2,11 +2,13 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdlib>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include "console/interrupt.h"
+#include "console/large_stack.h"
 #include "construction/mesh_process.h"
 #include "program.h"
 
@@ -22,6 +24,12 @@ void occupyClosedStreams() {
     }
 }
 
+int run(const std::vector<std::string>& words) {
+  if (hpsdf::app::asksForReading(words)) return hpsdf::app::readForOtherProcess(words);
+  const bool terminal = isatty(STDERR_FILENO) == 1;
+  return hpsdf::app::runProgram(words, {std::cin, std::cout, std::cerr, terminal, nullptr, hpsdf::app::ownProgram()});
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -34,8 +42,8 @@ int main(int argc, char** argv) {
   std::signal(SIGCHLD, SIG_DFL);  // waitpid would fail if the parent process ignored SIGCHLD
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
+  // Mesa would otherwise write warnings of its own. The program's message about OpenGL tells what was tried.
+  setenv("EGL_LOG_LEVEL", "fatal", 0);
   const std::vector<std::string> words(argv + (argc > 0), argv + argc);
-  if (hpsdf::app::asksForReading(words)) return hpsdf::app::readForOtherProcess(words);
-  const bool terminal = isatty(STDERR_FILENO) == 1;
-  return hpsdf::app::runProgram(words, {std::cin, std::cout, std::cerr, terminal, nullptr, hpsdf::app::ownProgram()});
+  return hpsdf::app::withLargeStack([&] { return run(words); });
 }

@@ -12,6 +12,7 @@
 #include "commands/commands.h"
 #include "console/console.h"
 #include "console/error_text.h"
+#include "console/interrupt.h"
 #include "console/version.h"
 #include "construction/file_kind.h"
 #include "construction/surface.h"
@@ -65,12 +66,21 @@ void execute(std::span<const std::string> given, const Registry& registry, const
   std::vector<Word> arguments;
   for (const std::string& word : std::span(words).subspan(1)) arguments.push_back({.text = word});
   Session session(registry, console);
-  perform(command, session, parseArguments(command, arguments, Origin::commandLine));
+  const Arguments parsed = parseArguments(command, arguments, Origin::commandLine);
+  perform(command, session, parsed);
+  requireWritten(console.out.flush(), outputFiles(command, parsed));  // errors of buffered output appear only here
 }
 
 int fail(const Console& console, const std::string& message, int status) {
   console.err << "hpsdf: error: " << printable(message) << std::endl;
   return status;
+}
+
+/// Returns the exit status of cancelled work: that of the signal that cancelled it. Work that something else cancelled
+/// ends as after Ctrl-C.
+int cancelledStatus() {
+  const int signal = InterruptGuard::signal();
+  return signal == 0 ? kExitCancelled : kExitSignal + signal;
 }
 
 }  // namespace
@@ -79,14 +89,16 @@ int runProgram(std::span<const std::string> words, const Console& console) {
   try {
     const Registry registry = makeRegistry();
     execute(words, registry, console);
-    requireWritten(console.out.flush());  // errors of buffered output appear only here
+    requireWritten(console.out.flush());  // for help and version
     return kExitDone;
   } catch (const CancelledPartway& cancelled) {
     console.err << "hpsdf: cancelled; " << cancelled.kept() << std::endl;
-    return kExitCancelled;
+    return cancelledStatus();
   } catch (const Cancelled&) {
     console.err << "hpsdf: cancelled; nothing is half-written" << std::endl;
-    return kExitCancelled;
+    return cancelledStatus();
+  } catch (const ReaderGone&) {
+    return kExitReaderGone;
   } catch (const Failed& failed) {
     return fail(console, failed.what(), failed.status());
   } catch (const std::exception& error) {

@@ -408,13 +408,12 @@ TEST_F(Batches, unwritableFieldsAreNotBuilt) {
                                          "permissions");
 }
 
-TEST_F(Batches, closedStandardOutputEndsTheWork) {
+TEST_F(Batches, aReaderThatHasGoneEndsTheWork) {
   Call call = batch("builtin:box\nbuiltin:gear\n", kCoarse);
   call.stdoutClosed = true;
   const Outcome outcome = run(call);
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_THAT(outcome.err,
-              EndsWith("hpsdf: error: cannot write to standard output: its reader has gone, or the disk is full\n"));
+  EXPECT_EQ(outcome.status, 141);
+  EXPECT_THAT(outcome.err, Not(HasSubstr("error")));
   EXPECT_THAT(fieldNames(), SizeIs(1));
 }
 

@@ -259,6 +259,18 @@ TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
   EXPECT_EQ(built("builtin:torus,segments=700,sides=700", {}).status, 0) << "untold, the limit is for what grows";
 }
 
+TEST_F(BuildCommand, studiesNameTheOptionThatAllowsMoreMemory) {
+  for (const std::vector<std::string>& kind :
+       {std::vector<std::string>{"tradeoff", "--target-errors", "1e-3"}, {"continuity"}, {"convergence"}}) {
+    std::vector<std::string> words = {"study", kind[0], "builtin:torus", "-o", at("study"), "--memory-limit", "1e7"};
+    words.insert(words.end(), kind.begin() + 1, kind.end());
+    const Outcome outcome = run({words});
+    EXPECT_EQ(outcome.status, 2) << kind[0];
+    EXPECT_THAT(outcome.err, HasSubstr("or allow more memory: --memory-limit ")) << kind[0];
+    EXPECT_THAT(outcome.err, Not(HasSubstr("memoryLimit"))) << kind[0];
+  }
+}
+
 TEST_F(BuildCommand, keepsTheDigitsOfCoordinatesFarFromTheOrigin) {
   const auto tetrahedron = [&](double x) {
     return fmt::format("v {0} 0 0\nv {1} 0 0\nv {0} 2 0\nv {0} 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", x, x + 2);

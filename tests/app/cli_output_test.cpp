@@ -34,11 +34,22 @@ TEST_F(Outputs, unwritableOutputsAreRefusedBeforeTheWork) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
-TEST_F(Outputs, closedStandardOutputIsAnError) {
-  const Outcome outcome = run({.words = {"info", field()}, .stdoutClosed = true});
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("cannot write to standard output"));
-  EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+/// The reader may have read what it wanted, as `head -1` does.
+TEST_F(Outputs, aReaderThatHasGoneIsNoError) {
+  for (const auto& words : {std::vector<std::string>{"info", field()},
+                            {"info", field(), "--json"},
+                            {"query", field()},
+                            {"run", "-e", "load \"" + field() + "\"; info"},
+                            {"--help"}}) {
+    const Outcome outcome = run({.words = words, .input = "0 0 0\n", .stdoutClosed = true});
+    EXPECT_EQ(outcome.status, 141) << words[0];
+    EXPECT_THAT(outcome.err, IsEmpty());
+  }
+  const Outcome built =
+      run({.words = {"build", "analytic:sphere", "-o", at("f.hpsdf"), "--target-error", "1e-2"}, .stdoutClosed = true});
+  EXPECT_EQ(built.status, 141);
+  EXPECT_THAT(built.err, IsEmpty());
+  EXPECT_THAT(namesIn(folder_.path()), ElementsAre("f.hpsdf"));
 }
 
 /// Writing fails as on a full disk; older files must stay, and no unfinished files may remain.
@@ -83,6 +94,56 @@ TEST_F(Outputs, standardOutputOnAFullDiskIsAnError) {
     EXPECT_THAT(outcome.err, HasSubstr("cannot write to standard output"));
     EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
   }
+}
+
+TEST_F(Outputs, filesThatWereWrittenBeforeStandardOutputFailedAreNamed) {
+  const auto expectNamed = [&](const std::vector<std::string>& words, const std::string& files) {
+    const Outcome outcome = run({.words = words, .output = "/dev/full"});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, StartsWith("hpsdf: error: cannot write to standard output; "));
+    EXPECT_THAT(outcome.err, EndsWith("; " + files + " written all the same\n"));
+    EXPECT_EQ(lineCount(outcome.err), 1u) << outcome.err;
+  };
+  const std::string field = at("f.hpsdf"), picture = at("s.png");
+  for (const char* more : {"--json", "--threads=1"})
+    expectNamed({"build", "analytic:sphere", "-o", field, "--target-error", "1e-2", more}, field + " is");
+  EXPECT_GT(fs::file_size(field), 0u);
+  expectNamed({"slice", field, "-o", picture, "--cpu", "--size", "64x64"}, picture + " is");
+  expectNamed({"run", "-e", "load " + field + "; save -o " + at("g.hpsdf") + "; slice cpu=true output=" + picture},
+              at("g.hpsdf") + ", " + picture + " are");
+}
+
+TEST_F(Outputs, symbolicLinksAreFollowedAndStay) {
+  fs::create_directory(at("real"));
+  writeFile(at("real/old.hpsdf"), "old");
+  fs::create_symlink("real/old.hpsdf", at("there.hpsdf"));
+  fs::create_symlink("real/new.hpsdf", at("dangling.hpsdf"));
+  fs::create_symlink("dangling.hpsdf", at("chain.hpsdf"));
+  fs::create_symlink("none/f.hpsdf", at("nowhere.hpsdf"));
+  fs::create_symlink("circle.hpsdf", at("circle.hpsdf"));
+  const auto build = [&](const std::string& output) {
+    return Call{{"build", "analytic:sphere", "-o", at(output), "--target-error", "1e-2"}};
+  };
+  for (const auto& [link, target] : {std::pair("there.hpsdf", "real/old.hpsdf"), {"chain.hpsdf", "real/new.hpsdf"}}) {
+    EXPECT_EQ(run(build(link)).status, 0) << link;
+    EXPECT_TRUE(fs::is_symlink(at(link)));
+    EXPECT_EQ(readFile(at(target)).substr(0, 6), readFile(field()).substr(0, 6)) << "a field's file";
+  }
+  EXPECT_TRUE(fs::is_symlink(at("dangling.hpsdf")));
+  EXPECT_THAT(namesIn(at("real")), ElementsAre("new.hpsdf", "old.hpsdf"));
+  expectRefused(build("nowhere.hpsdf"), "nowhere.hpsdf: cannot be written (No such file or directory)");
+  expectRefused(build("circle.hpsdf"), "circle.hpsdf: cannot be written (Too many levels of symbolic links)");
+}
+
+TEST_F(Outputs, aSmallStackIsEnough) {
+  writeFile(at("mesh.obj"), kTetrahedron);
+  for (const std::size_t kilobytes : {48, 64})
+    for (const auto& words : {std::vector<std::string>{"build", at("mesh.obj"), "-o", at("f.hpsdf"), "--grid", "2"},
+                              {"verify", field(), "builtin:torus", "--points", "1000"},
+                              {"render", field(), "-o", at("r.png"), "--cpu", "--size", "64x64"}}) {
+      const Outcome outcome = run({.words = words, .stackKilobytes = kilobytes});
+      EXPECT_EQ(outcome.status, 0) << words[0] << " with " << kilobytes << " kB: " << outcome.err;
+    }
 }
 
 TEST_F(Outputs, readOnlyFoldersAreRefusedBeforeTheWork) {
@@ -145,6 +206,23 @@ TEST_F(Outputs, interruptOutsideAConstructionLeavesNothing) {
   EXPECT_EQ(outcome.status, 143);
   EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing is half-written\n"));
   EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+}
+
+/// The construction ends by a flag that its loops see, the query within the signal handler.
+TEST_F(Outputs, signalsEndAllCommandsAlike) {
+  for (const auto& [signal, status] : {std::pair{SIGINT, 130}, {SIGTERM, 143}, {SIGHUP, 129}}) {
+    Process query({.words = {"query", field(), "-o", at("q.csv")}, .keepInputOpen = true});
+    Process build({{"build", "builtin:gear", "-o", at("f.hpsdf"), "--target-error", "1e-12"}});
+    build.waitForErrorLine();
+    for (Process* process : {&query, &build}) {
+      process->send(signal);
+      const Outcome outcome = process->finish();
+      EXPECT_EQ(outcome.status, status) << outcome.err;
+      EXPECT_THAT(outcome.err, EndsWith("hpsdf: cancelled; nothing is half-written\n"));
+      EXPECT_THAT(outcome.out, IsEmpty());
+    }
+    EXPECT_THAT(namesIn(folder_.path()), IsEmpty());
+  }
 }
 
 TEST_F(Outputs, olderFileSurvivesAnInterrupt) {

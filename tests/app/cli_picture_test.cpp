@@ -265,12 +265,29 @@ TEST_F(Pictures, withoutEglPicturesAreRefusedAndTheCpuStillDraws) {
   expectRefused({.words = {"slice", field(), "-o", at("s.png")}, .environment = noEgl}, "render with --cpu");
   expectRefused({.words = {"render", field(), "-o", at("r.png")}, .environment = noEgl}, "render with --cpu");
   expectRefused({.words = {"report", field(), "-o", at("report")}, .environment = noEgl}, "render with --cpu");
+  expectRefused(
+      {.words = {"frames", "analytic:torus", "-o", at("frames"), "--target-error", "1e-2"}, .environment = noEgl},
+      "libgl1-mesa-dri, or render with --of 'slice cpu'");
+  const Outcome shot =
+      run({.words = {"run", "-e", "load \"" + field() + "\"; shot output=" + at("shot.png")}, .environment = noEgl});
+  EXPECT_EQ(shot.status, 2);
+  EXPECT_EQ(lineCount(shot.err), 1u) << shot.err;
+  EXPECT_THAT(shot.err, EndsWith("libgl1-mesa-dri, or render with 'show cpu=true'\n"));
   const Outcome doctor = run({.words = {"doctor", "--json"}, .environment = noEgl});
   EXPECT_EQ(doctor.status, 0) << doctor.err;
   EXPECT_TRUE(Json::parse(doctor.out).at("renderer").is_null());
+  EXPECT_THAT(Json::parse(doctor.out).at("renderer_problem").get<std::string>(), EndsWith("or render with --cpu"));
   EXPECT_EQ(
       run({.words = {"slice", field(), "-o", at("s.png"), "--cpu", "--size", "64x64"}, .environment = noEgl}).status,
       0);
+}
+
+/// Mesa itself would write several warnings before the program's message.
+TEST_F(Pictures, aBrokenMesaIsToldInOneLine) {
+  const Call call{.words = {"slice", field(), "-o", at("s.png"), "--gl", "software", "--size", "64x64"},
+                  .environment = {{"LIBGL_DRIVERS_PATH", "/nonexistent"}}};
+  if (run(call).status == 0) GTEST_SKIP() << "this Mesa finds its drivers all the same";
+  expectRefused(call, "no OpenGL 4.5 through EGL on a software device");
 }
 
 TEST_F(Pictures, slicesOfFieldsAwayFromTheOriginCutTheirMiddle) {

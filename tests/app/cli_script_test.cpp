@@ -127,6 +127,19 @@ TEST_F(Scripts, picksAgreeWithQueries) {
   }
 }
 
+/// A message would end at a zero byte if it were printed as it is.
+TEST_F(Scripts, zeroBytesDoNotCutMessages) {
+  using namespace std::string_view_literals;
+  writeFile(at("verb.hps"), "in\0fo x\n"sv);
+  expectRefused({{"run", at("verb.hps")}}, "unknown command 'in fo'; did you mean 'info'?");
+  writeFile(at("name.hps"), "load \"a\0b.hpsdf\"\n"sv);
+  expectRefused({{"run", at("name.hps")}}, "a b.hpsdf: no such file; check the");
+  writeFile(at("points"), "1 2\0 3\n"sv);
+  const Outcome outcome = run({{"query", field(), at("points")}});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, EndsWith("points:1: expected three finite numbers x,y,z, found '1 2  3'\n"));
+}
+
 TEST_F(Scripts, scriptMistakesAreRefused) {
   writeFile(at("s.hps"), "load \"" + field() + "\"\nslice colour=degree output=x.png\n");
   expectRefused({.words = {"run", "s.hps"}, .folder = folder_.path()},

@@ -8,8 +8,10 @@
 #include <chrono>
 #include <cmath>
 #include <sstream>
+#include <thread>
 
 #include "console/console.h"
+#include "console/long_work.h"
 #include "started_program.h"
 #include "text/text.h"
 
@@ -39,10 +41,43 @@ TEST(Progress, logGetsALineEachQuarterAndEveryTenSeconds) {
     line.report("refining", 1, after(18));
   }
   EXPECT_EQ(out.str(),
-            "refining   0 %, 2 s\n"
+            "refining, 2 s\n"
             "refining  26 %, 6 s, about 17 s left\n"
             "refining  31 %, 17 s, about 38 s left\n"
             "refining 100 %, 18 s\n");
+}
+
+TEST(Progress, tellsTheTimeWhileNothingIsReported) {
+  for (const bool redraws : {false, true}) {
+    std::ostringstream out;
+    const Clock::time_point start{};
+    const auto shown = [&](auto draw) {
+      const std::size_t before = out.str().size();
+      draw();
+      const std::string text = out.str().substr(before);
+      return text.substr(text.find(']') == std::string::npos ? 0 : text.find(']') + 2);
+    };
+    const std::string end = redraws ? "" : "\n";
+    ProgressLine line(out, redraws, start);
+    EXPECT_EQ(shown([&] { line.tick(start + std::chrono::seconds(5)); }), "") << "no task is known";
+    EXPECT_EQ(shown([&] { line.report("fitting", 0.004, start + std::chrono::seconds(6)); }), "fitting, 6 s" + end);
+    EXPECT_EQ(shown([&] { line.tick(start + std::chrono::seconds(30)); }), "fitting, 30 s" + end);
+    EXPECT_EQ(shown([&] { line.report("fitting", 0.25, start + std::chrono::seconds(40)); }),
+              "fitting  25 %, 40 s, about 2 min 00 s left" + end);
+    EXPECT_EQ(shown([&] { line.tick(start + std::chrono::seconds(60)); }),
+              "fitting  25 %, 1 min 00 s, about 2 min 00 s left" + end);
+  }
+}
+
+TEST(Progress, timeGoesOnDuringALongStep) {
+  std::istringstream in;
+  std::ostringstream out, err;
+  withProgress(Console{in, out, err, true}, [](const Progress& progress) {
+    progress.update("fitting", 0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    return true;
+  });
+  EXPECT_THAT(err.str(), testing::ContainsRegex("fitting, [1-9] s"));
 }
 
 TEST(Progress, terminalGetsOneLineThatIsErased) {

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <new>
 #include <set>
 #include <sstream>
 
 #include "commands/commands.h"
+#include "console/error_text.h"
 #include "construction/build_arguments.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
@@ -211,6 +213,19 @@ TEST(BuildArguments, errorsOfMemoryNameTheOption) {
             "much is needed: take less, or allow more memory: --memory-limit 2.1e8 is likely to suffice (where no "
             "target is given either, 0.1 GB are allowed besides the mesh's distance)");
   EXPECT_EQ(text(" --memory-limit 3e9", 0), "much is needed: take less; this machine does not allow more memory");
+}
+
+/// A memory limit helps only where the program itself refuses to take more.
+TEST(BuildArguments, errorsOfTheSystemsMemoryFitTheWork) {
+  try {
+    withinMemory(parse("build", "m.obj -o f"), []() -> int { throw std::bad_alloc(); });
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::limit);
+    EXPECT_STREQ(error.what(), "not enough memory; a larger tolerance or target error, or a coarser grid, needs less");
+  }
+  EXPECT_EQ(errorText(std::bad_alloc()),
+            "not enough memory; end other programs, or take a smaller mesh, field or picture");
 }
 
 TEST(BuildArguments, readContinuity) {

@@ -35,10 +35,11 @@ struct Call {
   std::vector<std::string> words;
   std::string input = {};
   std::map<std::string, std::string> environment = {};
-  fs::path folder = {};        ///< working folder; if empty, the folder of the caller
-  fs::path output = {};        ///< file to which standard output is redirected; if empty, the test reads the output
-  bool stdoutClosed = false;   ///< true if the reading end of the standard output pipe is closed
-  bool keepInputOpen = false;  ///< true if standard input stays open for `Process::type`
+  fs::path folder = {};            ///< working folder; if empty, the folder of the caller
+  fs::path output = {};            ///< file to which standard output is redirected; if empty, the test reads the output
+  bool stdoutClosed = false;       ///< true if the reading end of the standard output pipe is closed
+  bool keepInputOpen = false;      ///< true if standard input stays open for `Process::type`
+  std::size_t stackKilobytes = 0;  ///< limit of the stack's size; if 0, that of the caller
 };
 
 inline std::size_t lineCount(const std::string& text) {
@@ -67,6 +68,8 @@ class Process {
     sigset_t defaults;
     sigemptyset(&defaults);
     sigaddset(&defaults, SIGINT);  // a test that runs in the background inherits an ignored SIGINT
+    sigaddset(&defaults, SIGTERM);
+    sigaddset(&defaults, SIGHUP);  // nohup ignores it
     sigaddset(&defaults, SIGPIPE);
     posix_spawnattr_setsigdefault(&attributes, &defaults);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
@@ -164,6 +167,9 @@ class Process {
  private:
   int spawn(const Call& call, const posix_spawn_file_actions_t& actions, const posix_spawnattr_t& attributes) {
     std::vector<std::string> words = {HPSDF_PROGRAM};
+    if (call.stackKilobytes > 0)  // a shell sets the limit and then becomes the program
+      words = {"/bin/sh", "-c", "ulimit -s \"$0\" && exec \"$@\"", std::to_string(call.stackKilobytes), HPSDF_PROGRAM};
+    const std::string program = words.front();
     words.insert(words.end(), call.words.begin(), call.words.end());
     std::vector<std::string> variables;
     for (char** entry = environ; *entry != nullptr; ++entry)
@@ -175,7 +181,8 @@ class Process {
       result.push_back(nullptr);
       return result;
     };
-    return posix_spawn(&id_, HPSDF_PROGRAM, &actions, &attributes, pointers(words).data(), pointers(variables).data());
+    return posix_spawn(&id_, program.c_str(), &actions, &attributes, pointers(words).data(),
+                       pointers(variables).data());
   }
 
   /// Reads available output; returns false if both output streams have ended.

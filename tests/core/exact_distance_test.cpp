@@ -22,8 +22,10 @@
 #include <vector>
 
 #include "bvh/triangle_frame.h"
+#include "hpsdf/detail/crossings.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
+#include "hpsdf/mesh_repair.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {
@@ -406,13 +408,34 @@ TEST(ExactDistance, handlesClustersTooSmallForBinning) {
   }
 }
 
-TEST(ExactDistance, acceptsAnyFiniteCoordinates) {
-  for (const double size : {1e-320, 1e-310, 1e300, 1e307})
-    for (const double at : {0.0, 1.6e308}) {
+TEST(ExactDistance, acceptsCoordinatesUpToTheLargest) {
+  for (const double size : {1e-320, 1e-310, 1.0, 0.1 * kLargestCoordinate})
+    for (const double at : {0.0, 0.9 * kLargestCoordinate}) {
       TriangleMesh mesh = sphere(2);
       for (Vector3& vertex : mesh.vertices) vertex = vertex * size + Vector3(at, -at, 0);
       EXPECT_EQ(ExactDistance(mesh).source().faces, mesh.triangles.size());
     }
+  const ExactDistance large(box(Vector3::Constant(0.9 * kLargestCoordinate)));
+  EXPECT_NEAR(large(Vector3::Zero()) / kLargestCoordinate, -0.9, 1e-12);
+}
+
+/// Squares of such lengths are infinite, and distances would be NaN.
+TEST(ExactDistance, refusesCoordinatesBeyondTheLargest) {
+  for (const double bad : {2 * kLargestCoordinate, -1e200, 1e300}) {
+    TriangleMesh mesh = sphere(2);
+    mesh.vertices[4].y() = bad;
+    const auto refuses = [](const auto& work) {
+      try {
+        work();
+      } catch (const Error& error) {
+        return error.kind() == ErrorKind::mesh && std::string(error.what()).find("beyond 1e100") != std::string::npos;
+      }
+      return false;
+    };
+    EXPECT_TRUE(refuses([&] { ExactDistance distance(mesh); })) << bad;
+    EXPECT_TRUE(refuses([&] { findCrossings(mesh); })) << bad;
+    EXPECT_TRUE(refuses([&] { repaired({mesh, {}}); })) << bad;
+  }
 }
 
 // --- Signs

@@ -360,6 +360,37 @@ TEST(FieldFile, forgedFilesAreRefused) {
   EXPECT_NE(forge(header, std::uint32_t{0xffffffff}), "");  // length of the name
 }
 
+TEST(Error, showsZeroBytesAsBlanks) {
+  const std::string zero(1, '\0');
+  const Error error("a" + zero + "b"), named(ErrorKind::file, "c" + zero + "d", "is" + zero + " gone");
+  EXPECT_STREQ(error.what(), "a b");
+  EXPECT_STREQ(named.what(), "c d: is  gone");
+  EXPECT_EQ(named.problem(), "is  gone");
+  EXPECT_EQ(named.subject(), "c" + zero + "d");
+}
+
+TEST(OutputFile, followsSymbolicLinks) {
+  support::TemporaryDirectory folder;
+  const auto write = [&](const char* name) {
+    OutputFile output(folder.path() / name);
+    output.write(name);
+    output.commit();
+  };
+  std::filesystem::create_directory(folder.path() / "real");
+  std::filesystem::create_symlink("real/target", folder.path() / "link");
+  for (int round = 0; round < 2; ++round) {  // the target is missing in the first round
+    write("link");
+    EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "link"));
+    EXPECT_EQ(readAll(folder.path() / "real/target"), "link");
+  }
+  std::filesystem::create_symlink(folder.path() / "real/other", folder.path() / "absolute");
+  write("absolute");
+  EXPECT_EQ(readAll(folder.path() / "real/other"), "absolute");
+  std::filesystem::create_symlink("two", folder.path() / "one");
+  std::filesystem::create_symlink("one", folder.path() / "two");
+  EXPECT_THROW(OutputFile(folder.path() / "one"), Error);
+}
+
 TEST(OutputFile, appearsWholeOrNotAtAll) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "out.txt";

@@ -47,6 +47,17 @@ FieldData steps() {
   return data;
 }
 
+#ifndef NDEBUG
+TEST(FieldDeathTest, movedFromFieldsAreNotQueried) {
+  Field field(steps());
+  const Field other = std::move(field);
+  EXPECT_EQ(other.value({0.5, 0.5, 0.5}), 100);
+  EXPECT_DEATH(field.value({0.5, 0.5, 0.5}), "the field was moved from");
+  EXPECT_DEATH(field.cellAt({0.5, 0.5, 0.5}), "the field was moved from");
+  EXPECT_DEATH(statistics(field), "the field was moved from");
+}
+#endif
+
 TEST(Field, cellsAreHalfOpen) {
   const Field field(steps());
   EXPECT_EQ(field.value({0.9999, 0.5, 0.5}), 100);

@@ -978,9 +978,9 @@ TEST(GlDeathTest, namesTheDevicesTriedAndTheRemedyWithoutADriver) {
   };
   EXPECT_EXIT(withoutDrivers(GlChoice::software), testing::ExitedWithCode(7),
               "no OpenGL 4.5 through EGL on a software device \\(tried .*default display: .*\\): install libegl-mesa0 "
-              "and libgl1-mesa-dri, or render with --cpu");
+              "and libgl1-mesa-dri, or render on the CPU");
   EXPECT_EXIT(withoutDrivers(GlChoice::hardware), testing::ExitedWithCode(7),
-              "on a hardware device \\(tried hardware devices: .*surfaceless Mesa: .*--cpu");
+              "on a hardware device \\(tried hardware devices: .*surfaceless Mesa: .*or render on the CPU");
 }
 
 /// The hardware device may be refused only if there is no graphics hardware; it must never be a software device.

@@ -348,7 +348,8 @@ class Batch {
     // Each line of the output is written in one call, so that the lines of several processes do not mix.
     console_.out << lineOf(mesh, made, seconds).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"
                  << std::flush;
-    requireWritten(console_.out);
+    const std::string output = outputOf(mesh).string();
+    requireWritten(console_.out, std::span(&output, made.status == Status::failed ? 0 : 1));
   }
 
   Json lineOf(const BatchMesh& mesh, const Made& made, double seconds) const {

@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <thread>
 
 #include "commands/commands.h"
@@ -53,6 +55,10 @@ void runRun(Session& session, const Arguments& arguments) {
   const auto calls = parseScript(session.registry(), name, text, parseVariables(words));
   const ScriptScope scope(session, session.wantsJson(arguments));
   runScript(session, calls);
+  std::vector<std::string> written;
+  for (const Call& call : calls)
+    std::ranges::copy(outputFiles(*call.command, call.arguments), std::back_inserter(written));
+  requireWritten(session.console().out.flush(), written);
 }
 
 void runSet(Session& session, const Arguments& arguments) {
@@ -129,6 +135,8 @@ Json diagnosis(const Session& session, const Arguments& arguments) {
   Json renderer, problem;
   try {
     renderer = render::glDescription(glChoice(arguments));
+  } catch (const render::GlError& error) {
+    problem = error.advising("with --cpu");
   } catch (const Error& error) {
     problem = error.what();
   }

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -45,7 +47,8 @@ struct Console {
   std::string work = {};  ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
 };
 
-/// Writes one line to the stream `err`. Control characters in `text`, which file names may contain, become blanks.
+/// Writes one line to the stream `err`, in place of a progress line. Any thread may call it. Control characters in
+/// `text`, which file names may contain, become blanks.
 void note(const Console& console, std::string_view text);
 void warn(const Console& console, std::string_view text);
 
@@ -55,7 +58,15 @@ std::string forecastText(const Forecast& forecast);
 /// Writes a line that says what a long operation will take.
 void noteForecast(const Console& console, const Forecast& forecast);
 
-/// Throws `Error` if a write to `out`, the standard output, has failed.
-void requireWritten(const std::ostream& out);
+/// Thrown if nobody reads the standard output any more, for instance because `head` has ended. It is no error of the
+/// program, which ends without a message.
+class ReaderGone : public std::runtime_error {
+ public:
+  ReaderGone() : std::runtime_error("the reader of the standard output has gone") {}
+};
+
+/// Throws `ReaderGone` if a write to `out`, the standard output, has failed for want of a reader. Throws `Error` if it
+/// has failed for another reason. Its message names `files`, which the program has written before.
+void requireWritten(const std::ostream& out, std::span<const std::string> files = {});
 
 }  // namespace hpsdf::app

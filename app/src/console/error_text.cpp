@@ -15,7 +15,7 @@ std::string errorText(const std::exception& error) {
     return fmt::format("{}: {}; check that it is there, and its permissions", file->path1().string(),
                        file->code().message());
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
-    return "not enough memory; a larger target error or a smaller grid needs less";
+    return "not enough memory; end other programs, or take a smaller mesh, field or picture";
   return fmt::format("{} (this is a fault of the program)", error.what());
 }
 

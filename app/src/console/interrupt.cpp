@@ -12,12 +12,12 @@ namespace hpsdf::app {
 namespace {
 
 std::atomic<int> guards = 0;
-std::atomic<bool> interruptedFlag = false;
-static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free,
-              "a signal handler may use lock-free atomics only");
+std::atomic<int> firstSignal = 0;  // the first signal that arrived while a guard existed, or 0
+static_assert(std::atomic<int>::is_always_lock_free, "a signal handler may use lock-free atomics only");
 
 void onInterrupt(int signal) {
-  if (guards > 0 && !interruptedFlag.exchange(true)) return;
+  int none = 0;
+  if (guards > 0 && firstSignal.compare_exchange_strong(none, signal)) return;
   OutputFile::removeUnfinished();
   constexpr std::string_view kMessage = "hpsdf: cancelled; nothing is half-written\n";
   [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kMessage.data(), kMessage.size());
@@ -40,11 +40,13 @@ void installInterruptHandlers() {
 }
 
 InterruptGuard::InterruptGuard() {
-  if (guards++ == 0) interruptedFlag = false;
+  if (guards++ == 0) firstSignal = 0;
 }
 
 InterruptGuard::~InterruptGuard() { --guards; }
 
-bool InterruptGuard::interrupted() { return interruptedFlag.load(std::memory_order_relaxed); }
+bool InterruptGuard::interrupted() { return signal() != 0; }
+
+int InterruptGuard::signal() { return firstSignal.load(std::memory_order_relaxed); }
 
 }  // namespace hpsdf::app

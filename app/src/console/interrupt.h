@@ -3,8 +3,8 @@
 namespace hpsdf::app {
 
 /// Installs handlers for SIGINT, SIGTERM and SIGHUP. The handlers remove unfinished files and end the
-/// process. While an `InterruptGuard` exists, the first signal only sets a flag. Signals that the parent
-/// process ignores stay ignored.
+/// process with the exit status 128 + the signal's number. While an `InterruptGuard` exists, the first signal only sets
+/// a flag. Signals that the parent process ignores stay ignored.
 void installInterruptHandlers();
 
 /// While a guard exists, the first SIGINT, SIGTERM or SIGHUP does not end the process, so that the work can stop in an
@@ -18,6 +18,9 @@ class InterruptGuard {
 
   /// True once SIGINT, SIGTERM or SIGHUP has arrived while a guard existed. Any thread may call this function.
   static bool interrupted();
+
+  /// Returns the signal that made `interrupted` true, or 0.
+  static int signal();
 };
 
 }  // namespace hpsdf::app

@@ -17,6 +17,7 @@ template <typename Work>
 auto withProgress(const Console& console, const Work& work) {
   const InterruptGuard guard;
   ProgressLine line(console.err, console.redrawsProgress);
+  const ProgressTicker ticker(line);
   WorkListener* const listener = console.listener;
   struct AtEnd {
     WorkListener* listener;

@@ -253,6 +253,11 @@ Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& argument
   return Error(error.kind(), error.subject(), text);
 }
 
+Error constructionOutOfMemory() {
+  return Error(ErrorKind::limit, "",
+               "not enough memory; a larger tolerance or target error, or a coarser grid, needs less");
+}
+
 void requireOwner(const Arguments& arguments, const char* name, const char* owner, bool ownerIsGiven) {
   if (arguments.given(name) && !ownerIsGiven)
     throw Error(fmt::format("{} belongs to {}: give that too, or leave it out", name, owner));

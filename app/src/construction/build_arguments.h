@@ -2,6 +2,7 @@
 // The command parameters for the construction of a field, and their conversion into options of the construction.
 
 #include <initializer_list>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -66,14 +67,19 @@ std::string givenWithoutEffectWithinTolerance(const Arguments& arguments);
 /// Returns the error of a construction that needs more memory, with the option of the command line that allows more.
 Error namingMemoryLimit(const MemoryLimitError& error, const Arguments& arguments);
 
+/// Returns the error of a construction for which the system has not enough memory. A memory limit would not help.
+Error constructionOutOfMemory();
+
 /// Calls work() and returns its result. If work() needs more memory than it may take, the error names the option that
-/// allows more.
+/// allows more. If the system has too little memory, the error says how a construction needs less.
 template <typename Work>
 auto withinMemory(const Arguments& arguments, const Work& work) {
   try {
     return work();
   } catch (const MemoryLimitError& error) {
     throw namingMemoryLimit(error, arguments);
+  } catch (const std::bad_alloc&) {
+    throw constructionOutOfMemory();
   }
 }
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "console/long_work.h"
-#include "console/progress_line.h"
 #include "construction/surface.h"
 #include "hpsdf/verify.h"
 #include "text/text.h"
@@ -42,7 +41,6 @@ Checkpoint checkpointAt(const Console& console, const std::filesystem::path& fil
   };
   checkpoint.failed = [&console, warned = false](const Error& error) mutable {
     if (std::exchange(warned, true)) return;
-    if (console.redrawsProgress) console.err << kEraseLine;
     warn(console, fmt::format("{}; the construction goes on without", error.what()));
   };
   return checkpoint;
@@ -83,13 +81,16 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     warnOfCutSurface(console, box, domain);
     if (console.listener != nullptr && !prepared.analytic) console.listener->showMesh(prepared.mesh, domain);
 
-    // Set up the exact distance function and measure how long this takes. The default memory limit is meant for the
-    // octree alone, so add the memory of the distance function to it.
+    // Set up the exact distance function and measure how long this takes.
     const auto start = std::chrono::steady_clock::now();
     auto exact = distanceTo(console, surface, prepared, insideOptions);
-    if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact->bytes();
+    allowDistance(options, *exact, arguments);
     return {std::move(exact), prepared.report, domain, options, secondsSince(start)};
   });
+}
+
+void allowDistance(BuildOptions& options, const DistanceFunction& exact, const Arguments& arguments) {
+  if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact.bytes();
 }
 
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,

@@ -25,6 +25,10 @@ struct BuildInput {
 /// Loads a surface, warns about its flaws and sets up its exact distance function. Throws `Error` naming `surface`.
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments);
 
+/// Allows a construction the memory of the distance `exact` in addition to the default memory limit, which is meant for
+/// what grows. Changes nothing if the arguments give a limit.
+void allowDistance(BuildOptions& options, const DistanceFunction& exact, const Arguments& arguments);
+
 struct BuiltField {
   Field field;
   std::shared_ptr<const DistanceFunction> exact;  ///< the exact distance that the field approximates

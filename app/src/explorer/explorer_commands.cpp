@@ -266,6 +266,7 @@ void addFieldAndShotCommands(Registry& registry) {
       .examples = {"shot output=frame.png"},
       .parameters = {{"output", outputFile().as('o').required(), "*.png."}},
       .action = runShot,
+      .drawsOnCpuBy = "'show cpu=true'",
   });
 }
 

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
@@ -430,23 +429,12 @@ std::vector<std::string> Arguments::texts(std::string_view name) const {
   return result;
 }
 
-void perform(const Command& command, Session& session, const Arguments& arguments) {
-  const auto filesOf = [&](bool outputs) {
-    std::vector<std::string> files;
-    for (const Parameter& parameter : command.parameters) {
-      const bool isInput = parameter.type == ParameterType::path || parameter.type == ParameterType::text;
-      if (outputs ? parameter.type != ParameterType::outputPath : !isInput) continue;
-      if (arguments.given(parameter.name) && !parameter.isRepeatable) files.push_back(arguments.text(parameter.name));
-    }
-    return files;
-  };
-  for (const std::string& output : filesOf(true))
-    for (const std::string& input : filesOf(false)) {
-      std::error_code missing;
-      if (std::filesystem::equivalent(output, input, missing))
-        throw Error(fmt::format("{}: is read by the same command; give the output another name", output));
-    }
-  command.action(session, arguments);
+std::vector<std::string> outputFiles(const Command& command, const Arguments& arguments) {
+  std::vector<std::string> files;
+  for (const Parameter& parameter : command.parameters)
+    if (parameter.type == ParameterType::outputPath && !parameter.isRepeatable && arguments.given(parameter.name))
+      files.push_back(arguments.text(parameter.name));
+  return files;
 }
 
 }  // namespace hpsdf::app

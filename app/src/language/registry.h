@@ -70,6 +70,9 @@ struct Command {
   /// Throws `Error` if the arguments contradict each other. All commands of a script are checked before its
   /// first command runs.
   std::function<void(const Arguments&)> check = {};
+  /// What makes the command draw without OpenGL, for messages. May be empty if the command has the parameter `cpu` or
+  /// does not draw.
+  std::string drawsOnCpuBy = {};
   bool scriptOnly = false;
   bool commandLineOnly = false;
   bool takesVariables = false;    ///< words `name=value` are positional values, not options
@@ -125,7 +128,11 @@ class ArgumentError : public Error {
 /// not accept.
 Arguments parseArguments(const Command& command, std::span<const Word> words, Origin origin);
 
-/// Runs the command. Throws `Error` before any work starts if an output file is also one of the input files.
+/// Returns the output files and folders that the arguments name.
+std::vector<std::string> outputFiles(const Command& command, const Arguments& arguments);
+
+/// Runs the command. Throws `Error` before any work starts if an output file is also one of the input files. If OpenGL
+/// cannot draw, throws an `Error` that says how the command draws without it.
 void perform(const Command& command, Session& session, const Arguments& arguments);
 
 /// Returns a description of the values that a parameter accepts, e.g. "a whole number from 1 to 30".

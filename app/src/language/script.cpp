@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "console/failed.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/error.h"
@@ -286,18 +285,6 @@ Variables parseVariables(const std::vector<std::string>& words) {
 std::vector<Call> parseScript(const Registry& registry, std::string_view name, std::string_view text,
                               Variables variables) {
   return ScriptReader(registry, std::move(variables)).read(name, text);
-}
-
-void runScript(Session& session, std::span<const Call> calls) {
-  for (const Call& call : calls) {
-    try {
-      perform(*call.command, session, call.arguments);
-    } catch (const Failed& error) {
-      throw Failed(call.where + ": " + error.what() + call.includedFrom, error.status());
-    } catch (const Error& error) {
-      throw Error(call.where + ": " + error.what() + call.includedFrom);
-    }
-  }
 }
 
 }  // namespace hpsdf::app

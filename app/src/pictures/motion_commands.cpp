@@ -167,14 +167,17 @@ void runFrames(Session& session, const Registry& commands, const Arguments& argu
     stage.setExact(exact);
     film.add(drawFrame(stage, call, scale).image, figures);
   };
+  BuildOptions options = buildOptions(arguments, finished.metadata().referenceLength);
+  allowDistance(options, *exact, arguments);
   withProgress(session.console(), [&](const Progress& progress) {
-    buildStages(*exact, finished.domain(), buildOptions(arguments, finished.metadata().referenceLength),
-                std::span(steps).first(steps.size() - 1),
-                [&](Field field) {
-                  progress.update("drawing frames", double(film.frames()) / double(steps.size()));
-                  addStage(std::move(field));
-                },
-                {.report = {}, .cancelled = progress.cancelled});
+    const auto drawStage = [&](Field field) {
+      progress.update("drawing frames", double(film.frames()) / double(steps.size()));
+      addStage(std::move(field));
+    };
+    withinMemory(arguments, [&] {
+      buildStages(*exact, finished.domain(), options, std::span(steps).first(steps.size() - 1), drawStage,
+                  {.report = {}, .cancelled = progress.cancelled});
+    });
     film.add(drawFrame(session, call, scale).image, frameFigures(finished));
     film.encode(arguments.number("fps"), progress);
     return true;
@@ -219,6 +222,7 @@ the number of steps, once for the frames. In a script the finished field becomes
                   buildParameters()}),
       .action = [shared](Session& session, const Arguments& arguments) { runFrames(session, *shared, arguments); },
       .check = [shared](const Arguments& arguments) { checkFrames(*shared, arguments); },
+      .drawsOnCpuBy = "--of 'slice cpu'",
   };
 }
 

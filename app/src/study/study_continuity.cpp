@@ -32,7 +32,8 @@ class ContinuityStudy {
       : console_(session.console()),
         arguments_(arguments),
         mesh_(arguments.texts("mesh")[mesh]),
-        input_(buildInput(console_, mesh_, buildArguments(session, arguments, mesh))),
+        buildArguments_(buildArguments(session, arguments, mesh)),
+        input_(buildInput(console_, mesh_, buildArguments_)),
         uniform_(samples(0)),
         near_(samples(kNear * input_.domain.sizes().maxCoeff())) {}
 
@@ -44,8 +45,9 @@ class ContinuityStudy {
       BuildOptions options = input_.options;
       options.enrich = enriched;
       const auto begin = std::chrono::steady_clock::now();
-      const Field built = withProgress(
-          console_, [&](const Progress& progress) { return build(*input_.exact, input_.domain, options, progress); });
+      const Field built = withProgress(console_, [&](const Progress& progress) {
+        return withinMemory(buildArguments_, [&] { return build(*input_.exact, input_.domain, options, progress); });
+      });
       const double buildSeconds = input_.setUpSeconds + secondsSince(begin);
       rows.push_back(rowOf(built, enriched, {}, 0, 0, buildSeconds));
       for (const double weight : arguments_.numbers("weights")) {
@@ -90,6 +92,7 @@ class ContinuityStudy {
   const Console& console_;
   const Arguments& arguments_;
   std::string mesh_;
+  Arguments buildArguments_;
   BuildInput input_;
   ExactSamples uniform_, near_;
   Json first_;  ///< row of the mesh's first field; null until it is measured

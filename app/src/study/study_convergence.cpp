@@ -137,13 +137,15 @@ Json equalError(const Json& curves, double rms) {
 /// file names.
 Json studied(Session& session, const Arguments& arguments, std::size_t mesh, const std::string& name) {
   const std::string surface = arguments.texts("mesh")[mesh];
-  const BuildInput input = buildInput(session.console(), surface, buildArguments(session, arguments, mesh));
+  const Arguments ofBuild = buildArguments(session, arguments, mesh);
+  const BuildInput input = buildInput(session.console(), surface, ofBuild);
   const ExactSamples samples =
       exactSamples(session.console(), arguments, *input.exact, input.domain, input.options.threads);
   return withProgress(session.console(), [&](const Progress& progress) {
     Json curves = Json::object();
     for (const Strategy strategy : {Strategy::hp, Strategy::h2, Strategy::h1})
-      curves[strategyName(strategy)] = curveOf(input, strategy, samples, arguments, progress);
+      curves[strategyName(strategy)] =
+          withinMemory(ofBuild, [&] { return curveOf(input, strategy, samples, arguments, progress); });
     const double rms = arguments.has("at") ? arguments.number("at") : commonRms(curves);
     return Json({{"mesh", surface}, {"name", name}, {"equal_error", equalError(curves, rms)}, {"curves", curves}});
   });

@@ -116,7 +116,7 @@ TradeoffPoint tradeoffPoint(const Console& console, const BuildInput& input, con
   const auto start = std::chrono::steady_clock::now();
   const BuildOptions options = buildOptions(buildArguments, input.exact->source().box.sizes().maxCoeff());
   return withProgress(console, [&](const Progress& progress) {
-    Field field = build(*input.exact, input.domain, options, progress);
+    Field field = withinMemory(buildArguments, [&] { return build(*input.exact, input.domain, options, progress); });
     const double seconds = input.setUpSeconds + secondsSince(start);
     const MeasureOptions measuring{.points = static_cast<std::size_t>(arguments.number("points")),
                                    .seed = static_cast<std::uint64_t>(arguments.number("seed")),

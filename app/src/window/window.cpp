@@ -10,9 +10,11 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
+#include <mutex>
 
 #include "console/error_text.h"
 #include "console/interrupt.h"
+#include "console/progress_line.h"
 #include "explorer/explorer.h"
 #include "files/text_file.h"
 #include "language/script.h"
@@ -289,6 +291,7 @@ class Window {
   /// Shows an error in the window and writes it to the terminal, since the readout panel may be closed.
   void showError(const std::string& error) {
     explorer_.message = withoutPosition(error);
+    const std::lock_guard lock(messageMutex());
     explorer_.session().console().err << "hpsdf: " << explorer_.message << std::endl;
   }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -20,16 +21,19 @@ enum class ErrorKind : std::uint8_t {
 };
 
 /// Thrown for bad input, such as a file, a mesh or an option. The message is one line that says what is wrong,
-/// where it is wrong, and what to do about it.
+/// where it is wrong, and what to do about it. A blank stands for each NUL byte that the message would contain, because
+/// what() would end there.
 class Error : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit Error(const std::string& message) : std::runtime_error(withoutNul(message)) {}
 
   /// Makes an error with the message "SUBJECT: PROBLEM", or "PROBLEM" if the subject is empty. The subject is the file,
   /// the option or the shape that the error is about. It is spelled as the caller wrote it, so that the caller can
   /// recognise it in the message.
   Error(ErrorKind kind, const std::string& subject, const std::string& problem)
-      : std::runtime_error(subject.empty() ? problem : subject + ": " + problem), subject_(subject), kind_(kind) {}
+      : std::runtime_error(withoutNul(subject.empty() ? problem : subject + ": " + problem)),
+        subject_(subject),
+        kind_(kind) {}
 
   ErrorKind kind() const { return kind_; }
   const std::string& subject() const { return subject_; }
@@ -38,6 +42,11 @@ class Error : public std::runtime_error {
   std::string problem() const { return what() + (subject_.empty() ? std::size_t{0} : subject_.size() + 2); }
 
  private:
+  static std::string withoutNul(std::string text) {
+    std::ranges::replace(text, '\0', ' ');
+    return text;
+  }
+
   std::string subject_;
   ErrorKind kind_ = ErrorKind::general;
 };

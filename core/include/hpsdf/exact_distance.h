@@ -63,10 +63,10 @@ struct DistanceOptions {
 class ExactDistance {
  public:
   /// Prepares the distance queries to a mesh. Throws `Error` for a mesh without triangles, with indices out of range or
-  /// with coordinates that are not finite. Throws `Error` for a thickness that does not fit the inside test. For the
-  /// outer hull, throws `Error` if the mesh has more than two million pairs of intersecting triangles, or if their
-  /// subdivision into pieces of 1/32 of the mesh's size would add more than 250,000 triangles. Throws `Cancelled` when
-  /// `progress` says so.
+  /// with coordinates that are not finite or beyond `kLargestCoordinate`. Throws `Error` for a thickness that does not
+  /// fit the inside test. For the outer hull, throws `Error` if the mesh has more than two million pairs of
+  /// intersecting triangles, or if their subdivision into pieces of 1/32 of the mesh's size would add more than 250,000
+  /// triangles. Throws `Cancelled` when `progress` says so.
   explicit ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options = {}, const Progress& progress = {});
   ~ExactDistance();
   ExactDistance(ExactDistance&&) noexcept;

@@ -40,6 +40,9 @@ struct FieldBytes {
 /// is the gradient of this expression. The value is continuous across the domain's boundary; jumps between leaves at
 /// the boundary continue outwards. Even if f is exact, the value is only an upper bound of the distance, and hence no
 /// safe step for sphere tracing. At infinite points the value is infinite and the gradient NaN.
+///
+/// A field that was moved from holds nothing: it may only be destroyed or assigned to. Queries of such a field are
+/// undefined, and fail an assertion where assertions are on.
 class Field {
  public:
   /// Makes a field from finished arrays. Throws `Error` if the arrays violate the layout that `FieldData` describes.
@@ -67,6 +70,7 @@ class Field {
 
   /// Returns the arrays that make up the field, for files, uploads to a GPU and tests.
   const FieldData& data() const& { return data_; }
+  /// Moves the arrays out of the field, which then is moved from.
   FieldData data() && { return std::move(data_); }
 
   /// Returns the grid in which queries start their descent of the octree, for uploads to a GPU and tests.

@@ -8,7 +8,8 @@ namespace hpsdf {
 
 /// Writes a field as a `.hpsdf` file (docs/file-format.md), which is versioned, little-endian and checksummed.
 /// Equal fields give equal bytes. The file is written under a temporary name in the same folder and then
-/// renamed, so that an interrupted save leaves an older file intact. Throws `Error` with a message that names
+/// renamed, so that an interrupted save leaves an older file intact. A symbolic link is followed and stays, also if the
+/// file to which it leads does not exist yet. Throws `Error` with a message that names
 /// the file and the reason.
 void save(const Field& field, const std::filesystem::path& file);
 

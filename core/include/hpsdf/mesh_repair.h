@@ -38,7 +38,7 @@ struct RepairedMesh {
 ///    its points lie within an odd number of other bodies, so that it is a cavity.
 ///
 /// Throws `Error` for a mesh without triangles or with more than 2²⁸ triangles, and for vertices that do not
-/// exist or are not finite.
+/// exist, are not finite or have coordinates beyond `kLargestCoordinate`.
 RepairedMesh repaired(ImportedMesh imported);
 
 }  // namespace hpsdf

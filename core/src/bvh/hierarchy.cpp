@@ -164,9 +164,10 @@ void requireSurface(const TriangleMesh& mesh) {
                        " that a distance takes; simplify the mesh first");
   requireValidIndices(mesh);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    if (!mesh.vertices[v].allFinite())
-      detail::refuseMesh(mesh.name, "vertex ", v + 1,
-                         " has a coordinate that is not a finite number; repair or export the mesh again");
+    if (!(mesh.vertices[v].cwiseAbs().array() <= kLargestCoordinate).all())
+      detail::refuseMesh(
+          mesh.name, "vertex ", v + 1,
+          " has a coordinate that is not a finite number (or beyond 1e100); repair or export the mesh again");
 }
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {

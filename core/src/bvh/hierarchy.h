@@ -15,7 +15,7 @@
 namespace hpsdf::bvh {
 
 /// Throws `Error` of kind `mesh` unless the mesh has from 1 to `Hierarchy::kMaxTriangles` triangles, valid vertex
-/// indices, and finite coordinates.
+/// indices, and finite coordinates up to `kLargestCoordinate`.
 void requireSurface(const TriangleMesh& mesh);
 
 /// The triangle of a mesh that is nearest to a query point.

@@ -51,13 +51,18 @@ std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   return name;
 }
 
-/// Returns the target of `file` if `file` is a symbolic link, else `file` itself. Renaming a temporary file
-/// to the target replaces the target and keeps the link.
+/// Returns the file to which `file` leads if `file` is a symbolic link, else `file` itself. That file need not exist.
+/// Renaming a temporary file to it keeps the link. Links that lead in a circle give one of these links.
 std::filesystem::path resolved(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (!std::filesystem::is_symlink(file, ignored)) return file;
-  const auto target = std::filesystem::weakly_canonical(file, ignored);
-  return target.empty() ? file : target;
+  constexpr int kMostLinks = 40;  // as many as the system follows
+  std::filesystem::path target = file;
+  std::error_code error;
+  for (int links = 0; links < kMostLinks && std::filesystem::is_symlink(target, error); ++links) {
+    const std::filesystem::path next = std::filesystem::read_symlink(target, error);
+    if (error) return file;
+    target = target.parent_path() / next;  // equals `next` if `next` begins at the root folder
+  }
+  return target;
 }
 
 /// The names of this process's existing temporary files, which `removeUnfinished` deletes. The array has room for 16
@@ -129,6 +134,7 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   };
   // Refuse a file name that is too long. The temporary file has a shorter name and would open, but `commit` would fail.
   if (error == std::errc::filename_too_long) refuse(error.value());
+  if (std::filesystem::is_symlink(file_, error)) refuse(ELOOP);
   if (std::filesystem::is_directory(status))
     throw Error(ErrorKind::file, file.string(), "is a folder; give a file name");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))

@@ -118,11 +118,10 @@ const char* choiceText(GlChoice choice) {
 }
 
 [[noreturn]] void noContext(GlChoice choice, std::string_view tried) {
-  const char* advice = choice == GlChoice::hardware
-                           ? "install the graphics driver, choose software or automatic, or render with --cpu"
-                           : "install libegl-mesa0 and libgl1-mesa-dri, or render with --cpu";
-  throw Error(std::string("no OpenGL 4.5 through EGL ") + choiceText(choice) + " (tried " + std::string(tried) +
-              "): " + advice);
+  const char* advice = choice == GlChoice::hardware ? "install the graphics driver, choose software or automatic"
+                                                    : "install libegl-mesa0 and libgl1-mesa-dri";
+  throw GlError(std::string("no OpenGL 4.5 through EGL ") + choiceText(choice) + " (tried " + std::string(tried) +
+                "): " + advice);
 }
 
 }  // namespace

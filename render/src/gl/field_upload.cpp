@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "hpsdf/detail/triangle_list.h"
-#include "hpsdf/error.h"
+#include "hpsdf/render/renderer.h"
 #include "view/exact_leaf.h"
 
 namespace hpsdf::render {
@@ -20,8 +20,8 @@ constexpr int kLowDegree = 4;    // highest degree evaluated without loops; same
 
 void checkFits(std::size_t texels, std::size_t largest, const char* what) {
   if (texels > largest)
-    throw Error("the field has " + std::to_string(texels) + " " + what + ", the OpenGL device takes " +
-                std::to_string(largest) + ": render with --cpu, or build a coarser field");
+    throw GlError("the field has " + std::to_string(texels) + " " + what + ", the OpenGL device takes " +
+                  std::to_string(largest) + ": build a coarser field");
 }
 
 /// The number of coefficients that a leaf of this degree takes on the device, a multiple of four.
@@ -130,8 +130,8 @@ void upload(const GlBuffer& buffer, const GlBufferTexture& texture, GLenum forma
   }
   glNamedBufferStorage(buffer.name(), static_cast<GLsizeiptr>(bytes), data.data(), 0);
   if (glGetError() != GL_NO_ERROR)
-    throw Error("the OpenGL device has no room for " + std::to_string(bytes >> 20) +
-                " MiB of the field: render with --cpu, or build a coarser field");
+    throw GlError("the OpenGL device has no room for " + std::to_string(bytes >> 20) +
+                  " MiB of the field: build a coarser field");
   glTextureBuffer(texture.name(), format, buffer.name());
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "hpsdf/error.h"
+#include "hpsdf/render/renderer.h"
 #include "image/embedded.h"
 
 namespace hpsdf::render {
@@ -30,7 +30,7 @@ void checkLog(GLint ok, const std::string& what, const GetLog& getLog, GLuint na
   getLog(name, static_cast<GLsizei>(log.size()), &length, log.data());
   log.resize(length);
   std::replace(log.begin(), log.end(), '\n', ' ');
-  throw Error(what + ": " + log + "; update the graphics driver, or render with --cpu");
+  throw GlError(what + ": " + log + "; update the graphics driver");
 }
 
 GlShader compile(GLenum stage, std::initializer_list<std::string_view> files) {
@@ -73,8 +73,8 @@ GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
 void checkGl(const char* what) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return;
-  throw Error(std::string("the OpenGL device fails to ") + what + " (error " + std::to_string(error) +
-              "): render a smaller picture, or with --cpu");
+  throw GlError(std::string("the OpenGL device fails to ") + what + " (error " + std::to_string(error) +
+                "): render a smaller picture");
 }
 
 }  // namespace hpsdf::render

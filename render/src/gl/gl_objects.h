@@ -69,11 +69,11 @@ using GlQuery = GlObject<QueryKind>;
 using GlProgram = GlObject<ProgramKind>;
 
 /// Compiles and links a program of a vertex shader and a fragment shader, each concatenated from files in shaders/.
-/// Throws `Error` with the compiler's log.
+/// Throws `GlError` with the compiler's log.
 GlProgram linkedProgram(std::initializer_list<std::string_view> vertexFiles,
                         std::initializer_list<std::string_view> fragmentFiles);
 
-/// Throws `Error` if OpenGL has reported an error since the last call. `what` completes the sentence "the
+/// Throws `GlError` if OpenGL has reported an error since the last call. `what` completes the sentence "the
 /// OpenGL device fails to".
 void checkGl(const char* what);
 

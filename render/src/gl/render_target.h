@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gl/gl_objects.h"
-#include "hpsdf/error.h"
+#include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
 
 namespace hpsdf::render {
@@ -60,7 +60,7 @@ class RenderTarget {
     glNamedFramebufferTexture(framebuffer_.name(), hasDepth_ ? GL_DEPTH_ATTACHMENT : kColors[1], other_.name(), 0);
     glNamedFramebufferDrawBuffers(framebuffer_.name(), hasDepth_ ? 1 : 2, kColors);
     if (glCheckNamedFramebufferStatus(framebuffer_.name(), GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-      throw Error("the OpenGL device cannot render into 32-bit buffers: update its driver, or render with --cpu");
+      throw GlError("the OpenGL device cannot render into 32-bit buffers: update its driver");
   }
 
   void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }

@@ -11,10 +11,13 @@ namespace hpsdf {
 /// A file that appears whole or not at all. It is written under a temporary name in the same folder, and
 /// `commit` renames it. Until `commit`, an older file of the same name stays unchanged. Without `commit`, the
 /// destructor removes the temporary file.
+///
+/// A symbolic link is followed, also if the file to which it leads does not exist yet: that file is written, in its own
+/// folder, and the link stays.
 class OutputFile {
  public:
   /// Creates the temporary file. Throws `Error` (of the kind `file`) if the folder of `file` does not exist or cannot
-  /// be written, or if `file` exists and is not a regular file.
+  /// be written, if `file` exists and is not a regular file, or if symbolic links lead in a circle.
   explicit OutputFile(const std::filesystem::path& file);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;

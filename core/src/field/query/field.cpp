@@ -131,6 +131,10 @@ void checkBlendAndBounds(const FieldData& data) {
     if (!(bound.error >= 0) || !(bound.slope >= 0)) notAField("a bound is not a number above 0");
 }
 
+void assertNotMovedFrom([[maybe_unused]] const FieldData& field) {
+  assert(!field.nodes.empty() && "the field was moved from");
+}
+
 template <typename Result>
 Result evaluateAt(const FieldData& field, const LookupGrid& lookupGrid, const Vector3& x) {
   if (!contains(lookupGrid.frame, x)) [[unlikely]] {
@@ -204,28 +208,36 @@ FieldBytes Field::bytesOfParts() const {
           .bounds = sizeOf(data_.bounds)};
 }
 
-double Field::value(const Vector3& x) const { return evaluateAt<double>(data_, lookupGrid_, x); }
+double Field::value(const Vector3& x) const {
+  assertNotMovedFrom(data_);
+  return evaluateAt<double>(data_, lookupGrid_, x);
+}
 
 ValueAndGradient Field::valueAndGradient(const Vector3& x) const {
+  assertNotMovedFrom(data_);
   return evaluateAt<ValueAndGradient>(data_, lookupGrid_, x);
 }
 
 void Field::values(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
+  assertNotMovedFrom(data_);
   evaluateBatch(data_, lookupGrid_, points, out);
 }
 
 void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const {
   assert(points.size() == out.size());
+  assertNotMovedFrom(data_);
   evaluateBatch(data_, lookupGrid_, points, out);
 }
 
 Cell Field::cellAt(const Vector3& x) const {
+  assertNotMovedFrom(data_);
   const GridFrame& frame = lookupGrid_.frame;
   return makeCell(data_, frame, findLeafNode(data_, gridPoint(frame, closestInDomain(frame, x))));
 }
 
 void Field::forEachCell(const std::function<void(const Cell&)>& visit) const {
+  assertNotMovedFrom(data_);
   visitNodes(data_, [&](const OctreeNode& at) {
     if (node::isLeaf(data_.nodes[at.node])) visit(makeCell(data_, lookupGrid_.frame, at));
     return true;

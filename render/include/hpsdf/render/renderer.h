@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "hpsdf/error.h"
 #include "hpsdf/field.h"
 #include "hpsdf/render/view.h"
 
@@ -13,6 +14,20 @@ enum class GlChoice : std::uint8_t {
   automatic,  ///< hardware devices, then software devices, then surfaceless Mesa, then the default display
   software,   ///< a software renderer only, such as Mesa's llvmpipe
   hardware,   ///< a hardware device only
+};
+
+/// Thrown if OpenGL cannot draw, because there is no device or the device lacks something. A renderer that works on the
+/// CPU draws the same picture without OpenGL.
+class GlError : public Error {
+ public:
+  /// `problem` tells what is wrong and how OpenGL may be made to draw.
+  explicit GlError(const std::string& problem) : Error(problem + ", or render on the CPU"), problem_(problem) {}
+
+  /// Returns the message with the advice to render by `means`, such as "with --cpu".
+  std::string advising(const std::string& means) const { return problem_ + ", or render " + means; }
+
+ private:
+  std::string problem_;
 };
 
 /// Renders views of one field into buffers. Not thread-safe: use one renderer for each thread.
@@ -37,8 +52,8 @@ class Renderer {
 std::unique_ptr<Renderer> makeCpuRenderer(const Field& field);
 
 /// Makes a renderer that uses OpenGL 4.5 core through EGL, without a window. The field is uploaded once,
-/// with its coefficients as float. Throws `Error`, which names the devices tried, if no device offers
-/// OpenGL 4.5. Throws `Error` if the field is too large for the device.
+/// with its coefficients as float. Throws `GlError`, which names the devices tried, if no device offers
+/// OpenGL 4.5. Throws `GlError` if the field is too large for the device.
 std::unique_ptr<Renderer> makeGlRenderer(const Field& field, GlChoice choice = GlChoice::automatic);
 
 /// The GL_RENDERER string of the device that `choice` selects. Throws as `makeGlRenderer` does.
