@@ -20,7 +20,7 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
-#include "mesh/read/triangulate.h"
+#include "mesh/scan/triangulate.h"
 #include "support/temporary_directory.h"
 #include "support/test_mesh.h"
 

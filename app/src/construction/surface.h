@@ -21,9 +21,8 @@ constexpr std::string_view kAnalytic = "analytic:";
 /// Returns true for the name of a shape, builtin:… or analytic:…, and false for the name of a file.
 bool isShape(std::string_view surface);
 
-/// Reads a mesh file or makes a built-in shape. All commands get their meshes from this function. Files are
-/// read by the console's `meshReader`. Warns if coordinates lose digits because the file reader stores them
-/// as float. Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
+/// Reads a mesh file or makes a built-in shape. All commands get their meshes from this function. The console's
+/// `meshReader` reads files of the formats that assimp reads. Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 /// A surface in the units of the field: a mesh, or a distance in closed form.

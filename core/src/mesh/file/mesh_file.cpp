@@ -16,7 +16,7 @@
 #include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 #include "mesh/read/ply_reader.h"
 #include "mesh/read/read_mesh.h"
 

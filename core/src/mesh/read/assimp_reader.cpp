@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "hpsdf/detail/text.h"
-#include "mesh/read/mesh_builder.h"
-#include "mesh/read/word_text.h"
+#include "mesh/scan/mesh_builder.h"
+#include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {

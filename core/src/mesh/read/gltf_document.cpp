@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "hpsdf/detail/memory.h"
-#include "mesh/read/word_text.h"
+#include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "mesh/read/gltf_json.h"
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 
 namespace hpsdf::mesh {
 

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "mesh/read/gltf_document.h"
-#include "mesh/read/mesh_builder.h"
-#include "mesh/read/word_text.h"
+#include "mesh/scan/mesh_builder.h"
+#include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {

@@ -7,7 +7,7 @@
 #include <system_error>
 #include <utility>
 
-#include "mesh/read/word_text.h"
+#include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 
 namespace hpsdf::mesh {
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/read/mesh_builder.h"
+#include "mesh/scan/mesh_builder.h"
 #include "mesh/read/ply_header.h"
-#include "mesh/read/text_scanner.h"
+#include "mesh/scan/text_scanner.h"
 
 namespace hpsdf::mesh {
 namespace {

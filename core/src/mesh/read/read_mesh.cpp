@@ -8,7 +8,7 @@
 #include "hpsdf/detail/text.h"
 #include "mesh/read/assimp_reader.h"
 #include "mesh/read/gltf_reader.h"
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 #include "mesh/read/obj_reader.h"
 #include "mesh/read/off_reader.h"
 #include "mesh/read/ply_reader.h"

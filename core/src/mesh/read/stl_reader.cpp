@@ -9,9 +9,9 @@
 #include <string_view>
 
 #include "hpsdf/detail/text.h"
-#include "mesh/read/mesh_builder.h"
-#include "mesh/read/text_scanner.h"
-#include "mesh/read/word_text.h"
+#include "mesh/scan/mesh_builder.h"
+#include "mesh/scan/text_scanner.h"
+#include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "hpsdf/triangle_mesh.h"
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 
 namespace hpsdf::mesh {
 

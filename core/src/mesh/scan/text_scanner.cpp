@@ -1,4 +1,4 @@
-#include "mesh/read/text_scanner.h"
+#include "mesh/scan/text_scanner.h"
 
 #include <algorithm>
 #include <charconv>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <system_error>
 
-#include "mesh/read/word_text.h"
+#include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/read/triangulate.h"
+#include "mesh/scan/triangulate.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

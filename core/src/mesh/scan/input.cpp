@@ -1,4 +1,4 @@
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "hpsdf/types.h"
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 
 namespace hpsdf::mesh {
 

@@ -1,4 +1,4 @@
-#include "mesh/read/mesh_builder.h"
+#include "mesh/scan/mesh_builder.h"
 
 #include <algorithm>
 #include <limits>
@@ -6,7 +6,7 @@
 
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/error.h"
-#include "mesh/read/triangulate.h"
+#include "mesh/scan/triangulate.h"
 
 namespace hpsdf::mesh {
 namespace {

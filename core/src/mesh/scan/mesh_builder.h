@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hpsdf/triangle_mesh.h"
-#include "mesh/read/input.h"
+#include "mesh/scan/input.h"
 
 namespace hpsdf::mesh {
 
