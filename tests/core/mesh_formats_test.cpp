@@ -18,7 +18,6 @@
 #include <string_view>
 #include <vector>
 
-#include "hpsdf/detail/mesh_reading.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
 #include "support/temporary_directory.h"
@@ -51,9 +50,7 @@ class MeshFormats : public ::testing::Test {
     return folder_ / name;
   }
 
-  TriangleMesh read(const std::string& name, std::string_view content) const {
-    return detail::readMesh(write(name, content));
-  }
+  TriangleMesh read(const std::string& name, std::string_view content) const { return readMesh(write(name, content)); }
 
   void expectTetrahedron(const std::string& name, std::string_view content) const {
     SCOPED_TRACE(name + ":\n" + std::string(content.substr(0, 300)));
@@ -503,15 +500,15 @@ TEST_F(MeshFormats, readingReportsProgressAndIsCancelled) {
   for (int i = 0; i < 100'000; ++i) text += "v 1 2 3\n";
   const fs::path file = write("t.obj", text);
   std::vector<double> shares;
-  detail::readMesh(file, {.report = [&](std::string_view task, double share) {
-                     EXPECT_EQ(task, "Reading the mesh");
-                     shares.push_back(share);
-                   }});
+  readMesh(file, {.report = [&](std::string_view task, double share) {
+             EXPECT_EQ(task, "Reading the mesh");
+             shares.push_back(share);
+           }});
   EXPECT_GT(shares.size(), 2u);
   EXPECT_TRUE(std::ranges::is_sorted(shares));
   EXPECT_GT(shares.back(), 0.5);
   int calls = 0;
-  EXPECT_THROW(detail::readMesh(file, {.cancelled = [&] { return ++calls > 2; }}), Cancelled);
+  EXPECT_THROW(readMesh(file, {.cancelled = [&] { return ++calls > 2; }}), Cancelled);
 }
 
 TEST_F(MeshFormats, largePolygonsAreCancelled) {
@@ -524,7 +521,7 @@ TEST_F(MeshFormats, largePolygonsAreCancelled) {
   const Progress progress{
       .report = [&](std::string_view task, double) { isTriangulating |= task.starts_with("Triang"); },
       .cancelled = [&] { return isTriangulating; }};
-  EXPECT_THROW(detail::readMesh(write("t.obj", text + face + "\n"), progress), Cancelled);
+  EXPECT_THROW(readMesh(write("t.obj", text + face + "\n"), progress), Cancelled);
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
@@ -665,7 +662,7 @@ TEST_F(GltfFormat, stripsAndFans) {
   write("t.bin", gltf.data);
   MeshFormats::expectTetrahedron("t.gltf", text);
   text.replace(text.find(R"("mode":5)"), 8, R"("mode":6)");
-  EXPECT_THAT(detail::readMesh(write("t.gltf", text)).triangles,
+  EXPECT_THAT(readMesh(write("t.gltf", text)).triangles,
               ElementsAre(Triangle{0, 2, 1}, Triangle{0, 1, 3}));  // the fan's other triangles have equal corners
 }
 

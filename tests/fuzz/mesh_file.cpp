@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <string>
 
-#include "hpsdf/detail/mesh_reading.h"
 #include "target.h"
 
 namespace {
@@ -20,7 +19,7 @@ bool isValid(const TriangleMesh& mesh) {
 
 std::string plyOf(const TriangleMesh& mesh) {
   std::string bytes;
-  detail::writePly(mesh, [&](std::span<const std::byte> piece) {
+  writePly(mesh, [&](std::span<const std::byte> piece) {
     bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
   });
   return bytes;
@@ -30,9 +29,9 @@ std::string plyOf(const TriangleMesh& mesh) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::reads([&] {
-    const TriangleMesh mesh = detail::readMesh(fuzz::fileOf("mesh" HPSDF_MESH_FORMAT, fuzz::textOf(data, size)));
+    const TriangleMesh mesh = readMesh(fuzz::fileOf("mesh" HPSDF_MESH_FORMAT, fuzz::textOf(data, size)));
     fuzz::require(isValid(mesh), "coordinates are finite and indices in range");
-    const TriangleMesh again = detail::readPly(plyOf(mesh), "again.ply");
+    const TriangleMesh again = readPly(plyOf(mesh), "again.ply");
     fuzz::require(again.vertices == mesh.vertices && again.triangles == mesh.triangles, "PLY keeps every bit");
     fuzz::reads([&] { cleaned(mesh); });
   });

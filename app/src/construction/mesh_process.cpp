@@ -26,7 +26,7 @@
 
 #include "files/other_program.h"
 #include "hpsdf/detail/memory.h"
-#include "hpsdf/detail/mesh_reading.h"
+#include "hpsdf/mesh_file.h"
 #include "language/registry.h"
 #include "text/text.h"
 
@@ -121,7 +121,7 @@ class Reading {
     if (answer.starts_with(kRefused)) throw Error(printable(answer.substr(kRefused.size())));
     if (answer.empty()) throw died("it gave no answer");
     try {
-      return detail::readPly(answer, file_.string(), progress_);
+      return readPly(answer, file_.string(), progress_);
     } catch (const Error& error) {
       throw died("its answer was no mesh: " + error.problem());
     }
@@ -265,8 +265,8 @@ int readForOtherProcess(std::span<const std::string> words) {
   if (!seconds || !bytes) return 2;
   confine(*seconds, *bytes);
   try {
-    const TriangleMesh mesh = detail::readMesh(words[1]);
-    detail::writePly(mesh, [](std::span<const std::byte> piece) { toStandardOutput(piece); });
+    const TriangleMesh mesh = readMesh(words[1]);
+    writePly(mesh, [](std::span<const std::byte> piece) { toStandardOutput(piece); });
   } catch (const Error& error) {
     toStandardOutput(std::string(kRefused) + (error.subject() == words[1] ? error.problem() : error.what()));
   } catch (const std::bad_alloc&) {  // Eigen calls malloc directly and bypasses `onMemoryOut`

@@ -1,7 +1,7 @@
 #pragma once
 // Mesh files of the formats that the library assimp reads are read in a separate process, which runs this same program
-// with a hidden command. If a file crashes assimp, or keeps it busy for too long, the only effect is an error message of
-// one line.
+// with a hidden command. If a file crashes assimp, or keeps it busy for too long, the only effect is an error message
+// of one line.
 
 #include <cstdint>
 #include <filesystem>
@@ -27,9 +27,10 @@ ReadingLimits readingLimits(const std::filesystem::path& file);
 /// Returns the path of the running program's executable file, or an empty path if it cannot be found out.
 std::filesystem::path ownProgram();
 
-/// Reads a mesh file in a separate process, as `importMesh` does in this one. The process runs `program`, which must come
-/// from the same build as this program. Throws `Error` naming the file if the file cannot be read, or if the process
-/// dies, answers with something else than a mesh, or exceeds a limit. Throws `Cancelled` on cancellation. When the function returns or throws, the process has ended.
+/// Reads a mesh file in a separate process, as `importMesh` does in this one. The process runs `program`, which must
+/// come from the same build as this program. Throws `Error` naming the file if the file cannot be read, or if the
+/// process dies, answers with something else than a mesh, or exceeds a limit. Throws `Cancelled` on cancellation. When
+/// the function returns or throws, the process has ended.
 ImportedMesh importInSubprocess(const std::filesystem::path& program, const std::filesystem::path& file,
                                 const ReadingLimits& limits, const Progress& progress);
 

@@ -11,7 +11,7 @@
 #include "construction/mesh_process.h"
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/memory.h"
-#include "hpsdf/detail/mesh_reading.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
 #include "text/text.h"
 
@@ -39,7 +39,7 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
 
 ImportedMesh readFile(const Console& console, const std::string& file) {
   return withProgress(console, [&](const Progress& progress) {
-    if (console.meshReader.empty() || !detail::isReadByAssimp(file)) return importMesh(file, progress);
+    if (console.meshReader.empty() || !isReadByAssimp(file)) return importMesh(file, progress);
     return importInSubprocess(console.meshReader, file, readingLimits(file), progress);
   });
 }

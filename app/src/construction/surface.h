@@ -22,7 +22,8 @@ constexpr std::string_view kAnalytic = "analytic:";
 bool isShape(std::string_view surface);
 
 /// Reads a mesh file or makes a built-in shape. All commands get their meshes from this function. The console's
-/// `meshReader` reads files of the formats that assimp reads. Throws `Error`, also for an analytic shape, and `Cancelled` after Ctrl-C.
+/// `meshReader` reads files of the formats that assimp reads. Throws `Error`, also for an analytic shape, and
+/// `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 /// A surface in the units of the field: a mesh, or a distance in closed form.

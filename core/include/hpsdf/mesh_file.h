@@ -1,7 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_report.h"
@@ -38,6 +42,15 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// so.
 ImportedMesh importMesh(const std::filesystem::path& file, const Progress& progress = {});
 
+/// Reads a mesh file as `importMesh` does, but does not clean the mesh. The mesh has the name `file`.
+TriangleMesh readMesh(const std::filesystem::path& file, const Progress& progress = {});
+
+/// Reads a mesh from the bytes of a PLY file, and does not clean it. `name` names it in errors.
+TriangleMesh readPly(std::string_view bytes, const std::string& name, const Progress& progress = {});
+
+/// Returns true if the library assimp reads files of this name. A damaged file can crash it.
+bool isReadByAssimp(const std::filesystem::path& file);
+
 /// Tells whether a file's name ends as the names of mesh files that `importMesh` reads.
 bool isMeshFileName(const std::filesystem::path& file);
 
@@ -49,6 +62,9 @@ TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress =
 /// The file appears whole or not at all. Throws `Error` (of the kind `file`) for another extension, and as `OutputFile`
 /// does.
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file);
+
+/// Passes the bytes of a binary PLY file with this mesh to `write`, in pieces. Allocates less than 100 kB.
+void writePly(const TriangleMesh& mesh, const std::function<void(std::span<const std::byte>)>& write);
 
 /// Throws the `Error` that `saveMesh` would throw for this file, as far as it can be foreseen. A caller thus learns
 /// before long work that it could not write the file.

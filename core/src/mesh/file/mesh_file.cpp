@@ -11,14 +11,13 @@
 #include <utility>
 #include <vector>
 
-#include "hpsdf/detail/mesh_reading.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/detail/text.h"
 #include "hpsdf/error.h"
 #include "hpsdf/shapes.h"
-#include "mesh/scan/input.h"
 #include "mesh/read/ply_reader.h"
 #include "mesh/read/read_mesh.h"
+#include "mesh/scan/input.h"
 
 namespace hpsdf {
 namespace {
@@ -92,11 +91,9 @@ void checkMeshWritable(const std::filesystem::path& file) {
 void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
   const bool ply = isPly(file);
   OutputFile out(file);
-  ply ? detail::writePly(mesh, [&](std::span<const std::byte> bytes) { out.write(bytes); }) : writeObj(mesh, out);
+  ply ? writePly(mesh, [&](std::span<const std::byte> bytes) { out.write(bytes); }) : writeObj(mesh, out);
   out.commit();
 }
-
-namespace detail {
 
 bool isReadByAssimp(const fs::path& file) { return mesh::isReadByAssimp(file); }
 
@@ -128,5 +125,4 @@ void writePly(const TriangleMesh& mesh, const std::function<void(std::span<const
   write(faces);
 }
 
-}  // namespace detail
 }  // namespace hpsdf

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/scan/mesh_builder.h"
 #include "mesh/read/ply_header.h"
+#include "mesh/scan/mesh_builder.h"
 #include "mesh/scan/text_scanner.h"
 
 namespace hpsdf::mesh {

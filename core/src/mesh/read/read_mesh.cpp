@@ -8,11 +8,11 @@
 #include "hpsdf/detail/text.h"
 #include "mesh/read/assimp_reader.h"
 #include "mesh/read/gltf_reader.h"
-#include "mesh/scan/input.h"
 #include "mesh/read/obj_reader.h"
 #include "mesh/read/off_reader.h"
 #include "mesh/read/ply_reader.h"
 #include "mesh/read/stl_reader.h"
+#include "mesh/scan/input.h"
 
 namespace hpsdf::mesh {
 namespace {
