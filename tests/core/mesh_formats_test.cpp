@@ -207,6 +207,13 @@ TEST_F(MeshFormats, plyLinesMayHoldMoreThanTheirElement) {
                     ply(header, "5 6 7 0 0 1\n6 6 7\n5 8 7\n5 6 10\n3 0 2 1 255 0 0\n3 0\n1 3\n3 0 3 2\n3 1 2 3\n"));
 }
 
+TEST_F(MeshFormats, plyIndicesMayBeFloats) {
+  const std::string header = "element vertex 4\n" + kXyz + "element face 4\nproperty list uchar float vertex_indices\n";
+  expectTetrahedron("t.ply", ply(header, "5 6 7\n6 6 7\n5 8 7\n5 6 10\n3 0.0 2 1\n3 0 1 3.0\n3 0 3 2\n3 1e0 2 3\n"));
+  EXPECT_THAT(errorOf("t.ply", ply(header, "5 6 7\n6 6 7\n5 8 7\n5 6 10\n3 0.5 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")),
+              HasSubstr("an index is no whole number"));
+}
+
 TEST_F(MeshFormats, plyHeadersAreChecked) {
   const auto error = [&](const std::string& header) { return errorOf("t.ply", header); };
   EXPECT_THAT(error("plyx\n"), HasSubstr("line 1: a PLY file begins with the line 'ply'"));
@@ -255,8 +262,8 @@ TEST_F(MeshFormats, offKeywordsWithMoreThanCoordinates) {
   expectTetrahedron("t.off", "NCOFF 4 4 6\n5 6 7 0 1\n6 6 7 0 1\n5 8 7 0 1\n5 6 10 0 1\n" + kOffFaces);
   expectTetrahedron("t.off", "OFF\n4 4 6\n" + kOffVertices +
                                  "3 0 2 1 255 0 0\n3 0 1 3 0.5 0.5 0.5 1\n3 0 3 2 7\n3 1 2 3 # no colour\n");
-  EXPECT_THAT(errorOf("t.off", "OFF 1 0 0\n5 6 7 255 0 0\n"),
-              HasSubstr("line 2: more numbers than the coordinates of the vertices"));
+  const std::string colours = "5 6 7 255 0 0 255\n6 6 7 0 0 0 0\n5 8 7 1 1 1 1\n5 6 10 1 1 1 1\n";
+  EXPECT_THAT(errorOf("t.off", "OFF 4 4 6\n" + colours + kOffFaces), HasSubstr("line 4: face 2 refers to vertex 9"));
   EXPECT_THAT(errorOf("t.off", "4OFF 1 0 0\n5 6 7 1\n"), HasSubstr("'4OFF' has vertices of another dimension than 3"));
   EXPECT_THAT(errorOf("t.off", "OFF BINARY\n"), HasSubstr("binary OFF files are not read"));
   EXPECT_THAT(errorOf("t.off", "CUBE\n8 6 12\n"), HasSubstr("line 1: expected 'OFF'"));
@@ -298,6 +305,8 @@ TEST_F(MeshFormats, objIsReadHoweverItIsWritten) {
                     "o a\ng b c\nmtllib x.mtl\nusemtl y\ns off\nv 5 6 7 1.0\nv 6 6 7 0.5 0.5 0.5\nv 5 8 7\nv 5 6 10\n" +
                         kObjFaces + "l 1 2\np 1\ncurv 0 1 1 2\nvp 1 2\ncstype rat bspline\n");
   expectTetrahedron("t.obj", kObjFaces + kObjVertices);  // faces may refer to later vertices
+  expectTetrahedron("t.obj", kObjVertices + "g a \\\nf 1 2 3\n# a comment ends with its line \\\n" + kObjFaces + "\\");
+  expectTetrahedron("t.obj", kObjVertices + "f 0001 03 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
   expectTetrahedron("t.obj", "v +5 6.0 7e0\nv 6 .6e1 7.\nv 5 8 7\nv 5 6 10\n" + kObjFaces);
 }
 
@@ -326,6 +335,9 @@ TEST_F(MeshFormats, objErrorsNameTheLine) {
   EXPECT_THAT(errorOf("t.obj", "v 1 2 3,5\n"), HasSubstr("line 1: expected a number, found '3,5'"));
   EXPECT_THAT(errorOf("t.obj", "\xff\xfev\0 \0"), HasSubstr("the text is UTF-16"));
   EXPECT_THAT(errorOf("t.obj", "v 1 2 " + std::string(5000, '7') + "\n"), HasSubstr("line 1: "));
+  EXPECT_THAT(errorOf("t.obj", "v 1. 2 1." + std::string(300'000, '0') + "\n"), HasSubstr("line 1: "));
+  EXPECT_THAT(errorOf("t.obj", kObjVertices + "f 1 2 9999999999999999999\n"),
+              HasSubstr("line 5: expected a whole number"));
 }
 
 // ---------------------------------------------------------------------------------------------------------------------
@@ -367,6 +379,7 @@ TEST_F(MeshFormats, stlTextAndBinary) {
   expectTetrahedron("t.stl", upper);
   expectTetrahedron("t.stl", stlBinary("made by hand"));
   expectTetrahedron("t.stl", stlBinary("solid made by a CAD system"));
+  expectTetrahedron("t.stl", stlText(std::string(10'000, 'n')));
   expectTetrahedron("t.stl", stlBinary(std::string("solid facet normal\0", 19)));
   std::string two = stlText();
   two.insert(two.find("  facet", two.size() / 2), "endsolid t\nsolid u\n");
@@ -437,7 +450,7 @@ TEST_F(MeshFormats, numbersThatDoNotFit) {
   EXPECT_EQ(read("t.obj", "v 1e-400 -1e-400 4.9e-324\n").vertices[0], Vector3(0, 0, 4.9406564584124654e-324));
   EXPECT_EQ(read("t.obj", "v 1.7976931348623157e308 0.1e309 0\n").vertices[0],
             Vector3(1.7976931348623157e308, 1e308, 0));
-  for (const std::string bad : {"1e400", "-1e309", "nan", "inf", "0x1p3", "1e", "--1", "1_000", "1.2.3"})
+  for (const std::string bad : {"1e400", "-1e309", "nan", "inf", "0x1p3", "1e", "--1", "+-1", "1_000", "1.2.3"})
     EXPECT_THAT(errorOf("t.obj", "v 1 " + bad + " 2\n"), AllOf(HasSubstr("line 1: "), HasSubstr("'" + bad + "'")))
         << bad;
 }
@@ -465,6 +478,7 @@ TEST_F(MeshFormats, compressedFiles) {
   expectTetrahedron("T.PLY.GZ", gzipped(ply(header, kPlyText)));
   expectTetrahedron("t.stl.gz", gzipped(stlText()));
   expectTetrahedron("t.stl.gz", gzipped(stlBinary("made by hand")));
+  expectTetrahedron("t.stl.gz", gzipped(stlBinary("solid facet")));
   expectTetrahedron("t.off.gz", gzipped("OFF 4 4 6\n" + kOffVertices + kOffFaces));
   EXPECT_THAT(errorOf("t.stl.gz", gzipped(stlBinary("made by hand").substr(0, 200))),
               HasSubstr("the file ends at face 3 of 4"));
@@ -650,6 +664,20 @@ TEST_F(GltfFormat, skinsAreLeftOut) {
   expectTetrahedron(gltf);
 }
 
+/// Quaternions may differ from unit length by rounding, for instance as normalized bytes.
+TEST_F(GltfFormat, rotationsKeepVolumes) {
+  Gltf gltf;
+  for (int i = 0; i < 4; ++i) append(gltf.data, std::int8_t{64});
+  gltf.moreViews = R"(,{"buffer":0,"byteOffset":72,"byteLength":4})";
+  gltf.moreAccessors = R"(,{"bufferView":2,"componentType":5120,"normalized":true,"count":1,"type":"VEC4"})";
+  gltf.nodes = R"({"mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"ROTATION":2}}}})";
+  EXPECT_NEAR(import(gltf).report.volume, 1, 1e-12);
+  gltf.nodes = R"({"mesh":0,"rotation":[0.6,0.6,0.6,0.6]})";
+  EXPECT_NEAR(import(gltf).report.volume, 1, 1e-12);
+  gltf.nodes = R"({"mesh":0,"rotation":[0,0,0,0]})";
+  EXPECT_THAT(errorOf(gltf), HasSubstr("nodes[0] has a rotation by a quaternion of length 0"));
+}
+
 TEST_F(GltfFormat, stripsAndFans) {
   // The strip 0 2 1 3 0 2 has the faces 021, 123, 130 and 302, each turned as the tetrahedron's.
   Gltf gltf;
@@ -698,19 +726,51 @@ TEST_F(GltfFormat, damagedFiles) {
               HasSubstr("its JSON cannot be read"));
   EXPECT_THAT(with([](Gltf& g) { g.nodes = R"({"mesh":0,"scale":[1e308,1e308,1e308]})"; }),
               HasSubstr("is not a finite number"));
+  const auto withIndices = [&](const std::string& accessor) {
+    Gltf gltf;
+    std::string text = gltf.text();
+    const std::string old = R"("componentType":5123,"count":12)";
+    text.replace(text.find(old), old.size(), accessor);
+    write("t.bin", gltf.data);
+    return MeshFormats::errorOf("t.gltf", text);
+  };
+  EXPECT_THAT(withIndices(R"("componentType":5123,"count":11)"), HasSubstr("has 11 corners, no multiple of three"));
+  EXPECT_THAT(withIndices(R"("componentType":5126,"count":6)"), HasSubstr("has a type of numbers that are no indices"));
+  EXPECT_THAT(withIndices(R"("componentType":5123,"normalized":true,"count":12)"), HasSubstr("that are no indices"));
   EXPECT_THAT(MeshFormats::errorOf("deep.gltf", std::string(200'000, '[')), HasSubstr("its JSON cannot be read"));
   EXPECT_THAT(MeshFormats::errorOf("t.gltf", R"({"asset":{"version":"1.0"}})"),
               HasSubstr("asset has a version other than 2.0"));
   Gltf elsewhere;
   std::string text = elsewhere.text();
-  text.replace(text.find("t%2Ebin"), 7, "https://example.org/t.bin");
-  EXPECT_THAT(MeshFormats::errorOf("t.gltf", text), HasSubstr("buffers[0] lies elsewhere"));
+  for (const char* other : {"https://example.org/t.bin", "/etc/hostname", "../t.bin", "a/%2E%2E/../t.bin"}) {
+    std::string changed = text;
+    changed.replace(changed.find("t%2Ebin"), 7, other);
+    EXPECT_THAT(MeshFormats::errorOf("t.gltf", changed), HasSubstr("buffers[0] lies elsewhere")) << other;
+  }
   std::string glb = "glTF";
   for (const std::uint32_t word : {1u, 12u}) append(glb, word);
   EXPECT_THAT(MeshFormats::errorOf("t.glb", glb), HasSubstr("a binary glTF file of version 1"));
   glb = "glTF";
   for (const std::uint32_t word : {2u, 1000u}) append(glb, word);
   EXPECT_THAT(MeshFormats::errorOf("t.glb", glb), HasSubstr("it promises 1000 bytes, but has only 12"));
+}
+
+TEST_F(GltfFormat, optionalExtensionsAreLeftOut) {
+  Gltf gltf;
+  std::string text = gltf.text();
+  text.replace(text.find(R"("byteLength":48)"), 15, R"("byteLength":48,"extensions":{"EXT_meshopt_compression":{}})");
+  write("t.bin", gltf.data);
+  MeshFormats::expectTetrahedron("t.gltf", text);
+}
+
+/// Bytes that begin like those of gzip are no compressed file if the name does not say so.
+TEST_F(GltfFormat, buffersMayBeginLikeCompressedFiles) {
+  Gltf gltf;
+  const std::uint32_t bits = 0x00008b1f;  // a denormal float
+  std::string first;
+  append(first, bits);
+  gltf.data.replace(0, 4, first);
+  EXPECT_EQ(import(gltf).mesh.vertices[0].x(), double{std::bit_cast<float>(bits)});
 }
 
 TEST_F(GltfFormat, buffersAsBase64) {
@@ -725,6 +785,10 @@ TEST_F(GltfFormat, buffersAsBase64) {
   std::string text = gltf.text();
   text.replace(text.find("t%2Ebin"), 7, "data:application/octet-stream;base64," + base64);
   MeshFormats::expectTetrahedron("t.gltf", text);
+  std::string escaped = text;
+  escaped.replace(escaped.find("data:"), 5, "DATA:");
+  escaped.replace(escaped.find("AAA"), 3, "A%41A");
+  MeshFormats::expectTetrahedron("t.gltf", escaped);
   text[text.find(";base64,") + 9] = '?';
   EXPECT_THAT(MeshFormats::errorOf("t.gltf", text), HasSubstr("buffers[0] has data that are not base64"));
 }

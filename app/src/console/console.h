@@ -41,8 +41,8 @@ struct Console {
   std::ostream& err;             ///< progress, notes and warnings
   bool redrawsProgress = false;  ///< true if `err` is a terminal, where a progress line can be redrawn
   WorkListener* listener = nullptr;
-  /// Program that reads mesh files of assimp's formats in a separate process (mesh_process.h). If it is empty, this
-  /// process reads them itself.
+  /// Program that reads mesh files in a separate process if assimp or Draco take part (mesh_process.h). If it is empty,
+  /// this process reads them itself.
   std::filesystem::path meshReader = {};
   std::string work = {};  ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
 };

@@ -1,7 +1,7 @@
 #pragma once
-// Mesh files of the formats that the library assimp reads are read in a separate process, which runs this same program
-// with a hidden command. If a file crashes assimp, or keeps it busy for too long, the only effect is an error message
-// of one line.
+// Mesh files that the libraries assimp or Draco take part in reading are read in a separate process, which runs this
+// same program with a hidden command. If a file crashes a library, or keeps it busy for too long, the only effect is an
+// error message of one line.
 
 #include <cstdint>
 #include <filesystem>

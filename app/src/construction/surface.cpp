@@ -39,7 +39,7 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
 
 ImportedMesh readFile(const Console& console, const std::string& file) {
   return withProgress(console, [&](const Progress& progress) {
-    if (console.meshReader.empty() || !isReadByAssimp(file)) return importMesh(file, progress);
+    if (console.meshReader.empty() || !isReadByOthers(file)) return importMesh(file, progress);
     return importInSubprocess(console.meshReader, file, readingLimits(file), progress);
   });
 }

@@ -22,7 +22,7 @@ constexpr std::string_view kAnalytic = "analytic:";
 bool isShape(std::string_view surface);
 
 /// Reads a mesh file or makes a built-in shape. All commands get their meshes from this function. The console's
-/// `meshReader` reads files of the formats that assimp reads. Throws `Error`, also for an analytic shape, and
+/// `meshReader` reads files that assimp or Draco take part in reading. Throws `Error`, also for an analytic shape, and
 /// `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 

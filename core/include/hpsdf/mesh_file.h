@@ -31,9 +31,9 @@ ImportedMesh cleaned(TriangleMesh mesh);
 /// `.glb`), whose meshes are joined under their node transforms; and 3DS. Coordinates keep all digits that the file
 /// has.
 ///
-/// 3DS files are read by the library assimp, in the caller's process and without a limit of time or memory. A damaged
-/// file can crash assimp or keep it busy for minutes. Read untrusted 3DS files in a subprocess, as the program `hpsdf`
-/// does.
+/// 3DS files are read by the library assimp, and meshes in glTF files that Draco has compressed by its library, in the
+/// caller's process and without a limit of time or memory. A damaged file can crash these libraries, or keep them busy
+/// for minutes. Read untrusted files of these kinds (`isReadByOthers`) in a subprocess, as the program `hpsdf` does.
 ///
 /// Throws `Error` (of the kind `file` or `mesh`, with the subject `file`) for a file that is missing, a folder,
 /// unreadable, empty or not a mesh; that holds less or more than its header promises; with indices out of range or
@@ -48,8 +48,9 @@ TriangleMesh readMesh(const std::filesystem::path& file, const Progress& progres
 /// Reads a mesh from the bytes of a PLY file, and does not clean it. `name` names it in errors.
 TriangleMesh readPly(std::string_view bytes, const std::string& name, const Progress& progress = {});
 
-/// Returns true if the library assimp reads files of this name. A damaged file can crash it.
-bool isReadByAssimp(const std::filesystem::path& file);
+/// Returns true if a library that a damaged file can crash, or keep busy for minutes, takes part in reading this file:
+/// assimp for 3DS, or Draco for glTF files that name its extension. Returns false for a file that cannot be read.
+bool isReadByOthers(const std::filesystem::path& file);
 
 /// Tells whether a file's name ends as the names of mesh files that `importMesh` reads.
 bool isMeshFileName(const std::filesystem::path& file);

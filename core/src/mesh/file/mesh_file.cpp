@@ -95,7 +95,7 @@ void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
   out.commit();
 }
 
-bool isReadByAssimp(const fs::path& file) { return mesh::isReadByAssimp(file); }
+bool isReadByOthers(const fs::path& file) { return mesh::isReadByOthers(file); }
 
 TriangleMesh readMesh(const fs::path& file, const Progress& progress) { return mesh::readMesh(file, progress); }
 

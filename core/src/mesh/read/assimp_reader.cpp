@@ -65,9 +65,9 @@ void addPart(MeshBuilder& builder, const Input& input, const aiMesh& part, const
 TriangleMesh readByAssimp(Input& input) {
   Assimp::Importer importer;
   const aiScene& scene = readScene(importer, input);
-  Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
   // Undo assimp's rotation of 3DS scenes from z-up to y-up, to restore the coordinates of the file.
-  if (lowerExtension(input.file()) == ".3ds") worldFromRoot.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
+  worldFromRoot.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   MeshBuilder builder(input);
   std::vector<std::pair<const aiNode*, Eigen::Affine3d>> pending = {{scene.mRootNode, worldFromRoot}};
   while (!pending.empty()) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/text.h"
 #include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
@@ -19,7 +20,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "glTF files are little-endian");
 
 /// Extensions that change the geometry and that this reader knows.
-constexpr std::array<std::string_view, 3> kGeometryExtensions = {"KHR_mesh_quantization", "KHR_draco_mesh_compression",
+constexpr std::string_view kDracoExtension = "KHR_draco_mesh_compression";
+constexpr std::array<std::string_view, 3> kGeometryExtensions = {"KHR_mesh_quantization", kDracoExtension,
                                                                  "EXT_mesh_gpu_instancing"};
 
 /// Beginnings of the names of extensions that leave the geometry as it is: materials, textures, lights, metadata.
@@ -45,9 +47,10 @@ std::vector<std::byte> readBytes(Input& input, std::uint64_t count) {
   return bytes;
 }
 
-/// Reads all that is left of a file.
+/// Reads all that is left of a file, which has the JSON.
 std::vector<std::byte> readRest(Input& input) {
   std::vector<std::byte> bytes;
+  bytes.reserve(input.mostLeft());
   while (input.ensure(1)) {
     const auto part = std::as_bytes(std::span(input.rest()));
     bytes.insert(bytes.end(), part.begin(), part.end());
@@ -143,6 +146,13 @@ ComponentType componentType(const GltfValue& object) {
   }
 }
 
+/// Throws `Error` if the components are not unsigned whole numbers.
+void requireIndexType(const GltfValue& object) {
+  const std::uint64_t type = object.whole("componentType");
+  if ((type != 5121 && type != 5123 && type != 5125) || object.flag("normalized"))
+    object.refuse("has a type of numbers that are no indices");
+}
+
 std::size_t componentsOf(const GltfValue& accessor) {
   constexpr std::array<std::pair<std::string_view, std::size_t>, 7> kTypes = {
       {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}}};
@@ -179,14 +189,17 @@ GltfDocument::GltfDocument(Input& input) : file_(input.file().string()), progres
 
 GltfDocument::~GltfDocument() = default;
 
-void GltfDocument::parse(const std::vector<std::byte>& text) {
-  const char* const begin = reinterpret_cast<const char*>(text.data());
+void GltfDocument::parse(const std::vector<std::byte>& bytes) {
+  constexpr double kBytesAByte = 40;  // An empty array of two characters takes about 80 bytes.
+  requireMemory("the JSON of a glTF file", kBytesAByte * double(bytes.size()), "simplify the mesh first");
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  namesDraco_ = text.find(kDracoExtension) != text.npos;
   nlohmann::json json;
   try {
-    json = nlohmann::json::parse(begin, begin + text.size());
-  } catch (const nlohmann::json::exception& error) {
+    json = nlohmann::json::parse(text);
+  } catch (const nlohmann::json::parse_error& error) {
     throw Error(ErrorKind::file, file_,
-                "its JSON cannot be read (" + std::string(error.what()).substr(0, 200) + "); check or export it again");
+                "its JSON cannot be read (byte " + std::to_string(error.byte) + "); check or export it again");
   }
   json_ = std::make_unique<const nlohmann::json>(std::move(json));
 }
@@ -209,6 +222,8 @@ void GltfDocument::readGlb(Input& input) {
     if (type == kBinary && chunk == 1) binary_ = std::move(content);
   }
   if (!json_) input.refuse("it has no JSON; check or export it again");
+  if (input.offset() != length || input.ensure(1))
+    input.refuse("the file goes on behind the parts that it promises; check or export it again");
 }
 
 GltfValue GltfDocument::root() const { return {*json_, file_}; }
@@ -231,20 +246,22 @@ void GltfDocument::requireKnownExtensions() const {
 std::vector<std::byte> GltfDocument::bufferFile(const GltfValue& buffer, const std::string& uri,
                                                 std::uint64_t bytes) const {
   constexpr std::string_view kBase64 = ";base64,";
-  if (uri.starts_with("data:")) {
-    const std::size_t begin = uri.find(kBase64);
-    auto decoded = begin == uri.npos ? std::nullopt : fromBase64(std::string_view(uri).substr(begin + kBase64.size()));
+  if (lowerCase(uri.substr(0, 5)) == "data:") {
+    const std::string data = fromPercent(uri);
+    const std::size_t begin = data.find(kBase64);
+    auto decoded =
+        begin == data.npos ? std::nullopt : fromBase64(std::string_view(data).substr(begin + kBase64.size()));
     if (!decoded) buffer.refuse("has data that are not base64");
     return std::move(*decoded);
   }
-  if (uri.find("://") != uri.npos)
-    buffer.refuse("lies elsewhere ('" + wordText(uri) + "'): only files beside it are read");
-  const std::filesystem::path file = std::filesystem::path(file_).parent_path() / fromPercent(uri);
+  const std::filesystem::path path = fromPercent(uri);
+  if (uri.find("://") != uri.npos || path.is_absolute() || std::ranges::find(path, "..") != path.end())
+    buffer.refuse("lies elsewhere ('" + wordText(uri) + "'): only files in the folder of the glTF file are read");
   try {
-    Input input(file, progress_);
+    Input input(std::filesystem::path(file_).parent_path() / path, progress_);
     return readBytes(input, bytes);
   } catch (const Error& error) {
-    buffer.refuse("cannot be read (" + std::string(error.what()) + ")");
+    throw Error(ErrorKind::file, file_, "its buffer '" + wordText(uri) + "': " + error.problem());
   }
 }
 
@@ -253,17 +270,25 @@ std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
   const std::uint64_t bytes = object.whole("byteLength");
   const bool isBinary = index == 0 && !object.has("uri");
   if (isBinary && binary_.empty()) object.refuse("has no uri, and the file has no binary chunk");
-  if (!isBinary && !buffers_.contains(index)) buffers_[index] = bufferFile(object, object.text("uri"), bytes);
+  if (!isBinary && !buffers_.contains(index)) {
+    requireMemory("the buffers of a glTF file", double(bufferBytes_) + double(bytes), "simplify the mesh first");
+    buffers_[index] = bufferFile(object, object.text("uri"), bytes);
+    bufferBytes_ += buffers_[index].size();
+  }
   const std::vector<std::byte>& content = isBinary ? binary_ : buffers_.at(index);
   if (bytes > content.size())
     object.refuse("promises " + std::to_string(bytes) + " bytes, but has only " + std::to_string(content.size()));
   return std::span(content).first(bytes);
 }
 
+/// Returns the bytes of the file and of all its buffers.
+std::uint64_t GltfDocument::allBytes() {
+  for (std::size_t index = 0; index < root().size("buffers"); ++index) buffer(index);
+  return fileBytes_ + bufferBytes_;
+}
+
 std::span<const std::byte> GltfDocument::view(std::uint64_t index) {
   const GltfValue object = item("bufferViews", index);
-  if (object.has("extensions") && object.get("extensions").has("EXT_meshopt_compression"))
-    object.refuse("is compressed by EXT_meshopt_compression, which is not known");
   const std::span<const std::byte> bytes = buffer(object.whole("buffer"));
   const std::uint64_t offset = object.whole("byteOffset", 0), length = object.whole("byteLength");
   if (offset > bytes.size() || length > bytes.size() - offset) object.refuse("reaches beyond the end of its buffer");
@@ -283,8 +308,8 @@ std::vector<double> GltfDocument::numbers(std::uint64_t accessor, std::size_t co
     stride = view.whole("byteStride", size);
     if (stride < size) view.refuse("has a byteStride below the size of its elements");
     bytes = partOf(object, this->view(object.whole("bufferView")), object.whole("byteOffset", 0), count, size, stride);
-  } else if (count > fileBytes_) {
-    object.refuse("has no buffer view, and promises more elements than the file has bytes");
+  } else if (count > allBytes()) {
+    object.refuse("has no buffer view, and promises more elements than the file and its buffers have bytes");
   }
   requireMemory("the mesh", double(count) * double(components) * sizeof(double), "simplify the mesh first");
   std::vector<double> numbers(count * components);
@@ -295,10 +320,16 @@ std::vector<double> GltfDocument::numbers(std::uint64_t accessor, std::size_t co
   return numbers;
 }
 
+std::vector<double> GltfDocument::indices(std::uint64_t accessor) {
+  requireIndexType(item("accessors", accessor));
+  return numbers(accessor, 1);
+}
+
 /// Replaces the elements of an accessor that its member `sparse` names.
 void GltfDocument::putSparse(const GltfValue& accessor, std::size_t components, std::vector<double>& numbers) {
   const GltfValue sparse = accessor.get("sparse"), indices = sparse.get("indices"), values = sparse.get("values");
   const std::uint64_t count = sparse.whole("count");
+  requireIndexType(indices);
   const ComponentType indexType = componentType(indices), type = componentType(accessor);
   const std::size_t size = type.size * components;
   const auto where = partOf(indices, view(indices.whole("bufferView")), indices.whole("byteOffset", 0), count,

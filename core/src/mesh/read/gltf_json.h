@@ -17,7 +17,6 @@ class GltfValue {
   /// Takes the root of the JSON. `file` names the file in errors.
   GltfValue(const nlohmann::json& json, const std::string& file) : json_(&json), file_(&file) {}
 
-  const std::string& name() const { return name_; }
   bool has(const char* member) const;
   GltfValue get(const char* member) const;  ///< a member, which must exist
 

@@ -47,11 +47,7 @@ std::vector<Vector3> vectorsOf(const std::vector<double>& numbers) {
 std::vector<std::uint32_t> trianglesOf(const std::vector<std::uint32_t>& indices, std::uint64_t mode) {
   enum : std::uint64_t { kTriangles = 4, kStrip = 5 };
   std::vector<std::uint32_t> corners;
-  if (mode == kTriangles) {
-    corners = indices;
-    corners.resize(corners.size() / 3 * 3);
-    return corners;
-  }
+  if (mode == kTriangles) return indices;
   for (std::size_t i = 2; i < indices.size(); ++i) {
     const bool isStrip = mode == kStrip, isTurned = isStrip && i % 2 == 1;
     const std::uint32_t a = isStrip ? indices[i - 2] : indices[0], b = indices[i - 1], c = indices[i];
@@ -62,6 +58,7 @@ std::vector<std::uint32_t> trianglesOf(const std::vector<std::uint32_t>& indices
 }
 
 Primitive decodeDraco(GltfDocument& document, const GltfValue& compressed) {
+  if (!document.namesDraco()) compressed.refuse("is an extension whose name is written with escaped letters");
   const auto bytes = document.view(compressed.whole("bufferView"));
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -86,6 +83,14 @@ Primitive decodeDraco(GltfDocument& document, const GltfValue& compressed) {
   return primitive;
 }
 
+/// Returns the rotation of a quaternion x, y, z, w, whose length may differ from 1 by rounding. `object` is named in
+/// errors.
+Eigen::Quaterniond rotationOf(const GltfValue& object, const double* q) {
+  const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
+  if (!(rotation.norm() > 0)) object.refuse("has a rotation by a quaternion of length 0");
+  return rotation.normalized();
+}
+
 /// Returns the transform of a node relative to its parent.
 Transform transformOf(const GltfValue& node) {
   Transform transform = Transform::Identity();
@@ -95,8 +100,7 @@ Transform transformOf(const GltfValue& node) {
   }
   if (node.has("translation")) transform.translate(Vector3(node.get("translation").numbers(3).data()));
   if (node.has("rotation")) {
-    const std::vector<double> q = node.get("rotation").numbers(4);
-    transform.rotate(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
+    transform.rotate(rotationOf(node, node.get("rotation").numbers(4).data()));
   }
   if (node.has("scale")) transform.scale(Vector3(node.get("scale").numbers(3).data()));
   return transform;
@@ -174,10 +178,7 @@ class GltfReader {
     std::vector<Transform> instances(count, Transform::Identity());
     for (std::size_t i = 0; i < count; ++i) {
       if (!translations.empty()) instances[i].translate(translations[i]);
-      if (!rotations.empty()) {
-        const double* const q = &rotations[4 * i];
-        instances[i].rotate(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
-      }
+      if (!rotations.empty()) instances[i].rotate(rotationOf(attributes, &rotations[4 * i]));
       if (!scales.empty()) instances[i].scale(scales[i]);
     }
     return instances;
@@ -206,7 +207,10 @@ class GltfReader {
     if (!added.contains(accessor))
       added[accessor] = addVertices(primitive, vectorsOf(document_.numbers(accessor, 3)), worldFromMesh);
     const AddedVertices vertices = added.at(accessor);
-    addTriangles(primitive, trianglesOf(indicesOf(primitive, vertices.count), mode), vertices, worldFromMesh);
+    const std::vector<std::uint32_t> indices = indicesOf(primitive, vertices.count);
+    if (mode == kTriangles && indices.size() % 3 != 0)
+      primitive.refuse("has " + std::to_string(indices.size()) + " corners, no multiple of three");
+    addTriangles(primitive, trianglesOf(indices, mode), vertices, worldFromMesh);
   }
 
   std::vector<std::uint32_t> indicesOf(const GltfValue& primitive, std::size_t vertices) {
@@ -216,7 +220,7 @@ class GltfReader {
       std::iota(indices.begin(), indices.end(), 0);
       return indices;
     }
-    for (const double index : document_.numbers(primitive.whole("indices"), 1)) {
+    for (const double index : document_.indices(primitive.whole("indices"))) {
       if (!(index >= 0 && index < double(vertices))) refuseIndex(primitive, index, vertices);
       indices.push_back(std::uint32_t(index));
     }

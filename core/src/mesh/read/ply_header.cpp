@@ -42,7 +42,7 @@ class HeaderLines {
     input_.ensure(kLongest);
     const std::string_view rest = input_.rest();
     const std::size_t end = rest.find_first_of("\r\n");
-    if (end == rest.npos) input_.refuse("its header does not end; check or export the file again");
+    if (end == rest.npos) input_.refuse("its header, or a line of it, does not end; check or export the file again");
     ++number_;
     const bool isPair = rest.substr(end).starts_with("\r\n");
     if (number_ == 1) endsByReturn_ = rest[end] == '\r' && !isPair;
@@ -145,6 +145,8 @@ PlyHeader readPlyHeader(Input& input) {
       header.format = formatOf(words, lines);
       hasFormat = true;
     } else if (words[0] == "element") {
+      constexpr std::size_t kMostElements = 1000;
+      if (header.elements.size() == kMostElements) lines.refuse("more than 1000 elements");
       PlyElement element = elementOf(words, lines);
       if (std::ranges::find(header.elements, element.name, &PlyElement::name) != header.elements.end())
         lines.refuse("a second element '" + wordText(element.name) + "'");

@@ -14,6 +14,7 @@
 #include "mesh/read/ply_header.h"
 #include "mesh/scan/mesh_builder.h"
 #include "mesh/scan/text_scanner.h"
+#include "mesh/scan/word_text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -25,9 +26,15 @@ struct PlyPosition {
 
   std::string text() const {
     return "number " + std::to_string(index + 1) + " of " + std::to_string(element->count) + " of the element '" +
-           element->name + "'";
+           wordText(element->name) + "'";
   }
 };
+
+/// Returns true for a number without a fraction that fits 53 bits. Some files hold the indices of vertices as `float`.
+bool isWholeNumber(double number) {
+  constexpr double kMost = 0x1p53;
+  return std::abs(number) <= kMost && std::floor(number) == number;
+}
 
 /// The numbers of a PLY file that is text.
 class PlyText {
@@ -56,8 +63,10 @@ class PlyText {
   }
 
   template <typename Take>
-  void items(PlyType, std::uint64_t count, const Take& take) {
-    for (; count > 0; --count) take(scanner_.wholeNumber("the index of a vertex"));
+  void items(PlyType type, std::uint64_t count, const Take& take) {
+    const bool mayHaveFraction = type == PlyType::float32 || type == PlyType::float64;
+    for (; count > 0; --count)
+      take(mayHaveFraction ? wholeOf(number(type)) : scanner_.wholeNumber("the index of a vertex"));
   }
 
   /// Skips the rest of the element's line. Some files have more numbers there than their header promises.
@@ -66,6 +75,11 @@ class PlyText {
   [[noreturn]] void refuse(const std::string& problem) const { scanner_.refuse(problem); }
 
  private:
+  std::int64_t wholeOf(double number) const {
+    if (!isWholeNumber(number)) refuse("an index is no whole number");
+    return std::int64_t(number);
+  }
+
   void toWord() {
     if (!scanner_.toWord()) refuse("the file ends at " + position_.text());
   }
@@ -158,13 +172,10 @@ class PlyBinary {
     return withType(type, [&](auto kind) { return wholeOf(next<decltype(kind)>()); });
   }
 
-  /// Returns a number as a whole number. Some files hold the indices of vertices as numbers with a fraction.
   template <typename T>
   std::int64_t wholeOf(T number) const {
-    if constexpr (std::is_floating_point_v<T>) {
-      constexpr double kMost = 0x1p53;
-      if (!(std::abs(double(number)) <= kMost) || std::floor(number) != number) refuse("an index is no whole number");
-    }
+    if constexpr (std::is_floating_point_v<T>)
+      if (!isWholeNumber(double(number))) refuse("an index is no whole number");
     return std::int64_t(number);
   }
 
@@ -247,8 +258,8 @@ class PlyElements {
 
   /// Returns a vertex index of the file as the builder takes it.
   std::uint32_t vertexOf(std::int64_t index) {
-    if (index < 0 || index > std::numeric_limits<std::uint32_t>::max())
-      builder_.refuseVertex(index + 1, numbers_.line());
+    if (index < 0) builder_.refuseNegative(index, numbers_.line());
+    if (index > std::numeric_limits<std::uint32_t>::max()) builder_.refuseVertex(index + 1, numbers_.line());
     return std::uint32_t(index);
   }
 

@@ -65,9 +65,22 @@ TriangleMesh readMesh(const fs::path& file, const Progress& progress) {
 
 bool hasMeshExtension(const fs::path& file) { return formatOf(file) != nullptr; }
 
-bool isReadByAssimp(const fs::path& file) {
+bool isReadByOthers(const fs::path& file) {
   const MeshFormat* const format = formatOf(file);
-  return format && format->read == readByAssimp;
+  if (!format || format->read != readGltf) return format && format->read == readByAssimp;
+  constexpr std::string_view kDraco = "KHR_draco_mesh_compression";
+  const Progress none;
+  try {
+    Input input(file, none);
+    while (input.ensure(kDraco.size())) {
+      const std::string_view rest = input.rest();
+      if (rest.find(kDraco) != rest.npos) return true;
+      input.skip(rest.size() - kDraco.size() + 1);
+    }
+  } catch (const Error&) {
+    // The reader will tell what is wrong with the file.
+  }
+  return false;
 }
 
 }  // namespace hpsdf::mesh

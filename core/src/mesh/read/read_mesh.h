@@ -14,7 +14,7 @@ TriangleMesh readMesh(const std::filesystem::path& file, const Progress& progres
 /// Returns true if a file has the extension of a format that `readMesh` reads.
 bool hasMeshExtension(const std::filesystem::path& file);
 
-/// Returns true if a file has the extension of a format that the library assimp reads for this project.
-bool isReadByAssimp(const std::filesystem::path& file);
+/// Returns true if the libraries assimp or Draco read the file or parts of it (see `hpsdf::isReadByOthers`).
+bool isReadByOthers(const std::filesystem::path& file);
 
 }  // namespace hpsdf::mesh

@@ -34,15 +34,14 @@ std::uint32_t promisedFaces(Input& input) {
   return faces;
 }
 
-/// Returns true if the file is text: if it begins with "solid", holds a word of STL text soon after, and no binary
-/// zeros before.
+/// Returns true if the file is text: if it begins with "solid", and holds no binary data soon after.
 bool isText(Input& input) {
   constexpr std::size_t kSoon = 8192;
   input.ensure(kSoon);
-  std::string beginning = lowerCase(std::string(input.rest().substr(0, kSoon)));
+  const std::string beginning = lowerCase(std::string(input.rest().substr(0, kSoon)));
   if (!trimmed(beginning).starts_with("solid") && !beginning.starts_with("\xef\xbb\xbfsolid")) return false;
-  const std::size_t word = std::min(beginning.find("facet"), beginning.find("endsolid"));
-  return word != std::string::npos && beginning.find('\0') > word;
+  const auto isBinary = [](char c) { return c >= '\0' && c < ' ' && !(c >= '\t' && c <= '\r'); };
+  return std::ranges::none_of(beginning, isBinary);
 }
 
 Vector3 corner(const char* bytes) {

@@ -8,9 +8,10 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <limits>
 #include <system_error>
 #include <utility>
+
+#include "hpsdf/detail/text.h"
 
 namespace hpsdf::mesh {
 namespace {
@@ -41,24 +42,30 @@ void requireReadable(const fs::path& file) {
   if (!stream || stream.peek() == std::ifstream::traits_type::eof()) refuse("cannot be read; check its permissions");
 }
 
-/// The open file. The library zlib reads it, which passes files that are not compressed on as they are.
+/// The open file: a descriptor or, for a file whose name ends in .gz, a stream of zlib.
 struct Input::Source {
-  explicit Source(const fs::path& file) : size(fs::file_size(file)), stream(gzopen(file.c_str(), "rbe")) {}
+  explicit Source(const fs::path& file)
+      : size(fs::file_size(file)), descriptor(open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
+    if (descriptor >= 0 && lowerExtension(file) == ".gz") stream = gzdopen(descriptor, "rb");
+  }
   ~Source() {
-    if (stream) gzclose(stream);
+    if (stream)
+      gzclose(stream);  // closes the descriptor too
+    else if (descriptor >= 0)
+      close(descriptor);
   }
   Source(const Source&) = delete;
   Source& operator=(const Source&) = delete;
 
   std::uint64_t size;  ///< bytes of the file as it lies on the disk
-  gzFile stream;
+  int descriptor;
+  gzFile stream = nullptr;
 };
 
 Input::Input(const fs::path& file, const Progress& progress) : file_(file), progress_(progress) {
   requireReadable(file);
   source_ = std::make_unique<Source>(file);
-  if (!source_->stream) refuse("cannot be read; check its permissions");
-  gzbuffer(source_->stream, kWindow / 4);
+  if (source_->descriptor < 0) refuse("cannot be read; check its permissions");
   window_ = std::make_unique_for_overwrite<char[]>(kWindow);
   at_ = end_ = window_.get();
 }
@@ -74,25 +81,35 @@ Input::~Input() = default;
 
 void Input::refuse(const std::string& problem) const { throw Error(ErrorKind::file, file_.string(), problem); }
 
+/// Reads up to `count` bytes of the file, decompressed. Returns 0 at its end.
+std::size_t Input::readPart(char* bytes, std::size_t count) {
+  if (source_->stream) {
+    const int read = gzread(source_->stream, bytes, unsigned(count));
+    int error = Z_OK;
+    const std::string reason = gzerror(source_->stream, &error);
+    if (read < 0 || (read == 0 && error != Z_OK))
+      refuse("its compressed data are damaged or cut off (" +
+             (error == Z_BUF_ERROR ? "unexpected end of file" : reason) + "); compress or copy the file again");
+    return std::size_t(read);
+  }
+  for (;;) {
+    const ssize_t read = ::read(source_->descriptor, bytes, count);
+    if (read >= 0) return std::size_t(read);
+    if (errno != EINTR) refuse(std::string("cannot be read (") + std::strerror(errno) + "); check the disk");
+  }
+}
+
 bool Input::refill(std::size_t count) {
   if (!source_) return false;
   progress_.update("Reading the mesh", share());
-  const auto kept = std::size_t(end_ - at_);
-  std::memmove(window_.get(), at_, kept);
+  std::size_t filled = std::size_t(end_ - at_);
+  std::memmove(window_.get(), at_, filled);
   at_ = window_.get();
-  std::size_t filled = kept;
   while (filled < count) {
-    const int read = gzread(source_->stream, window_.get() + filled, unsigned(kWindow - filled));
-    int error = Z_OK;
-    const char* reason = gzerror(source_->stream, &error);
-    if (read < 0 || (read == 0 && error != Z_OK))
-      refuse(error == Z_ERRNO ? std::string("cannot be read (") + std::strerror(errno) + "); check the disk"
-                              : std::string("its compressed data are damaged or cut off (") +
-                                    (error == Z_BUF_ERROR ? "unexpected end of file" : reason) +
-                                    "); compress or copy the file again");
+    const std::size_t read = readPart(window_.get() + filled, kWindow - filled);
     if (read == 0) break;
-    filled += std::size_t(read);
-    windowEnd_ += std::uint64_t(read);
+    filled += read;
+    windowEnd_ += read;
   }
   end_ = at_ + filled;
   return filled >= count;
@@ -101,14 +118,14 @@ bool Input::refill(std::size_t count) {
 std::uint64_t Input::mostLeft() const {
   const auto waiting = std::uint64_t(end_ - at_);
   if (!source_) return waiting;
-  if (gzdirect(source_->stream) == 1) return waiting + source_->size - std::min(source_->size, windowEnd_);
-  return waiting + kGreatestExpansion * source_->size;
+  if (source_->stream) return waiting + kGreatestExpansion * source_->size;
+  return waiting + source_->size - std::min(source_->size, windowEnd_);
 }
 
 double Input::share() const {
   if (!source_) return windowEnd_ == 0 ? 1 : double(offset()) / double(windowEnd_);
-  const z_off_t position = gzoffset(source_->stream);
-  return position < 0 ? 0 : std::min(1.0, double(position) / double(source_->size));
+  const auto position = source_->stream ? double(gzoffset(source_->stream)) : double(windowEnd_);
+  return std::clamp(position / double(source_->size), 0.0, 1.0);
 }
 
 }  // namespace hpsdf::mesh

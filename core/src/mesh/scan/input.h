@@ -18,7 +18,7 @@ namespace hpsdf::mesh {
 void requireReadable(const std::filesystem::path& file);
 
 /// Reads a file from its beginning to its end. A window of the file is in memory; it moves on as bytes are skipped.
-/// Files that gzip has compressed are decompressed on the way.
+/// Files whose names end in .gz are decompressed on the way.
 class Input {
  public:
   /// The number of bytes that `ensure` can make available at once.
@@ -61,6 +61,7 @@ class Input {
   [[noreturn]] void refuse(const std::string& problem) const;
 
  private:
+  std::size_t readPart(char* bytes, std::size_t count);
   bool refill(std::size_t count);
 
   struct Source;

@@ -46,11 +46,13 @@ class MeshBuilder {
   }
 
   std::size_t vertices() const { return mesh_.vertices.size(); }
-  std::uint64_t faces() const { return faces_; }
 
   /// Throws the error for the face that would be added next if it refers to a vertex that does not exist. `vertex` is
   /// that vertex's number, counted from 1 or, if it is negative, back from the last vertex.
   [[noreturn]] void refuseVertex(std::int64_t vertex, std::uint64_t line) const;
+
+  /// Throws the error for the face that would be added next if one of its indices, which count from 0, is negative.
+  [[noreturn]] void refuseNegative(std::int64_t index, std::uint64_t line) const;
 
   /// Returns the mesh, whose name is the path of the file. Throws `Error` if a face refers to a vertex that was not
   /// added.
@@ -58,17 +60,13 @@ class MeshBuilder {
 
  private:
   struct LaterFace {
-    std::vector<std::uint32_t> corners;
+    std::size_t firstCorner, corners;  ///< range in `laterCorners_`
     std::uint64_t number, line;
   };
 
-  /// Where in the file the elements of an array begin, as the share of the file before them.
-  struct Beginning {
-    double share = -1;  ///< below 0 before the first element
-  };
-
   template <typename T>
-  void grow(std::vector<T>& array, Beginning& beginning) const;
+  void grow(std::vector<T>& array, double& beginning) const;
+  std::size_t arrayBytes() const;  ///< memory that the arrays take
   void growVertices();
   void growTriangles();
   void expect(std::uint64_t count, std::uint64_t bytes, const char* what) const;
@@ -79,9 +77,11 @@ class MeshBuilder {
 
   const Input& input_;
   TriangleMesh mesh_;
-  Beginning verticesBegin_, trianglesBegin_;
+  /// Shares of the file before its first vertex and its first face; below 0 before these were read.
+  double verticesBegin_ = -1, trianglesBegin_ = -1;
   std::uint64_t faces_ = 0;       ///< faces added, whatever their number of corners
   std::vector<LaterFace> later_;  ///< faces whose vertices were not known yet
+  std::vector<std::uint32_t> laterCorners_;
   std::vector<Vector3> polygon_;  ///< positions of the corners of the face that is triangulated
 };
 

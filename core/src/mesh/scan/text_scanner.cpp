@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <system_error>
 
@@ -11,6 +10,16 @@
 
 namespace hpsdf::mesh {
 namespace {
+
+/// Returns the `double` nearest to a number whose size `double` cannot hold: 0 or the least denormal number, or
+/// infinity.
+double beyondDouble(std::string_view number) {
+  long double value = 0;
+  const auto error = std::from_chars(number.data(), number.data() + number.size(), value).ec;
+  if (error == std::errc()) return double(value);
+  const bool isTiny = number.find("e-") != number.npos || number.find("E-") != number.npos;
+  return isTiny ? 0 : std::numeric_limits<double>::infinity();
+}
 
 bool isLineEnd(char c) { return c == '\n' || c == '\r'; }
 bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
@@ -34,13 +43,13 @@ void TextScanner::skipLineEnd(char c) {
   if (c == '\r') take('\n');
 }
 
-/// Skips a continuation sign together with the line end behind it.
+/// Skips a continuation sign together with the line end, or the file's end, behind it.
 bool TextScanner::skipContinuation() {
   const std::string_view rest = input_.rest();
-  const std::size_t end = rest.find_first_not_of(" \t", 1);
-  if (end == rest.npos || !isLineEnd(rest[end])) return false;
+  const std::size_t end = std::min(rest.find_first_not_of(" \t", 1), rest.size());
+  if (end < rest.size() ? !isLineEnd(rest[end]) : end > kLongestWord) return false;
   input_.skip(end);
-  skipLineEnd(rest[end]);
+  if (end < rest.size()) skipLineEnd(rest[end]);
   return true;
 }
 
@@ -71,19 +80,19 @@ bool TextScanner::skipToWord() {
 bool TextScanner::atLineEnd() { return !skipBlanks() || isLineEnd(input_.rest().front()); }
 
 void TextScanner::skipLine() {
+  bool isComment = false;
   for (;;) {
-    peek();
+    const char c = peek();
     const std::string_view rest = input_.rest();
     if (rest.empty()) return;
-    std::size_t length = 0;
-    while (length < rest.size() && !isLineEnd(rest[length]) && (rest[length] != continuation_ || length == 0)) ++length;
-    if (length > 0) {
-      input_.skip(length);
-    } else if (isLineEnd(rest.front())) {
-      return skipLineEnd(rest.front());
-    } else if (!skipContinuation()) {
-      input_.skip(1);
-    }
+    if (isLineEnd(c)) return skipLineEnd(c);
+    isComment |= c == comment_ && c != '\0';
+    if (c == continuation_ && c != '\0' && !isComment && skipContinuation()) continue;
+    std::size_t length = 1;
+    while (length < rest.size() && !isLineEnd(rest[length]) && rest[length] != continuation_ &&
+           rest[length] != comment_)
+      ++length;
+    input_.skip(length);
   }
 }
 
@@ -106,28 +115,26 @@ bool TextScanner::take(char c) {
 double TextScanner::number() {
   peek();
   const std::string_view rest = input_.rest();
-  const char* const begin = rest.data() + (rest.starts_with('+') ? 1 : 0);
+  const bool hasPlus = rest.starts_with('+') && !rest.starts_with("+-");
+  const char* const begin = rest.data() + (hasPlus ? 1 : 0);
   const char* const end = rest.data() + rest.size();
   double value = 0;
-  auto [stop, error] = std::from_chars(begin, end, value);
-  if (error == std::errc::result_out_of_range) value = std::strtod(std::string(begin, stop).c_str(), nullptr);
-  const bool ends = stop == end || endsWord(*stop);
-  if (error == std::errc::invalid_argument || !ends || !std::isfinite(value)) refuseNumber("a number");
-  input_.skip(std::size_t(stop - rest.data()));
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  const auto length = std::size_t(stop - rest.data());
+  const bool isWhole = stop == end || endsWord(*stop);
+  if (error == std::errc::invalid_argument || !isWhole || length > kLongestWord) refuseWord("a number");
+  if (error == std::errc::result_out_of_range) value = beyondDouble({begin, stop});
+  if (!std::isfinite(value))
+    refuse("'" + wordText(word()) + "' is not a finite number (or beyond 1.8e308, where double ends)");
+  input_.skip(length);
   return value;
 }
 
-/// Throws the error for a word that is not the number that was expected.
-void TextScanner::refuseNumber(std::string_view expected) {
-  if (input_.rest().empty()) refuse("expected " + std::string(expected) + ", but the file ends");
-  if (isLineEnd(input_.rest().front())) refuse("expected " + std::string(expected) + ", but the line ends");
-  const std::string found(word());
-  double value = 0;
-  const auto [stop, error] = std::from_chars(found.data(), found.data() + found.size(), value);
-  const bool isNumber = error != std::errc::invalid_argument && stop == found.data() + found.size();
-  if (isNumber && expected == "a number")
-    refuse("'" + wordText(found) + "' is not a finite number (or beyond 1.8e308, where double ends)");
-  refuse("expected " + std::string(expected) + ", found '" + wordText(found) + "'");
+/// Throws the error for a word that stands where something else was expected.
+void TextScanner::refuseWord(const std::string& expected) {
+  if (input_.rest().empty()) refuse("expected " + expected + ", but the file ends");
+  if (isLineEnd(input_.rest().front())) refuse("expected " + expected + ", but the line ends");
+  refuse("expected " + expected + ", found '" + wordText(word()) + "'");
 }
 
 Vector3 TextScanner::vector(std::string_view what) {
@@ -143,12 +150,13 @@ std::int64_t TextScanner::wholeNumberBefore(std::string_view what) {
   constexpr std::size_t kMostDigits = std::numeric_limits<std::int64_t>::digits10;
   const char sign = peek();
   const std::string_view rest = input_.rest();
-  const std::size_t begin = sign == '-' || sign == '+' ? 1 : 0;
+  const auto isDigit = [&](std::size_t at) { return at < rest.size() && rest[at] >= '0' && rest[at] <= '9'; };
+  std::size_t begin = sign == '-' || sign == '+' ? 1 : 0;
+  while (rest.substr(begin).starts_with('0') && isDigit(begin + 1) && begin < kLongestWord) ++begin;
   std::size_t end = begin;
   std::int64_t value = 0;
-  for (; end < rest.size() && rest[end] >= '0' && rest[end] <= '9' && end - begin <= kMostDigits; ++end)
-    value = 10 * value + (rest[end] - '0');
-  if (end == begin || end - begin > kMostDigits) refuseNumber("a whole number (" + std::string(what) + ")");
+  for (; isDigit(end) && end - begin < kMostDigits; ++end) value = 10 * value + (rest[end] - '0');
+  if (end == begin || isDigit(end)) refuseWord("a whole number (" + std::string(what) + ")");
   input_.skip(end);
   return sign == '-' ? -value : value;
 }

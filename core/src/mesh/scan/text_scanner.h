@@ -95,7 +95,7 @@ class TextScanner {
   bool skipBlanks();
   void skipLineEnd(char c);
   bool skipContinuation();
-  [[noreturn]] void refuseNumber(std::string_view expected);
+  [[noreturn]] void refuseWord(const std::string& expected);
 
   Input& input_;
   char comment_;

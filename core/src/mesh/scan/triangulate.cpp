@@ -134,10 +134,9 @@ class EarClipper {
   }
 
  private:
-  /// Counts the corners that were looked at, and reports progress from time to time.
-  void work(std::size_t corners) {
-    constexpr std::size_t kBetweenReports = 100'000;
-    looked_ += corners;
+  /// Reports progress whenever many corners have been looked at.
+  void report() {
+    constexpr std::size_t kBetweenReports = 1'000'000;
     if (looked_ < kBetweenReports) return;
     looked_ = 0;
     progress_.update("Triangulating a polygon of the mesh", 1 - double(left_) / double(points_.size()));
@@ -147,7 +146,7 @@ class EarClipper {
     std::optional<std::uint32_t> corner = candidates.next(start_);
     for (; corner && !isEar(*corner, tolerance); corner = candidates.next(*corner)) {
       candidates.remove(*corner);
-      work(1);
+      report();
     }
     return corner;
   }
@@ -162,6 +161,7 @@ class EarClipper {
     const Vector2 out = ear[2] - ear[1];
     if (!(cross(in, out) > tolerance * in.norm() * out.norm())) return false;
     const auto other = grid_.find(boxAround(ear, tolerance), [&](std::uint32_t p) {
+      ++looked_;
       return isLeft_[p] && p != before && p != corner && p != after && isNear(points_[p], ear, tolerance);
     });
     if (other) blocked_[*other].push_back(corner);
@@ -192,7 +192,8 @@ class EarClipper {
   /// Returns the corner that makes the smallest triangle with its two neighbours. The clipper cuts this corner off if
   /// the polygon has no ear, because it is flat or intersects itself.
   std::uint32_t flattestCorner() {
-    work(left_);
+    looked_ += left_;
+    report();
     std::uint32_t best = start_;
     double least = std::numeric_limits<double>::infinity();
     std::uint32_t corner = start_;
