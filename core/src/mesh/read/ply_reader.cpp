@@ -141,7 +141,15 @@ class PlyBinary {
   template <typename Take>
   void items(PlyType type, std::uint64_t count, const Take& take) {
     withType(type, [&](auto kind) {
-      for (; count > 0; --count) take(wholeOf(next<decltype(kind)>()));
+      using T = decltype(kind);
+      while (count > 0) {
+        const std::size_t piece = std::size_t(std::min<std::uint64_t>(count, Input::kLongestPiece / sizeof(T)));
+        require(piece * sizeof(T));
+        const char* const bytes = input_.rest().data();
+        for (std::size_t i = 0; i < piece; ++i) take(wholeOf(load<T>(bytes + i * sizeof(T))));
+        input_.skip(piece * sizeof(T));
+        count -= piece;
+      }
       return 0;
     });
   }
@@ -154,18 +162,25 @@ class PlyBinary {
 
  private:
   void require(std::size_t bytes) {
-    if (!input_.ensure(bytes)) [[unlikely]]
-      refuse("the file ends at " + position_.text());
+    if (!input_.ensure(bytes)) refuseEnd();
+  }
+
+  [[noreturn]] void refuseEnd() const { refuse("the file ends at " + position_.text()); }
+
+  template <typename T>
+  T load(const char* from) const {
+    std::array<char, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), from, sizeof(T));
+    if (isSwapped_) std::ranges::reverse(bytes);
+    return std::bit_cast<T>(bytes);
   }
 
   template <typename T>
   T next() {
     require(sizeof(T));
-    std::array<char, sizeof(T)> bytes;
-    std::memcpy(bytes.data(), input_.rest().data(), sizeof(T));
+    const T number = load<T>(input_.rest().data());
     input_.skip(sizeof(T));
-    if (isSwapped_) std::ranges::reverse(bytes);
-    return std::bit_cast<T>(bytes);
+    return number;
   }
 
   std::int64_t whole(PlyType type) {
@@ -270,10 +285,17 @@ class PlyElements {
     std::vector<std::uint32_t> corners;
     forEach(element, [&] {
       skip(properties.first(list));
-      corners.clear();
-      numbers_.items(properties[list].type, lengthOf(properties[list]),
-                     [&](std::int64_t index) { corners.push_back(vertexOf(index)); });
-      builder_.addFace(corners, numbers_.line());
+      const std::uint64_t length = lengthOf(properties[list]);
+      if (length == 3) {
+        Triangle triangle;
+        auto corner = triangle.begin();
+        numbers_.items(properties[list].type, length, [&](std::int64_t index) { *corner++ = vertexOf(index); });
+        builder_.addTriangle(triangle, numbers_.line());
+      } else {
+        corners.clear();
+        numbers_.items(properties[list].type, length, [&](std::int64_t index) { corners.push_back(vertexOf(index)); });
+        builder_.addFace(corners, numbers_.line());
+      }
       skip(properties.subspan(list + 1));
     });
   }
