@@ -140,8 +140,7 @@ class Reading {
   static Error died(const std::string& cause) {
     return Error(
         fmt::format("the process that read it came down ({}): the file is damaged, or too much for the library that "
-                    "reads it; check or "
-                    "export it again",
+                    "reads it; check or export it again",
                     printable(cause)));
   }
 

@@ -70,8 +70,8 @@ struct Command {
   /// Throws `Error` if the arguments contradict each other. All commands of a script are checked before its
   /// first command runs.
   std::function<void(const Arguments&)> check = {};
-  /// What makes the command draw without OpenGL, for messages. May be empty if the command has the parameter `cpu` or
-  /// does not draw.
+  /// Words that make the command draw without OpenGL, for messages. They may be empty if the command has the parameter
+  /// `cpu` or does not draw.
   std::string drawsOnCpuBy = {};
   bool scriptOnly = false;
   bool commandLineOnly = false;

@@ -7,7 +7,6 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <string_view>
 #include <utility>
 
 #include "hpsdf/detail/memory.h"
@@ -20,7 +19,6 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "glTF files are little-endian");
 
 /// Extensions that change the geometry and that this reader knows.
-constexpr std::string_view kDracoExtension = "KHR_draco_mesh_compression";
 constexpr std::array<std::string_view, 3> kGeometryExtensions = {"KHR_mesh_quantization", kDracoExtension,
                                                                  "EXT_mesh_gpu_instancing"};
 

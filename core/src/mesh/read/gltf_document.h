@@ -8,12 +8,16 @@
 #include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mesh/read/gltf_json.h"
 #include "mesh/scan/input.h"
 
 namespace hpsdf::mesh {
+
+/// The extension of glTF for meshes that the library Draco has compressed.
+constexpr std::string_view kDracoExtension = "KHR_draco_mesh_compression";
 
 /// A glTF 2.0 file, read into memory as JSON, and the buffers that it names: in the file itself (.glb), as base64 text,
 /// or in files beside it. Source: Khronos, glTF 2.0 specification (2021).

@@ -34,7 +34,8 @@ struct AddedVertices {
   std::size_t count = 0;
 };
 
-constexpr const char* kDraco = "KHR_draco_mesh_compression";
+constexpr std::uint64_t kTriangles = 4, kStrip = 5,
+                        kFan = 6;  ///< modes of a primitive; those below are points and lines
 constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
 
 std::vector<Vector3> vectorsOf(const std::vector<double>& numbers) {
@@ -45,7 +46,6 @@ std::vector<Vector3> vectorsOf(const std::vector<double>& numbers) {
 
 /// Turns the indices of a primitive into three for each triangle, as its mode says.
 std::vector<std::uint32_t> trianglesOf(const std::vector<std::uint32_t>& indices, std::uint64_t mode) {
-  enum : std::uint64_t { kTriangles = 4, kStrip = 5 };
   std::vector<std::uint32_t> corners;
   if (mode == kTriangles) return indices;
   for (std::size_t i = 2; i < indices.size(); ++i) {
@@ -99,9 +99,7 @@ Transform transformOf(const GltfValue& node) {
     return transform;
   }
   if (node.has("translation")) transform.translate(Vector3(node.get("translation").numbers(3).data()));
-  if (node.has("rotation")) {
-    transform.rotate(rotationOf(node, node.get("rotation").numbers(4).data()));
-  }
+  if (node.has("rotation")) transform.rotate(rotationOf(node, node.get("rotation").numbers(4).data()));
   if (node.has("scale")) transform.scale(Vector3(node.get("scale").numbers(3).data()));
   return transform;
 }
@@ -194,12 +192,11 @@ class GltfReader {
 
   void addPrimitive(const GltfValue& primitive, const Transform& worldFromMesh,
                     std::map<std::uint64_t, AddedVertices>& added) {
-    constexpr std::uint64_t kTriangles = 4, kFan = 6;
     const std::uint64_t mode = primitive.whole("mode", kTriangles);
     if (mode > kFan) primitive.refuse("has an unknown mode");
     if (mode < kTriangles || !primitive.get("attributes").has("POSITION")) return;  // points, lines, or nothing
-    if (primitive.has("extensions") && primitive.get("extensions").has(kDraco)) {
-      const Primitive decoded = decodeDraco(document_, primitive.get("extensions").get(kDraco));
+    if (primitive.has("extensions") && primitive.get("extensions").has(kDracoExtension.data())) {
+      const Primitive decoded = decodeDraco(document_, primitive.get("extensions").get(kDracoExtension.data()));
       return addTriangles(primitive, decoded.corners, addVertices(primitive, decoded.positions, worldFromMesh),
                           worldFromMesh);
     }

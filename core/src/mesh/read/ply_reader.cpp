@@ -278,41 +278,44 @@ class PlyElements {
     return std::uint32_t(index);
   }
 
-  void readFaces(const PlyElement& element) {
+  /// Calls read(list, length) for the list of vertex indices of each element, behind its length.
+  template <typename Read>
+  void forEachList(const PlyElement& element, const Read& read) {
     const std::size_t list = require(element, element.find("vertex_index") ? "vertex_index" : "vertex_indices", true);
     const std::span<const PlyProperty> properties = element.properties;
-    builder_.expectTriangles(element.count, numbers_.leastBytes(element));
-    std::vector<std::uint32_t> corners;
     forEach(element, [&] {
       skip(properties.first(list));
-      const std::uint64_t length = lengthOf(properties[list]);
-      if (length == 3) {
-        Triangle triangle;
-        auto corner = triangle.begin();
-        numbers_.items(properties[list].type, length, [&](std::int64_t index) { *corner++ = vertexOf(index); });
-        builder_.addTriangle(triangle, numbers_.line());
-      } else {
-        corners.clear();
-        numbers_.items(properties[list].type, length, [&](std::int64_t index) { corners.push_back(vertexOf(index)); });
-        builder_.addFace(corners, numbers_.line());
-      }
+      read(properties[list], lengthOf(properties[list]));
       skip(properties.subspan(list + 1));
     });
   }
 
+  void readFaces(const PlyElement& element) {
+    builder_.expectTriangles(element.count, numbers_.leastBytes(element));
+    std::vector<std::uint32_t> corners;
+    forEachList(element, [&](const PlyProperty& list, std::uint64_t length) {
+      if (length == 3) {
+        Triangle triangle;
+        auto corner = triangle.begin();
+        numbers_.items(list.type, length, [&](std::int64_t index) { *corner++ = vertexOf(index); });
+        builder_.addTriangle(triangle, numbers_.line());
+      } else {
+        corners.clear();
+        numbers_.items(list.type, length, [&](std::int64_t index) { corners.push_back(vertexOf(index)); });
+        builder_.addFace(corners, numbers_.line());
+      }
+    });
+  }
+
   void readStrips(const PlyElement& element) {
-    const std::size_t list = require(element, element.find("vertex_index") ? "vertex_index" : "vertex_indices", true);
-    const std::span<const PlyProperty> properties = element.properties;
-    forEach(element, [&] {
-      skip(properties.first(list));
+    forEachList(element, [&](const PlyProperty& list, std::uint64_t length) {
       Strip strip;
-      numbers_.items(properties[list].type, lengthOf(properties[list]), [&](std::int64_t index) {
+      numbers_.items(list.type, length, [&](std::int64_t index) {
         if (index < 0)
           strip = {};
         else
           add(strip, vertexOf(index));
       });
-      skip(properties.subspan(list + 1));
     });
   }
 

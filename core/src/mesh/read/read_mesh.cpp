@@ -7,6 +7,7 @@
 
 #include "hpsdf/detail/text.h"
 #include "mesh/read/assimp_reader.h"
+#include "mesh/read/gltf_document.h"
 #include "mesh/read/gltf_reader.h"
 #include "mesh/read/obj_reader.h"
 #include "mesh/read/off_reader.h"
@@ -56,10 +57,9 @@ const MeshFormat* formatOf(const fs::path& file) {
 }  // namespace
 
 TriangleMesh readMesh(const fs::path& file, const Progress& progress) {
-  requireReadable(file);
+  Input input(file, progress);
   const MeshFormat* const format = formatOf(file);
   if (!format) refuseFormat(file);
-  Input input(file, progress);
   return format->read(input);
 }
 
@@ -68,14 +68,13 @@ bool hasMeshExtension(const fs::path& file) { return formatOf(file) != nullptr; 
 bool isReadByOthers(const fs::path& file) {
   const MeshFormat* const format = formatOf(file);
   if (!format || format->read != readGltf) return format && format->read == readByAssimp;
-  constexpr std::string_view kDraco = "KHR_draco_mesh_compression";
   const Progress none;
   try {
     Input input(file, none);
-    while (input.ensure(kDraco.size())) {
+    while (input.ensure(kDracoExtension.size())) {
       const std::string_view rest = input.rest();
-      if (rest.find(kDraco) != rest.npos) return true;
-      input.skip(rest.size() - kDraco.size() + 1);
+      if (rest.find(kDracoExtension) != rest.npos) return true;
+      input.skip(rest.size() - kDracoExtension.size() + 1);
     }
   } catch (const Error&) {
     // The reader will tell what is wrong with the file.

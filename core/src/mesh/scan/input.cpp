@@ -24,8 +24,6 @@ static_assert(kWindow >= 2 * Input::kLongestPiece);
 /// The greatest number of bytes into which one byte of a file that gzip has compressed can expand.
 constexpr std::uint64_t kGreatestExpansion = 1032;
 
-}  // namespace
-
 void requireReadable(const fs::path& file) {
   const std::string name = file.string();
   const auto refuse = [&](const std::string& problem) { throw Error(ErrorKind::file, name, problem); };
@@ -41,6 +39,8 @@ void requireReadable(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream || stream.peek() == std::ifstream::traits_type::eof()) refuse("cannot be read; check its permissions");
 }
+
+}  // namespace
 
 /// The open file: a descriptor or, for a file whose name ends in .gz, a stream of zlib.
 struct Input::Source {

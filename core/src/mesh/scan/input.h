@@ -13,10 +13,6 @@
 
 namespace hpsdf::mesh {
 
-/// Throws `Error` (of the kind `file`, with the subject `file`) for a file that is missing, a folder, not a regular
-/// file, empty, or not readable by this process.
-void requireReadable(const std::filesystem::path& file);
-
 /// Reads a file from its beginning to its end. A window of the file is in memory; it moves on as bytes are skipped.
 /// Files whose names end in .gz are decompressed on the way.
 class Input {
@@ -24,8 +20,9 @@ class Input {
   /// The number of bytes that `ensure` can make available at once.
   static constexpr std::size_t kLongestPiece = std::size_t{1} << 16;
 
-  /// Opens a file. Throws as `requireReadable` does. `progress` must outlive this object: it is told how much of the
-  /// file has been read, and can cancel the reading at every new part of the window.
+  /// Opens a file. Throws `Error` (of the kind `file`, with the subject `file`) if it is missing, a folder, not a
+  /// regular file, empty, or not readable by this process. `progress` must outlive this object: it is told how much of
+  /// the file has been read, and can cancel the reading at every new part of the window.
   Input(const std::filesystem::path& file, const Progress& progress);
   /// Takes the bytes of a file, which must outlive this object, and the name of the file for errors.
   Input(std::string_view bytes, const std::filesystem::path& file, const Progress& progress);

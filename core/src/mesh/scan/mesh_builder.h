@@ -20,7 +20,7 @@ class MeshBuilder {
   explicit MeshBuilder(const Input& input);
 
   /// Tells how many vertices or triangles will come, each of which takes at least `bytes` bytes of the file. Throws
-  /// `Error` if the rest of the file cannot hold so many; `what` names them in the error ("vertices").
+  /// `Error` if the rest of the file cannot hold so many.
   void expectVertices(std::uint64_t count, std::uint64_t bytes);
   void expectTriangles(std::uint64_t count, std::uint64_t bytes);
 

@@ -23,7 +23,7 @@ class TextScanner {
   /// Skips blanks, comments and line ends. Returns false if nothing is left then.
   bool toWord() {
     if (peek() == ' ') input_.skip(1);  // Mostly there is one blank.
-    return beginsWord(peek()) || skipToWord();
+    return !endsWord(peek()) || skipToWord();
   }
 
   /// Skips blanks and comments of this line. Returns true if the line or the file ends then. With the sign of a
@@ -89,8 +89,6 @@ class TextScanner {
 
   /// Returns true if a word cannot contain this character. `peek` gives '\0' at the file's end.
   bool endsWord(char c) const { return endsWord_[static_cast<unsigned char>(c)]; }
-  /// Returns true if a word begins with this character.
-  bool beginsWord(char c) const { return !endsWord(c); }
   bool skipToWord();
   bool skipBlanks();
   void skipLineEnd(char c);
