@@ -25,13 +25,15 @@ Strategy chosenFor(const TriangleMesh& mesh, const DistanceOptions& distance = {
 TEST(AutomaticStrategy, isHpxForSharpEdgesAndCoarseFacets) {
   EXPECT_EQ(chosenFor(shapes::mesh("gear")), Strategy::hpx);
   EXPECT_EQ(chosenFor(support::boxOfTwo()), Strategy::hpx);
+  EXPECT_EQ(chosenFor(support::openBox()), Strategy::hpx);
   EXPECT_EQ(chosenFor(shapes::mesh("torus,segments=16,sides=8")), Strategy::hpx);
 }
 
 TEST(AutomaticStrategy, isHpWhereExactLeavesGainNothing) {
   EXPECT_EQ(chosenFor(shapes::mesh("torus")), Strategy::hp) << "a smooth mesh";
   EXPECT_EQ(chosenFor(shapes::analytic("box"), Box(-Vector3::Ones(), Vector3::Ones())), Strategy::hp);
-  EXPECT_EQ(chosenFor(support::openBox()), Strategy::hp) << "no sign follows from the triangles";
+  EXPECT_EQ(chosenFor(support::boxOfTwo(), {.insideTest = InsideTest::outerHull}), Strategy::hp)
+      << "no sign follows from the triangles";
   const TriangleMesh gear = shapes::mesh("gear");
   EXPECT_EQ(chosenFor(support::joined(gear, support::moved(gear, {5000, 0, 0}))), Strategy::hp)
       << "all triangles of a gear lie within a half percent of the size";

@@ -1,6 +1,7 @@
 // Tests exact leaves: leaves that keep the triangles nearest to their points.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <string>
@@ -238,6 +239,42 @@ TEST(ExactLeaves, followTheWindingNumberWhereTrianglesIntersect) {
   }
   EXPECT_GT(count, 500);
   EXPECT_GT(inBoth, 20);
+}
+
+/// Returns the mesh without some of its faces.
+TriangleMesh without(TriangleMesh mesh, const std::vector<std::size_t>& faces) {
+  for (const std::size_t face : faces) mesh.triangles[face] = {0, 0, 0};
+  std::erase_if(mesh.triangles, [](const auto& triangle) { return triangle[0] == triangle[1]; });
+  return mesh;
+}
+
+/// Beside a hole the distance is not that to triangles, and a leaf must not be exact.
+TEST(ExactLeaves, ofOpenMeshesHaveTheExactDistance) {
+  std::array<int, 4> bySign{};
+  int besideHoles = 0;
+  for (const TriangleMesh& mesh : {support::openBox(), without(overlappingBoxes(), {0, 15}),
+                                   without(shapes::mesh("builtin:sphere,subdivisions=3"), {3, 100, 101, 102, 250})}) {
+    const ExactDistance exact(mesh);
+    ASSERT_EQ(exact.insideTestChoice().insideTest, InsideTest::winding);
+    BuildOptions options = hpx();
+    options.coefficients = CoefficientType::float64;
+    const Field field = build(exact, domainAround(mesh), options);
+    const double size = boundingBox(mesh).sizes().maxCoeff();
+    for (const Vector3& x : placesIn(field.domain(), 20000)) {
+      if (!field.domain().contains(x)) continue;
+      const ClosestPoint closest = exact.closestPoint(x);
+      const bool isBesideHole = std::abs(closest.signedDistance) < 0.999 * (closest.point - x).norm();
+      besideHoles += static_cast<int>(isBesideHole);
+      const Cell cell = field.cellAt(x);
+      if (cell.degree != kExactDegree) continue;
+      ASSERT_FALSE(isBesideHole) << x.transpose();
+      ASSERT_NEAR(field.value(x), closest.signedDistance, 1e-12 * size) << x.transpose();
+      ++bySign[static_cast<std::size_t>(node::exactSign(field.data().nodes[cell.id]))];
+    }
+  }
+  EXPECT_GT(besideHoles, 50);
+  for (const ExactSign sign : {ExactSign::pseudonormal, ExactSign::positive, ExactSign::negative, ExactSign::winding})
+    EXPECT_GT(bySign[static_cast<std::size_t>(sign)], 50) << static_cast<int>(sign);
 }
 
 TEST(ExactLeaves, haveTheNormalAsGradientOnTheSurfaceWhereTrianglesIntersect) {

@@ -127,6 +127,52 @@ TEST(BoundaryEdges, gradientsAreWithinTheirErrorBounds) {
   EXPECT_GT(greatest, 1e-6) << "no cluster was replaced by its series";
 }
 
+/// Returns the mesh with these faces twice.
+TriangleMesh doubled(TriangleMesh mesh, std::size_t faces) {
+  for (std::size_t f = 0; f < faces; ++f) mesh.triangles.push_back(mesh.triangles[f]);
+  return mesh;
+}
+
+TEST(BoundaryEdges, tellTheExactWindingNumber) {
+  const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
+  for (const TriangleMesh& mesh : {withHoles(sphere, 100), doubled(sphere, 40)}) {
+    const Hierarchy hierarchy(mesh, boundingBox(mesh));
+    const BoundaryEdges edges(hierarchy);
+    ASSERT_TRUE(edges.haveFans());
+    for (const Vector3& x : placesIn(boundingBox(mesh), 200)) {
+      const Vector3 local = hierarchy.local(x);
+      const double exact = sumOfAngles(mesh, x);
+      for (const double error : {-0.39, 0.0, 0.39}) {
+        const auto found = edges.exactWinding(local, exact + error, std::abs(error) + 0.01);
+        ASSERT_TRUE(found);
+        EXPECT_NEAR(*found, exact, 1e-9) << x.transpose();
+      }
+      EXPECT_FALSE(edges.exactWinding(local, exact + 0.2, 0.1)) << "the estimate is worse than it says";
+    }
+  }
+  const Hierarchy manyHoles(withHoles(sphere, 7), boundingBox(sphere));
+  EXPECT_FALSE(BoundaryEdges(manyHoles).haveFans());
+}
+
+/// Errors of winding numbers would be noise in the distance, which a construction would try to resolve.
+TEST(InsideTest, hasNoNoiseBesideHoles) {
+  TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=5");
+  std::erase_if(mesh.triangles, [&](const auto& triangle) { return mesh.vertices[triangle[0]].z() > 0.8; });
+  const ExactDistance distance(mesh, kAutomatic);
+  const Hierarchy hierarchy(mesh, boundingBox(mesh));
+  const BoundaryEdges edges(hierarchy);
+  int tried = 0;
+  for (const Vector3& x : placesIn(Box(Vector3(-0.3, -0.3, 0.7), Vector3(0.3, 0.3, 0.9)), 100)) {
+    const double slope = edges.gradient(hierarchy.local(x), 0).value.norm() * hierarchy.scale();
+    const double toClosingSurface = (0.5 - sumOfAngles(mesh, x)) / slope;
+    const ClosestPoint closest = distance.closestPoint(x);
+    if (std::abs(toClosingSurface) > 0.99 * (closest.point - x).norm()) continue;
+    ++tried;
+    EXPECT_NEAR(closest.signedDistance, toClosingSurface, 1e-7) << x.transpose();
+  }
+  EXPECT_GT(tried, 50);
+}
+
 /// The two sides of a slit cancel in the winding number, so that a sample tells the signs of points around it.
 TEST(BoundaryEdges, ofNarrowSlitsHardlyChangeTheGradient) {
   TriangleMesh tube;  // square, with a slit along one of its edges

@@ -12,7 +12,7 @@ namespace hpsdf::distance {
 
 bool ExactLeafSigns::any() const {
   return insideTest_ == InsideTest::pseudonormal || insideTest_ == InsideTest::shell ||
-         (insideTest_ == InsideTest::winding && winding_.isClosed());
+         insideTest_ == InsideTest::winding;
 }
 
 std::optional<LeafSign> ExactLeafSigns::find(const Box& box, const std::function<bool()>& isCrossed,
@@ -20,6 +20,7 @@ std::optional<LeafSign> ExactLeafSigns::find(const Box& box, const std::function
   if (!any()) return std::nullopt;
   if (insideTest_ == InsideTest::pseudonormal) return LeafSign{ExactSign::pseudonormal};
   if (insideTest_ == InsideTest::shell) return LeafSign{ExactSign::positive};
+  if (!isFarFromHoles(box)) return std::nullopt;
   if (!isCrossed()) return LeafSign{winding_.isInside(box.center()) ? ExactSign::negative : ExactSign::positive};
   const auto allAre = [&](Sides sides) {
     return std::ranges::all_of(slots, [&](std::uint32_t slot) { return sidesOf(slot) == sides; });
@@ -28,6 +29,11 @@ std::optional<LeafSign> ExactLeafSigns::find(const Box& box, const std::function
   if (allAre(Sides::bothInside)) return LeafSign{ExactSign::negative};
   const std::optional<WindingReference> reference = referenceIn(box);
   return reference ? std::optional(LeafSign{ExactSign::winding, *reference}) : std::nullopt;
+}
+
+bool ExactLeafSigns::isFarFromHoles(const Box& box) const {
+  if (winding_.isClosed()) return true;
+  return winding_.isFarFromHoles(box.center(), box.sizes().norm() / 2, bvh::distanceTo(hierarchy_, box.center()));
 }
 
 /// Returns a reference point in a box, the farthest from the triangles out of a few. Segments from it to points that

@@ -22,8 +22,9 @@ constexpr double kTooNear = 0x1p-44;
 /// Finds how the distance in an exact leaf gets its sign, such that it has the sign of the whole mesh's inside test.
 /// Thread-safe.
 ///
-/// For `InsideTest::winding`, the mesh must be closed. Its winding number is then constant where no triangle is
-/// crossed. The sign of a leaf into which no triangle reaches is therefore that of its centre. In other leaves, the
+/// For `InsideTest::winding`, the leaf must be so far from the mesh's holes that the triangles are nearer than any
+/// surface that closes a hole. The side (inside or outside) is then constant where no triangle is crossed. The sign of
+/// a leaf into which no triangle reaches is therefore that of its centre. In other leaves, the
 /// pseudonormal gives the sign if every listed triangle has the outside in front of it and the inside behind it,
 /// intersects no other triangle, and has no edge or vertex that is too sharp: the triangles are then the whole boundary
 /// of the inside around their nearest points. Elsewhere, the winding number is found at one point of the leaf, from
@@ -35,7 +36,7 @@ class ExactLeafSigns {
   ExactLeafSigns(const bvh::Hierarchy& hierarchy, InsideTest insideTest, const sign::WindingSign& winding)
       : hierarchy_(hierarchy), insideTest_(insideTest), winding_(winding) {}
 
-  /// Returns false if no leaf has a sign: for open meshes and outer hulls.
+  /// Returns false if no leaf has a sign: for outer hulls.
   bool any() const;
 
   /// Returns the sign in a leaf that has a weight in `box`. `isCrossed` says whether a triangle may reach into the box;
@@ -48,6 +49,7 @@ class ExactLeafSigns {
   using Sides = sign::WindingSign::Sides;
 
   void prepare() const;
+  bool isFarFromHoles(const Box& box) const;
   std::optional<WindingReference> referenceIn(const Box& box) const;
   Sides sidesOf(std::uint32_t slot) const;
 

@@ -17,6 +17,11 @@ constexpr std::uint32_t kFew = 512;      // if there are fewer edges than this, 
 constexpr std::uint32_t kSmallest = 8;   // clusters of at most this many edges are not divided
 constexpr double kCoarsestRatio = 0.25;  // greatest ratio of a cluster's radius to its distance
 
+/// If there are more triangles in the fans, or more than this share of the mesh's triangles, the sum over their solid
+/// angles takes longer than a good estimate of the mesh's winding number.
+constexpr std::size_t kMostInFans = 4096;
+constexpr double kMostShareInFans = 0.25;
+
 double cube(double x) { return x * x * x; }
 
 /// Returns the vector ε_ijk M_jk of a matrix M, where ε is the Levi-Civita symbol. For M = a⊗b this vector is a × b.
@@ -42,6 +47,35 @@ BoundaryEdges::BoundaryEdges(const bvh::Hierarchy& hierarchy, const std::vector<
     addCluster(0, count);
     tbb::parallel_for(std::size_t{0}, clusters_.size(), [&](std::size_t n) { measure(clusters_[n]); });
   }
+  addFans(std::min(kMostInFans, std::size_t(kMostShareInFans * double(hierarchy.triangles().size()))));
+}
+
+/// Adds the triangles that join the edges to a common point, but none at all if there are more than `most`.
+void BoundaryEdges::addFans(std::size_t most) {
+  double count = 0;
+  for (const Edge& edge : edges_) count += std::abs(edge.multiplicity);
+  if (count == 0 || count > double(most)) return;
+  // An arbitrary point, so that the lines from it to the edges do not pass through the points of regular grids.
+  const Vector3 common(0.2718281828459045, 0.3141592653589793, 0.1618033988749895);
+  fans_.resize((std::size_t(count) + bvh::kWidth - 1) / bvh::kWidth);
+  std::size_t triangle = 0;
+  for (const Edge& edge : edges_) {
+    const bool isForward = edge.multiplicity > 0;  // then triangles of the fans run back along the edge
+    const std::array<Vector3, 3> corners = {isForward ? edge.to : edge.from, isForward ? edge.from : edge.to, common};
+    for (auto copies = static_cast<std::size_t>(std::abs(edge.multiplicity)); copies > 0; --copies, ++triangle)
+      for (int k = 0; k < 3; ++k)
+        for (int axis = 0; axis < 3; ++axis)
+          fans_[triangle / bvh::kWidth].corner[k][axis][triangle % bvh::kWidth] = corners[k][axis];
+  }
+}
+
+std::optional<double> BoundaryEdges::exactWinding(const Vector3& local, double estimate, double error) const {
+  constexpr double kRoundingOfFans = 1e-7;
+  BlockAngles angles;
+  for (const AngleBlock& block : fans_) addHalfSolidAngles(block, local, angles);
+  const double fans = angles.value() / (2 * std::numbers::pi), whole = std::round(estimate + fans);
+  if (!(std::abs(estimate + fans - whole) <= error + kRoundingOfFans)) return std::nullopt;
+  return whole - fans;
 }
 
 /// Adds a cluster of the edges [begin, end) and, recursively, the clusters of its two halves. A cluster is

@@ -4,15 +4,18 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "bvh/hierarchy.h"
 #include "mesh/connectivity.h"
+#include "sign/angle_block.h"
 
 namespace hpsdf::sign {
 
 /// The unbalanced edges of a mesh: boundary edges, and edges along which more triangles run in one direction than in
-/// the other. The unbalanced edges determine the gradient of the mesh's winding number.
+/// the other. The unbalanced edges determine the gradient of the mesh's winding number and, up to a whole number, the
+/// winding number itself.
 ///
 /// A solid angle depends only on the outline of a surface. Therefore the gradient at a point is the magnetic field of a
 /// current along the unbalanced edges (Biot and Savart): (1/4π) ∫ s/|s|³ × dl, where s runs from the point to the edge.
@@ -25,6 +28,10 @@ namespace hpsdf::sign {
 ///   B/(4πR⁵) · (4 − 3t)/(1 − t)²  with t = r/R and B = ∫ |d|³ dl.
 ///
 /// This bound is the sum over l ≥ 4 of the bounds l |d|^(l−1)/R^(l+1) that the comment of `WindingNumber` derives.
+///
+/// Triangles that join all unbalanced edges to one common point, the fans, close the mesh: the winding number of the
+/// mesh and the fans together is whole. An estimate of the mesh's winding number with an error below ½ thus tells the
+/// exact one.
 class BoundaryEdges {
  public:
   BoundaryEdges() = default;
@@ -52,7 +59,17 @@ class BoundaryEdges {
   /// error of at most `error`. The sum is exact if `error` is 0.
   Gradient gradient(const Vector3& local, double error) const;
 
-  std::size_t bytes() const { return edges_.size() * sizeof(Edge) + clusters_.size() * sizeof(Cluster); }
+  /// Returns true if there are few enough edges for `exactWinding`.
+  bool haveFans() const { return !fans_.empty(); }
+
+  /// Returns the exact winding number of the mesh, to within `WindingNumber::kRounding`, from an estimate whose error
+  /// is at most `error`, which must be below ½. Returns std::nullopt where rounding spoils the result, as it does on
+  /// the lines from the ends of the edges to the common point of the fans.
+  std::optional<double> exactWinding(const Vector3& local, double estimate, double error) const;
+
+  std::size_t bytes() const {
+    return edges_.size() * sizeof(Edge) + clusters_.size() * sizeof(Cluster) + fans_.size() * sizeof(AngleBlock);
+  }
 
  private:
   struct Edge {
@@ -87,6 +104,7 @@ class BoundaryEdges {
   };
 
   void addCluster(std::uint32_t begin, std::uint32_t end);
+  void addFans(std::size_t most);
   void measure(Cluster& cluster) const;
   /// Returns the gradient of the winding number. Uses the Taylor series for clusters whose ratio of radius to distance
   /// is below `ratio`, and sums all other edges one by one.
@@ -94,6 +112,7 @@ class BoundaryEdges {
 
   std::vector<Edge> edges_;
   std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes the clusters into which it is divided
+  std::vector<AngleBlock> fans_;   ///< empty if there are too many edges
 };
 
 }  // namespace hpsdf::sign

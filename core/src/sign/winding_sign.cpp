@@ -19,6 +19,9 @@ constexpr double kExact = 2e-3;
 /// usually suffices to show that the surface which closes a hole is farther away than the triangles. `kExactChange` is
 /// small enough to add little to the noise of `kExact`.
 constexpr double kRoughChange = 0.1, kExactChange = kExact / 4;
+/// The surface that closes a hole is at the distance |w − ½|/|∇w| to first order. The triangles count as nearer only if
+/// they are nearer by this factor.
+constexpr double kMargin = 1.01;
 
 /// Returns the indices of the distances, sorted from the greatest to the least distance. Infinities and NaNs come last.
 std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
@@ -28,6 +31,9 @@ std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
   std::ranges::sort(order, std::greater(), finite);
   return order;
 }
+
+/// Returns the distance of a winding number from the nearest of the levels ½, 1½, −½ …
+double toHalf(double winding) { return 0.5 - std::abs(winding - std::round(winding)); }
 
 }  // namespace
 
@@ -48,12 +54,16 @@ struct WindingSign::Sample {
   double derivative = 0, derivativeByMoments = 0;
   double edgeDistance = 0;  ///< lower bound of the distance to the unbalanced edges, at least `clearance`
 
-  /// Derives the sample for a point x, whose distances are known, from this sample. If x is too far away, the new
-  /// sample has margin 0, which means that the side of x is unknown.
+  /// Returns false if the bounds of this sample certainly do not tell the side of a point x at this distance from the
+  /// triangles.
+  bool mayReach(const Vector3& x, double itsDistance) const {
+    const double farthest = std::min(0.999 * clearance, (margin - 2 * kExact) / gradient - kMargin * itsDistance);
+    return farthest > 0 && (x - position).squaredNorm() < farthest * farthest;
+  }
+
+  /// Derives the sample for a point x, whose distances are known, from this sample.
   Sample movedTo(const Vector3& x, double itsClearance, double itsDistance) const {
-    const double squaredStep = (x - position).squaredNorm();
-    if (!(squaredStep < 0.998 * clearance * clearance)) return {x, itsClearance, itsDistance, inside};
-    return movedBy(std::sqrt(squaredStep), x, itsClearance, itsDistance);
+    return movedBy((x - position).norm(), x, itsClearance, itsDistance);
   }
 
   /// Returns true if all points within `radius` of this point are certainly on the same side (inside or outside) as
@@ -62,9 +72,15 @@ struct WindingSign::Sample {
     return radius < edgeDistance && movedBy(radius, position, 0, radius).margin > 0;
   }
 
+  /// Returns true if, at all points within `radius` of this point, whose distances to the triangles are at most
+  /// `farthest`, every surface that closes a hole is certainly farther away than the triangles.
+  bool isCertainWithin(double radius, double farthest) const {
+    return radius < edgeDistance && movedBy(radius, position, 0, farthest).isCertain();
+  }
+
   /// Returns true if the sign is certain and every surface that closes a hole is farther away than the
   /// triangles.
-  bool isCertain() const { return margin > 2 * kExact + 1.01 * gradient * distance; }
+  bool isCertain() const { return margin > 2 * kExact + kMargin * gradient * distance; }
 
  private:
   /// Returns the sample for a point x at the distance `step` from this sample. The distance to an unbalanced edge
@@ -92,6 +108,18 @@ WindingSign::WindingSign(const bvh::Hierarchy& hierarchy, const TriangleMesh& me
   if (edges_.empty() && signedVolume(mesh) < 0) level_ = -0.5;
 }
 
+/// Returns the first estimate of the winding number that satisfies `isEnough`, or one whose error is at most `kExact`.
+template <typename Enough>
+WindingNumber::Estimate WindingSign::windingNumber(const Vector3& x, Enough isEnough) const {
+  constexpr double kTellsWhole = 0.4;  // error of an estimate from which the exact winding number follows
+  if (!edges_.haveFans()) return winding_.estimateWithin(x, kExact, isEnough);
+  const WindingNumber::Estimate found = winding_.estimateWithin(x, kTellsWhole, isEnough);
+  if (isEnough(found)) return found;
+  if (const auto exact = edges_.exactWinding(hierarchy_->local(x), found.value, found.error))
+    return {*exact, WindingNumber::kRounding};
+  return winding_.estimateWithin(x, kExact, isEnough);
+}
+
 WindingSign::Sample WindingSign::sampleAt(const Vector3& x, double clearance, double distance) const {
   if (!std::isfinite(distance)) return {x, 0, distance, false};
   if (edges_.empty()) return {x, clearance, distance, winding_.isAbove(x, level_), 0.5, 0, 0, 0, HUGE_VAL};
@@ -102,21 +130,17 @@ WindingSign::Sample WindingSign::sampleAt(const Vector3& x, double clearance, do
   BoundaryEdges::Gradient gradient = gradientWithin(kRoughChange);
   const auto fromLevel = [&](const WindingNumber::Estimate& found) { return std::abs(found.value - level_); };
   const auto isFarFromLevel = [&](const WindingNumber::Estimate& found) {
-    return fromLevel(found) - found.error > 1.01 * (gradient.value.norm() + gradient.error) * scale * distance;
+    return fromLevel(found) - found.error > kMargin * (gradient.value.norm() + gradient.error) * scale * distance;
   };
-  const WindingNumber::Estimate found = winding_.estimateWithin(x, kExact, isFarFromLevel);
+  const WindingNumber::Estimate found = windingNumber(x, isFarFromLevel);
   if (!isFarFromLevel(found) && gradient.error > 0) gradient = gradientWithin(kExactChange);
   const bool inside = fromLevel(found) > found.error ? found.value > level_ : winding_.isAbove(x, level_);
-  const double slope = gradient.value.norm() * scale, toClosingSurface = fromLevel(found) / slope;
-  return {x,
-          clearance,
-          toClosingSurface < distance ? toClosingSurface : distance,
-          inside,
-          fromLevel(found) - found.error,
-          slope + gradient.error * scale,
-          gradient.derivative * scale * scale,
-          gradient.derivativeByMoments * scale * scale,
-          std::max(gradient.edgeDistance / scale, clearance)};
+  const double toClosingSurface = fromLevel(found) / (gradient.value.norm() * scale);
+  Sample sample = sampleOf(x, clearance, gradient);
+  sample.distance = std::min(distance, toClosingSurface);
+  sample.inside = inside;
+  sample.margin = fromLevel(found) - found.error;
+  return sample;
 }
 
 void WindingSign::applyTo(std::span<double> distances, std::span<const Vector3> points,
@@ -135,20 +159,62 @@ void WindingSign::applyToBatch(std::span<double> distances, std::span<const Vect
   // Process points far from all triangles first, because a sample far away determines the signs of more other points.
   for (const std::uint32_t i : farthestFirst(clearances)) {
     Sample here = {points[i], clearances[i], distances[i], false};
-    for (const Sample& other : samples)
-      if (here = other.movedTo(points[i], clearances[i], distances[i]); here.isCertain()) break;
+    for (const Sample& other : samples) {
+      if (!other.mayReach(points[i], distances[i])) continue;
+      here = other.movedTo(points[i], clearances[i], distances[i]);
+      if (here.isCertain()) break;
+    }
     if (!here.isCertain()) here = sampleAt(points[i], clearances[i], distances[i]);
-    samples.push_back(here);
+    // The bounds of an uncertain sample do not reach any point that is nearer to the triangles.
+    if (here.isCertain()) samples.push_back(here);
     distances[i] = here.inside ? -here.distance : std::min(here.distance, clearances[i]);
   }
 }
 
+/// Returns a sample with the bounds of a gradient, but without a winding number.
+WindingSign::Sample WindingSign::sampleOf(const Vector3& x, double distance,
+                                          const BoundaryEdges::Gradient& gradient) const {
+  const double scale = hierarchy_->scale();
+  return {.position = x,
+          .clearance = distance,
+          .distance = distance,
+          .inside = false,
+          .gradient = (gradient.value.norm() + gradient.error) * scale,
+          .derivative = gradient.derivative * scale * scale,
+          .derivativeByMoments = gradient.derivativeByMoments * scale * scale,
+          .edgeDistance = std::max(gradient.edgeDistance / scale, distance)};
+}
+
+bool WindingSign::isFarFromHoles(const Vector3& x, double radius, double distance) const {
+  if (edges_.empty()) return true;
+  const double farthest = distance + radius;
+  Sample sample =
+      sampleOf(x, distance, edges_.gradient(hierarchy_->local(x), kRoughChange / (farthest * hierarchy_->scale())));
+  const auto isCertain = [&](const WindingNumber::Estimate& found) {
+    sample.margin = toHalf(found.value) - found.error;
+    return sample.isCertainWithin(radius, farthest);
+  };
+  return isCertain(windingNumber(x, isCertain));
+}
+
 WindingSign::Sides WindingSign::sidesOf(std::uint32_t slot) const {
+  constexpr double kError = 0.05;
   const auto& [a, b, c] = hierarchy_->triangles()[slot];
   const auto vertices = hierarchy_->vertices();
+  const Vector3 centroid = (vertices[a] + vertices[b] + vertices[c]) / 3;
   // Without the triangle, the winding number at its centroid is the mean of the numbers on its two sides, which differ
   // by 1.
-  const double fromLevel = winding_.withoutTriangle((vertices[a] + vertices[b] + vertices[c]) / 3, slot) - level_;
+  const double winding = winding_.withoutTriangle(centroid, slot);
+  if (!edges_.empty()) {
+    // The number may change along the triangle, but must stay on the same side of every level.
+    const double radius =
+        std::sqrt(std::max({(vertices[a] - centroid).squaredNorm(), (vertices[b] - centroid).squaredNorm(),
+                            (vertices[c] - centroid).squaredNorm()}));
+    Sample sample = sampleOf(centroid, 0, edges_.gradient(hierarchy_->local(centroid), 0));
+    sample.margin = toHalf(winding + 0.5) - kError;
+    if (!sample.holdsWithin(radius)) return Sides::unknown;
+  }
+  const double fromLevel = winding - level_;
   if (std::abs(fromLevel) < 0.25) return Sides::separates;
   return fromLevel > 0.75 ? Sides::bothInside : Sides::unknown;
 }

@@ -45,7 +45,7 @@ class WindingSign {
   /// nearby wall.
   bool separatesOutsideFromInside(std::uint32_t slot) const;
 
-  /// The sides of a triangle of a mesh without holes.
+  /// The sides of a triangle.
   enum class Sides : std::uint8_t {
     unknown,     ///< none of the following, or not certain
     separates,   ///< the outside is in front of the triangle, the inside behind it
@@ -53,6 +53,7 @@ class WindingSign {
   };
 
   /// Returns what lies on the two sides of the triangle in `slot`, at its centroid (see `separatesOutsideFromInside`).
+  /// In a mesh with holes, the same holds certainly at all points of the triangle, if no other triangle crosses it.
   Sides sidesOf(std::uint32_t slot) const;
 
   /// Returns true if the mesh has no holes, so that the winding number is constant where no triangle is crossed.
@@ -60,8 +61,13 @@ class WindingSign {
 
   bool isInside(const Vector3& x) const;
 
-  /// Returns the winding number at a point that lies on no triangle, plus 1 in a mesh that is oriented inward, so that
-  /// the point is inside if the number is above 0. The mesh must have no holes.
+  /// Returns true if at all points within `radius` of x every surface that closes a hole is certainly farther away than
+  /// the triangles. `distance` is the distance of x from the triangles.
+  bool isFarFromHoles(const Vector3& x, double radius, double distance) const;
+
+  /// Returns the winding number at a point that lies on no triangle, rounded to a whole number, plus 1 in a mesh that
+  /// is oriented inward, so that the point is inside if the result is above 0. In a mesh with holes, the point must be
+  /// far from them (`isFarFromHoles`).
   std::int32_t windingAt(const Vector3& x) const;
 
   /// Returns true if all points within `radius` of x are certainly on the same side (inside or outside) as x, except
@@ -72,6 +78,9 @@ class WindingSign {
 
  private:
   struct Sample;
+  template <typename Enough>
+  WindingNumber::Estimate windingNumber(const Vector3& x, Enough isEnough) const;
+  Sample sampleOf(const Vector3& x, double distance, const BoundaryEdges::Gradient& gradient) const;
   Sample sampleAt(const Vector3& x, double clearance, double distance) const;
   void applyToBatch(std::span<double> distances, std::span<const Vector3> points, std::span<const double> clearances,
                     std::vector<Sample>& samples) const;
