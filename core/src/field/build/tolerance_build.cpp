@@ -78,19 +78,26 @@ class ToleranceBuild {
     /// Orders tasks by the work that they are likely to take: first by whether a jump of the distance was found in the
     /// parent, then by the parent's error.
     std::pair<bool, double> error() const { return {parent && parent->jumps, ratioAbove()}; }
+    /// Returns true if the task may take much longer than most others. Where the distance has a kink, the number of
+    /// leaves grows as the square of the error, and where it jumps even more.
+    bool isLarge() const {
+      constexpr double kLargeError = 8;
+      return error() > std::pair(false, kLargeError);
+    }
     /// Returns the bytes of a cell that is done. The parent stays a leaf if its children take more.
     double bytes() const { return parent ? std::min(cell->bytes, parent->bytes / 8) : cell->bytes; }
   };
 
   /// Looks at all cells of the first depths, until enough cells are left for tasks. A few of these may take most of the
-  /// work, usually those with the greatest errors: a part of them is divided further.
+  /// work, usually those with the greatest errors: they are divided further, until none stands out or there are many.
   void lookAtFirstDepths() {
-    constexpr std::size_t kEnough = 500, kTimes = 3, kPart = 10;
+    constexpr std::size_t kEnough = 500, kMany = 8000, kPart = 10;
     for (std::uint32_t n = 0; n < roots_.size(); ++n) tasks_.push_back({&roots_[n], {0, tree_.nodes[n].cellIndex}});
     shuffle(tasks_);
     while (!tasks_.empty() && tasks_.size() < kEnough) tasks_ = childrenOf(tasks_);
-    for (std::size_t time = 0; time < kTimes; ++time) {
+    while (tasks_.size() >= kPart && tasks_.size() < kMany) {
       std::ranges::stable_sort(tasks_, {}, &Task::error);
+      if (!tasks_.back().isLarge()) break;
       const std::vector<Task> greatest(tasks_.end() - std::ptrdiff_t(tasks_.size() / kPart), tasks_.end());
       tasks_.resize(tasks_.size() - greatest.size());
       std::ranges::copy(childrenOf(greatest), std::back_inserter(tasks_));
