@@ -154,6 +154,28 @@ TEST(BoundaryEdges, tellTheExactWindingNumber) {
   EXPECT_FALSE(BoundaryEdges(manyHoles).haveFans());
 }
 
+TEST(BoundaryEdges, doNotTellTheWindingNumberWhereRoundingSpoilsIt) {
+  const Vector3 common(0.2718281828459045, 0.3141592653589793, 0.1618033988749895);
+  const TriangleMesh sphere = shapes::mesh("builtin:sphere,subdivisions=4");
+  const TriangleMesh mesh = withHoles(sphere, 1000);
+  const Hierarchy hierarchy(mesh, boundingBox(mesh));
+  const BoundaryEdges edges(hierarchy);
+  EXPECT_FALSE(edges.exactWinding(common, 0.5, 0.4));
+  for (const std::uint32_t vertex : sphere.triangles[0]) {
+    const Vector3 end = hierarchy.local(sphere.vertices[vertex]);
+    for (const double share : {0.1, 0.5, 0.9}) {
+      const Vector3 onLine = common + share * (end - common);
+      EXPECT_FALSE(edges.exactWinding(onLine, 0.5, 0.4));
+      for (const double offset : {1e-14, 1e-12, 1e-10, 1e-8, 1e-6}) {
+        const Vector3 local = onLine + Vector3(offset, -offset, 2 * offset);
+        const double exact =
+            sumOfAngles(mesh, mesh.vertices[0] + (local - hierarchy.local(mesh.vertices[0])) / hierarchy.scale());
+        EXPECT_NEAR(edges.exactWinding(local, exact + 0.3, 0.35).value_or(exact), exact, 1e-6) << offset;
+      }
+    }
+  }
+}
+
 /// Errors of winding numbers would be noise in the distance, which a construction would try to resolve.
 TEST(InsideTest, hasNoNoiseBesideHoles) {
   TriangleMesh mesh = shapes::mesh("builtin:sphere,subdivisions=5");

@@ -9,6 +9,12 @@
 #include "surface/crossings.h"
 
 namespace hpsdf::distance {
+namespace {
+
+/// Powers of the inverse of the real solution of t³ = t + 1. Multiples of this vector spread evenly in a cube.
+const Vector3 kIrregular(0.8191725133961645, 0.6710436067037893, 0.5497004779019703);
+
+}  // namespace
 
 bool ExactLeafSigns::any() const {
   return insideTest_ == InsideTest::pseudonormal || insideTest_ == InsideTest::shell ||
@@ -31,23 +37,35 @@ std::optional<LeafSign> ExactLeafSigns::find(const Box& box, const std::function
   return reference ? std::optional(LeafSign{ExactSign::winding, *reference}) : std::nullopt;
 }
 
+/// Returns true if every surface that closes a hole is certainly farther from all points of a box than the triangles.
+/// The winding number that shows it is taken beside the centre of the box, because the centres of cells may lie on
+/// edges of the mesh, where rounding spoils it.
 bool ExactLeafSigns::isFarFromHoles(const Box& box) const {
   if (winding_.isClosed()) return true;
-  return winding_.isFarFromHoles(box.center(), box.sizes().norm() / 2, bvh::distanceTo(hierarchy_, box.center()));
+  constexpr double kAside = 1.0 / 16;
+  const double radius = box.sizes().norm() / 2;
+  const Vector3 point = box.center() + kAside * radius * kIrregular.normalized();
+  const double distance = bvh::distanceTo(hierarchy_, point);
+  return distance > leastFromTriangles() && winding_.isFarFromHoles(point, (1 + kAside) * radius, distance);
+}
+
+/// Returns the distance from the triangles above which a point keeps its side when its coordinates are rounded to
+/// floats.
+double ExactLeafSigns::leastFromTriangles() const {
+  return 4 * std::numeric_limits<float>::epsilon() / hierarchy_.scale();
 }
 
 /// Returns a reference point in a box, the farthest from the triangles out of a few. Segments from it to points that
-/// queries and pictures ask for, such as centres of cells, should not run along edges. So the places are irregular:
-/// multiples of powers of the real solution of t³ = t + 1 spread evenly in a cube. Returns std::nullopt if the point
+/// queries and pictures ask for, such as centres of cells, should not run along edges. So the places are irregular.
+/// Returns std::nullopt if the point
 /// may change its side when its offset from a vertex is rounded to floats.
 std::optional<WindingReference> ExactLeafSigns::referenceIn(const Box& box) const {
   constexpr int kPlaces = 4;
-  const Vector3 steps(0.8191725133961645, 0.6710436067037893, 0.5497004779019703);
-  double farthest = 4 * std::numeric_limits<float>::epsilon() / hierarchy_.scale();
+  double farthest = leastFromTriangles();
   WindingReference reference;
   bool isFound = false;
   for (int place = 1; place <= kPlaces; ++place) {
-    const Vector3 share = (place * steps).unaryExpr([](double s) { return s - std::floor(s); });
+    const Vector3 share = (place * kIrregular).unaryExpr([](double s) { return s - std::floor(s); });
     const Vector3 point = box.min() + share.cwiseProduct(box.sizes());
     const double distance = bvh::distanceTo(hierarchy_, point);
     if (!(distance > farthest)) continue;

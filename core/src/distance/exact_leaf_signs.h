@@ -23,13 +23,13 @@ constexpr double kTooNear = 0x1p-44;
 /// Thread-safe.
 ///
 /// For `InsideTest::winding`, the leaf must be so far from the mesh's holes that the triangles are nearer than any
-/// surface that closes a hole. The side (inside or outside) is then constant where no triangle is crossed. The sign of
-/// a leaf into which no triangle reaches is therefore that of its centre. In other leaves, the
-/// pseudonormal gives the sign if every listed triangle has the outside in front of it and the inside behind it,
-/// intersects no other triangle, and has no edge or vertex that is too sharp: the triangles are then the whole boundary
-/// of the inside around their nearest points. Elsewhere, the winding number is found at one point of the leaf, from
-/// where it can be followed to any other point: every triangle that is crossed on the way is listed, because it is
-/// nearest to the point where it is crossed.
+/// surface that closes a hole. The side (inside or outside) is then constant where no triangle is crossed. In that case
+/// the sign of a leaf into which no triangle reaches is that of its centre. In other leaves, the pseudonormal gives the
+/// sign if every listed triangle has the outside in front of it and the inside behind it, intersects no other triangle,
+/// and has no edge or vertex that is too sharp: the triangles are then the whole boundary of the inside around their
+/// nearest points. Elsewhere, the winding number is found at one point of the leaf, from where it can be followed to
+/// any other point: every triangle that is crossed on the way is listed, because it is nearest to the point where it is
+/// crossed.
 class ExactLeafSigns {
  public:
   /// Keeps references to the arguments.
@@ -50,6 +50,7 @@ class ExactLeafSigns {
 
   void prepare() const;
   bool isFarFromHoles(const Box& box) const;
+  double leastFromTriangles() const;
   std::optional<WindingReference> referenceIn(const Box& box) const;
   Sides sidesOf(std::uint32_t slot) const;
 

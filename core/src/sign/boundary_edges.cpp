@@ -22,6 +22,10 @@ constexpr double kCoarsestRatio = 0.25;  // greatest ratio of a cluster's radius
 constexpr std::size_t kMostInFans = 4096;
 constexpr double kMostShareInFans = 0.25;
 
+/// The common point of the fans, in local coordinates. It is arbitrary, so that the lines from it to the edges do not
+/// pass through the points of regular grids.
+const Vector3 kCommonPoint(0.2718281828459045, 0.3141592653589793, 0.1618033988749895);
+
 double cube(double x) { return x * x * x; }
 
 /// Returns the vector ε_ijk M_jk of a matrix M, where ε is the Levi-Civita symbol. For M = a⊗b this vector is a × b.
@@ -55,22 +59,36 @@ void BoundaryEdges::addFans(std::size_t most) {
   double count = 0;
   for (const Edge& edge : edges_) count += std::abs(edge.multiplicity);
   if (count == 0 || count > double(most)) return;
-  // An arbitrary point, so that the lines from it to the edges do not pass through the points of regular grids.
-  const Vector3 common(0.2718281828459045, 0.3141592653589793, 0.1618033988749895);
   fans_.resize((std::size_t(count) + bvh::kWidth - 1) / bvh::kWidth);
   std::size_t triangle = 0;
   for (const Edge& edge : edges_) {
     const bool isForward = edge.multiplicity > 0;  // then triangles of the fans run back along the edge
-    const std::array<Vector3, 3> corners = {isForward ? edge.to : edge.from, isForward ? edge.from : edge.to, common};
+    const std::array<Vector3, 3> corners = {isForward ? edge.to : edge.from, isForward ? edge.from : edge.to,
+                                            kCommonPoint};
     for (auto copies = static_cast<std::size_t>(std::abs(edge.multiplicity)); copies > 0; --copies, ++triangle)
       for (int k = 0; k < 3; ++k)
         for (int axis = 0; axis < 3; ++axis)
           fans_[triangle / bvh::kWidth].corner[k][axis][triangle % bvh::kWidth] = corners[k][axis];
+    for (const Vector3& end : {edge.from, edge.to}) toEnds_.push_back((end - kCommonPoint).normalized());
   }
+}
+
+/// Returns true if two triangles of a fan may have solid angles that add up to a wrong sum, because the point lies
+/// nearly on the edge between them.
+bool BoundaryEdges::isOnLineToEnd(const Vector3& local) const {
+  constexpr double kAngle = 1e-8;  // the error of a solid angle is about the rounding error over the angle to the line
+  const Vector3 offset = local - kCommonPoint;
+  const double distance = offset.norm();
+  if (distance < kAngle) return true;
+  const Vector3 direction = offset / distance;
+  double least = HUGE_VAL;
+  for (const Vector3& toEnd : toEnds_) least = std::min(least, (toEnd - direction).squaredNorm());
+  return least < kAngle * kAngle;
 }
 
 std::optional<double> BoundaryEdges::exactWinding(const Vector3& local, double estimate, double error) const {
   constexpr double kRoundingOfFans = 1e-7;
+  if (isOnLineToEnd(local)) return std::nullopt;
   BlockAngles angles;
   for (const AngleBlock& block : fans_) addHalfSolidAngles(block, local, angles);
   const double fans = angles.value() / (2 * std::numbers::pi), whole = std::round(estimate + fans);

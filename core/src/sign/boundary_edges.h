@@ -29,9 +29,8 @@ namespace hpsdf::sign {
 ///
 /// This bound is the sum over l ≥ 4 of the bounds l |d|^(l−1)/R^(l+1) that the comment of `WindingNumber` derives.
 ///
-/// Triangles that join all unbalanced edges to one common point, the fans, close the mesh: the winding number of the
-/// mesh and the fans together is whole. An estimate of the mesh's winding number with an error below ½ thus tells the
-/// exact one.
+/// Triangle fans that join all unbalanced edges to one common point close the mesh: the winding number of the mesh and
+/// the fans together is whole. An estimate of the mesh's winding number with an error below ½ thus tells the exact one.
 class BoundaryEdges {
  public:
   BoundaryEdges() = default;
@@ -63,12 +62,13 @@ class BoundaryEdges {
   bool haveFans() const { return !fans_.empty(); }
 
   /// Returns the exact winding number of the mesh, to within `WindingNumber::kRounding`, from an estimate whose error
-  /// is at most `error`, which must be below ½. Returns std::nullopt where rounding spoils the result, as it does on
-  /// the lines from the ends of the edges to the common point of the fans.
+  /// is at most `error`, which must be below ½. Returns std::nullopt where rounding may spoil the result: close to the
+  /// lines through the common point and the ends of the edges.
   std::optional<double> exactWinding(const Vector3& local, double estimate, double error) const;
 
   std::size_t bytes() const {
-    return edges_.size() * sizeof(Edge) + clusters_.size() * sizeof(Cluster) + fans_.size() * sizeof(AngleBlock);
+    return edges_.size() * sizeof(Edge) + clusters_.size() * sizeof(Cluster) + fans_.size() * sizeof(AngleBlock) +
+           toEnds_.size() * sizeof(Vector3);
   }
 
  private:
@@ -105,6 +105,7 @@ class BoundaryEdges {
 
   void addCluster(std::uint32_t begin, std::uint32_t end);
   void addFans(std::size_t most);
+  bool isOnLineToEnd(const Vector3& local) const;
   void measure(Cluster& cluster) const;
   /// Returns the gradient of the winding number. Uses the Taylor series for clusters whose ratio of radius to distance
   /// is below `ratio`, and sums all other edges one by one.
@@ -113,6 +114,7 @@ class BoundaryEdges {
   std::vector<Edge> edges_;
   std::vector<Cluster> clusters_;  ///< in depth-first order: a cluster precedes the clusters into which it is divided
   std::vector<AngleBlock> fans_;   ///< empty if there are too many edges
+  std::vector<Vector3> toEnds_;    ///< unit vectors from the common point of the fans to the ends of the edges
 };
 
 }  // namespace hpsdf::sign

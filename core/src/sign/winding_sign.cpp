@@ -165,7 +165,7 @@ void WindingSign::applyToBatch(std::span<double> distances, std::span<const Vect
       if (here.isCertain()) break;
     }
     if (!here.isCertain()) here = sampleAt(points[i], clearances[i], distances[i]);
-    // The bounds of an uncertain sample do not reach any point that is nearer to the triangles.
+    // The bounds of an uncertain sample hardly ever reach a point that is nearer to the triangles.
     if (here.isCertain()) samples.push_back(here);
     distances[i] = here.inside ? -here.distance : std::min(here.distance, clearances[i]);
   }
@@ -224,9 +224,8 @@ bool WindingSign::separatesOutsideFromInside(std::uint32_t slot) const { return 
 bool WindingSign::isInside(const Vector3& x) const { return sampleAt(x, 0, 0).inside; }
 
 std::int32_t WindingSign::windingAt(const Vector3& x) const {
-  constexpr double kError = 0.25;  // the number is whole
-  const double winding = winding_.estimateWithin(x, kError, [](const auto&) { return false; }).value;
-  return static_cast<std::int32_t>(std::lround(winding + 0.5 - level_));
+  const auto isEnough = [](const WindingNumber::Estimate& found) { return toHalf(found.value) > found.error; };
+  return static_cast<std::int32_t>(std::lround(windingNumber(x, isEnough).value + 0.5 - level_));
 }
 
 bool WindingSign::isSameSideWithin(const Vector3& x, double radius) const {

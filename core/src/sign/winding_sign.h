@@ -62,7 +62,8 @@ class WindingSign {
   bool isInside(const Vector3& x) const;
 
   /// Returns true if at all points within `radius` of x every surface that closes a hole is certainly farther away than
-  /// the triangles. `distance` is the distance of x from the triangles.
+  /// the triangles. `distance` is the distance of x from the triangles, which must not be so small that rounding
+  /// decides on which side of them x is.
   bool isFarFromHoles(const Vector3& x, double radius, double distance) const;
 
   /// Returns the winding number at a point that lies on no triangle, rounded to a whole number, plus 1 in a mesh that
