@@ -57,8 +57,7 @@ double ExactLeafSigns::leastFromTriangles() const {
 
 /// Returns a reference point in a box, the farthest from the triangles out of a few. Segments from it to points that
 /// queries and pictures ask for, such as centres of cells, should not run along edges. So the places are irregular.
-/// Returns std::nullopt if the point
-/// may change its side when its offset from a vertex is rounded to floats.
+/// Returns std::nullopt if the point may change its side when its offset from a vertex is rounded to floats.
 std::optional<WindingReference> ExactLeafSigns::referenceIn(const Box& box) const {
   constexpr int kPlaces = 4;
   double farthest = leastFromTriangles();
