@@ -64,6 +64,8 @@ TEST(Measure, agreesWithManyMorePointsOfAFieldThatIsExactAlmostEverywhere) {
       measureError(field, sampleUniform(exact, field.domain(), 0, {.count = 1'000'000, .seed = 5}));
   ASSERT_GT(many.rms, 1e-6);
   EXPECT_NEAR(found.domain.rms / many.rms, 1, 0.05);
+  EXPECT_EQ(found.signThreshold, 0.002);
+  EXPECT_LT(10 * found.near.rms, 0.001);
 }
 
 TEST(Measure, doesNotDependOnThreads) {

@@ -27,6 +27,7 @@ struct Measurement {
   Error near;                    ///< errors near the surface
   Error domain;                  ///< errors over the domain or, if there is one, over the band
   std::uint64_t wrongSigns = 0;  ///< points at which f and Φ have different signs and |Φ| exceeds `signThreshold`
+  /// The tolerance within which the field was built, or else ten times the RMS error near the surface.
   double signThreshold = 0;
   /// Share of the surface's area that is torn: the area of the cracks between cells, as wide as f jumps there, over the
   /// area of the surface. It is 0 for a surface without triangles and for a blended field.

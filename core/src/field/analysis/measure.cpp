@@ -152,7 +152,8 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
   const double length = metadata.referenceLength;
   Measurement result;
   const double within = std::min(allowedError(metadata.settings, length).within, field.domain().diagonal().norm() / 8);
-  const double usual = metadata.settings.tolerance > 0 ? within : 0.01 * length;
+  const double tolerance = metadata.settings.tolerance;
+  const double usual = tolerance > 0 ? within : 0.01 * length;
   result.nearDistance = options.near > 0 ? options.near : usual;
   const std::size_t points =
       options.points > 0 ? options.points : usualPoints(metadata.exactEvaluations, distance.source().insideTest);
@@ -168,7 +169,7 @@ Measurement measure(const Field& field, const DistanceFunction& distance, const 
     result.points = near.values.size();
     result.near = {near.sums.rms(), near.sums.max};
     result.domain = errorOver(parts);
-    result.signThreshold = std::max(10 * result.near.rms, kLeastThreshold * length);
+    result.signThreshold = tolerance > 0 ? tolerance : std::max(10 * result.near.rms, kLeastThreshold * length);
     const AllowedError allowed = allowedError(metadata.settings, length);
     double greatest = -1;
     addPoints(result, greatest, near, allowed);
