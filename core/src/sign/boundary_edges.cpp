@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "bvh/triangle_frame.h"
+#include "sign/winding_number.h"
 
 namespace hpsdf::sign {
 namespace {
@@ -71,6 +72,11 @@ void BoundaryEdges::addFans(std::size_t most) {
           fans_[triangle / bvh::kWidth].corner[k][axis][triangle % bvh::kWidth] = corners[k][axis];
     for (const Vector3& end : {edge.from, edge.to}) toEnds_.push_back((end - kCommonPoint).normalized());
   }
+  // Edges share their ends, which are to be looked at once.
+  std::sort(toEnds_.begin(), toEnds_.end(), [](const Vector3& a, const Vector3& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  });
+  toEnds_.erase(std::unique(toEnds_.begin(), toEnds_.end()), toEnds_.end());
 }
 
 /// Returns true if two triangles of a fan may have solid angles that add up to a wrong sum, because the point lies
@@ -87,12 +93,11 @@ bool BoundaryEdges::isOnLineToEnd(const Vector3& local) const {
 }
 
 std::optional<double> BoundaryEdges::exactWinding(const Vector3& local, double estimate, double error) const {
-  constexpr double kRoundingOfFans = 1e-7;
   if (isOnLineToEnd(local)) return std::nullopt;
   BlockAngles angles;
   for (const AngleBlock& block : fans_) addHalfSolidAngles(block, local, angles);
   const double fans = angles.value() / (2 * std::numbers::pi), whole = std::round(estimate + fans);
-  if (!(std::abs(estimate + fans - whole) <= error + kRoundingOfFans)) return std::nullopt;
+  if (!(std::abs(estimate + fans - whole) <= error + WindingNumber::kRounding)) return std::nullopt;
   return whole - fans;
 }
 
