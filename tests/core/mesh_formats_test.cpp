@@ -1,5 +1,7 @@
 // What the readers of mesh formats take and refuse: one test for each trait of files that readers are known to get
 // wrong.
+#include <draco/compression/encode.h>
+#include <draco/mesh/triangle_soup_mesh_builder.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -12,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <random>
 #include <sstream>
 #include <string>
@@ -643,6 +646,51 @@ TEST_F(GltfFormat, sparseAccessors) {
   EXPECT_THAT(errorOf(gltf), HasSubstr("accessors[0].sparse has an index out of range"));
 }
 
+/// Returns the tetrahedron as Draco compresses it, without loss.
+std::string dracoTetrahedron(draco::MeshEncoderMethod method) {
+  draco::TriangleSoupMeshBuilder builder;
+  builder.Start(int(kFaces.size()));
+  const int positions = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
+  for (std::uint32_t f = 0; f < kFaces.size(); ++f) {
+    std::array<std::array<float, 3>, 3> corners;
+    for (std::size_t i = 0; i < 3; ++i) std::ranges::copy(kCorners[kFaces[f][i]], corners[i].begin());
+    builder.SetAttributeValuesForFace(positions, draco::FaceIndex(f), corners[0].data(), corners[1].data(),
+                                      corners[2].data());
+  }
+  const std::unique_ptr<draco::Mesh> mesh = builder.Finalize();
+  draco::Encoder encoder;
+  encoder.SetEncodingMethod(method);
+  draco::EncoderBuffer buffer;
+  EXPECT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+  return {buffer.data(), buffer.size()};
+}
+
+TEST_F(GltfFormat, draco) {
+  for (const auto method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
+    const std::string compressed = dracoTetrahedron(method);
+    Gltf gltf;
+    gltf.data += compressed;
+    gltf.moreViews = R"(,{"buffer":0,"byteOffset":72,"byteLength":)" + std::to_string(compressed.size()) + "}";
+    gltf.primitive = R"("extensions":{"KHR_draco_mesh_compression":{"bufferView":2,"attributes":{"POSITION":0}}},)";
+    gltf.more = R"("extensionsRequired":["KHR_draco_mesh_compression"],)";
+    for (std::size_t i = 0; i < 72; ++i) gltf.data[i] = 0;  // what a reader without the extension would take
+    const MeshReport report = import(gltf).report;
+    EXPECT_EQ(report.vertices, 4u);
+    EXPECT_EQ(report.faces, 4u);
+    EXPECT_EQ(report.boundaryEdges, 0u);
+    EXPECT_EQ(report.volume, 1);
+    EXPECT_EQ(report.box.min(), Vector3(5, 6, 7));
+    EXPECT_EQ(report.box.max(), Vector3(6, 8, 10));
+
+    Gltf cut = gltf;
+    cut.moreViews = R"(,{"buffer":0,"byteOffset":72,"byteLength":20})";
+    EXPECT_THAT(errorOf(cut), HasSubstr("cannot be decompressed"));
+    Gltf unnamed = gltf;
+    unnamed.primitive = R"("extensions":{"KHR_draco_mesh_compression":{"bufferView":2,"attributes":{"POSITION":7}}},)";
+    EXPECT_THAT(errorOf(unnamed), HasSubstr("has no positions"));
+  }
+}
+
 TEST_F(GltfFormat, instances) {
   Gltf gltf;
   for (const float x : {0.0f, 0.0f, 0.0f, 10.0f, 0.0f, 0.0f}) append(gltf.data, x);
@@ -726,6 +774,8 @@ TEST_F(GltfFormat, damagedFiles) {
               HasSubstr("its JSON cannot be read"));
   EXPECT_THAT(with([](Gltf& g) { g.nodes = R"({"mesh":0,"scale":[1e308,1e308,1e308]})"; }),
               HasSubstr("is not a finite number"));
+  EXPECT_THAT(with([](Gltf& g) { g.nodes = R"({"mesh":0,"scale":[1e400,1,1]})"; }),
+              HasSubstr("its JSON has a number beyond the range of doubles"));
   const auto withIndices = [&](const std::string& accessor) {
     Gltf gltf;
     std::string text = gltf.text();

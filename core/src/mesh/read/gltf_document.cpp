@@ -198,6 +198,9 @@ void GltfDocument::parse(const std::vector<std::byte>& bytes) {
   } catch (const nlohmann::json::parse_error& error) {
     throw Error(ErrorKind::file, file_,
                 "its JSON cannot be read (byte " + std::to_string(error.byte) + "); check or export it again");
+  } catch (const nlohmann::json::out_of_range&) {  // has no position
+    throw Error(ErrorKind::file, file_,
+                "its JSON has a number beyond the range of doubles; check or export the file again");
   }
   json_ = std::make_unique<const nlohmann::json>(std::move(json));
 }
