@@ -1,4 +1,7 @@
-// Time of a sphere-traced frame of the bunny by Mesa's software renderer, after the field was uploaded.
+// Time of a sphere-traced frame of the bunny by Mesa's software renderer, and by a graphics card if there is one, after
+// the field was uploaded. The time includes reading the buffers of the frame back.
+
+#include <memory>
 
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
@@ -7,16 +10,37 @@
 namespace hpsdf::bench {
 namespace {
 
-void bunnyFrame(benchmark::State& state) {
+std::unique_ptr<render::Renderer> rendererOf(const Field& field, render::GlChoice choice, benchmark::State& state) {
+  try {
+    return render::makeGlRenderer(field, choice);
+  } catch (const render::GlError& error) {
+    state.SkipWithError(error.what());
+    return nullptr;
+  }
+}
+
+void frame(benchmark::State& state, render::GlChoice choice, int width, int height) {
   const Field& field = bunnyField();
-  const auto renderer = render::makeGlRenderer(field, render::GlChoice::software);
-  const render::SurfaceView view{.camera = render::cameraOf({}, field.domain(), 1280, 720)};
-  renderer->surface(view, 1280, 720);  // compiles the shaders
-  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(renderer->surface(view, 1280, 720));
+  const auto renderer = rendererOf(field, choice, state);
+  if (!renderer) return;
+  const render::SurfaceView view{.camera = render::cameraOf({}, field.domain(), width, height)};
+  renderer->surface(view, width, height);  // compiles the shaders
+  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(renderer->surface(view, width, height));
   state.SetLabel(renderer->description());
 }
 
+void bunnyFrame(benchmark::State& state) { frame(state, render::GlChoice::software, 1280, 720); }
+void bunnyFrameByHardware(benchmark::State& state) {
+  frame(state, render::GlChoice::hardware, int(state.range(0)), int(state.range(1)));
+}
+
 BENCHMARK(bunnyFrame)->Name("frame/bunny")->UseRealTime()->Unit(benchmark::kSecond);
+BENCHMARK(bunnyFrameByHardware)
+    ->Name("frame_by_hardware/bunny")
+    ->Args({1280, 720})
+    ->Args({3840, 2160})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace hpsdf::bench

@@ -174,7 +174,7 @@ TEST(BlendedOpenGl, drawsWhatTheOracleDraws) {
   for (const unsigned seed : {8u})
     for (const double width : {kDefaultBlend, 0.25}) {
       const Field smooth = blended(jumping(seed, 0.15), width);
-      const auto cpu = makeCpuRenderer(smooth), gl = makeGlRenderer(smooth, GlChoice::software);
+      const auto cpu = makeCpuRenderer(smooth), gl = makeGlRenderer(smooth, support::testedGl());
       for (const SliceView& view : slices(smooth))
         EXPECT_TRUE(agree(cpu->slice(view, kWidth, kHeight), gl->slice(view, kWidth, kHeight), {.value = 4e-6}));
       const double diagonal = smooth.domain().sizes().norm();
@@ -192,7 +192,7 @@ TEST(BlendedOpenGl, differsForAWrongField) {
   const ViewBuffers expected = makeCpuRenderer(blended(field, 0.1))->slice(view, kWidth, kHeight);
   for (const double width : {0.0, 0.0999})
     EXPECT_FALSE(agree(expected,
-                       makeGlRenderer(blended(field, width), GlChoice::software)->slice(view, kWidth, kHeight),
+                       makeGlRenderer(blended(field, width), support::testedGl())->slice(view, kWidth, kHeight),
                        {.value = 4e-6}))
         << width;
 }
@@ -212,13 +212,13 @@ TEST(BlendedOpenGl, drawsDeepOctrees) {
   const SliceView close{deepest.center(), 40 * deepest.sizes().x() * Vector3::UnitX(),
                         30 * deepest.sizes().y() * Vector3::UnitY()};
   EXPECT_TRUE(agree(makeCpuRenderer(smooth)->slice(close, kWidth, kHeight),
-                    makeGlRenderer(smooth, GlChoice::software)->slice(close, kWidth, kHeight), {.value = 5e-5}));
+                    makeGlRenderer(smooth, support::testedGl())->slice(close, kWidth, kHeight), {.value = 5e-5}));
 }
 
 TEST(BlendedField, hasNoCracks) {
   const auto count = [](const Field& field, bool gl) {
     std::size_t cracks = 0;
-    const auto renderer = gl ? makeGlRenderer(field, GlChoice::software) : makeCpuRenderer(field);
+    const auto renderer = gl ? makeGlRenderer(field, support::testedGl()) : makeCpuRenderer(field);
     for (const SurfaceView& view : views(field))
       for (const std::uint8_t crack : renderer->surface(view, kWidth, kHeight).crack) cracks += crack;
     return cracks;

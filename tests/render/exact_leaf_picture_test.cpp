@@ -206,7 +206,7 @@ TEST_P(ExactLeafPicture, ofTheOracleShowsTheExactSurface) {
 TEST_P(ExactLeafPicture, ofOpenGlIsThatOfTheOracle) {
   HPSDF_REQUIRE_GL();
   const Field& field = part().field;
-  const auto cpu = makeCpuRenderer(field), gl = makeGlRenderer(field, GlChoice::software);
+  const auto cpu = makeCpuRenderer(field), gl = makeGlRenderer(field, support::testedGl());
   for (const SliceView& view : slices(field))
     EXPECT_TRUE(agree(cpu->slice(view, kWidth, kHeight), gl->slice(view, kWidth, kHeight), sliceTolerance(field)));
   for (const double offset : {0.0, 0.003, -0.002})
@@ -227,7 +227,7 @@ TEST_P(ExactLeafPicture, ofOpenGlIsThatOfTheOracle) {
 TEST_P(ExactLeafPicture, ofABlendedFieldIsThatOfTheOracle) {
   HPSDF_REQUIRE_GL();
   const Field field = blendedField();
-  const auto cpu = makeCpuRenderer(field), gl = makeGlRenderer(field, GlChoice::software);
+  const auto cpu = makeCpuRenderer(field), gl = makeGlRenderer(field, support::testedGl());
   for (const SliceView& view : slices(field))
     EXPECT_TRUE(agree(cpu->slice(view, kWidth, kHeight), gl->slice(view, kWidth, kHeight),
                       {.value = 2e-6 * field.domain().sizes().norm()}));
@@ -262,7 +262,7 @@ TEST_P(ExactLeafPicture, differsForAWrongTriangle) {
   const Field wrong(std::move(data));
   const Camera camera = cameras(field, 1, 5).front();
   const SliceView slice = slices(field).front();
-  const auto cpu = makeCpuRenderer(field), gl = makeGlRenderer(wrong, GlChoice::software);
+  const auto cpu = makeCpuRenderer(field), gl = makeGlRenderer(wrong, support::testedGl());
   EXPECT_FALSE(agree(cpu->surface({camera, 0}, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight),
                      surfaceTolerance(field), &camera));
   EXPECT_FALSE(agree(cpu->slice(slice, kWidth, kHeight), gl->slice(slice, kWidth, kHeight), sliceTolerance(field)));
@@ -293,7 +293,7 @@ TEST(ExactLeafPictures, ofOverlappingPartsDoNotDependOnTheUnit) {
   const TriangleMesh box = support::boxOfTwo(), both = support::joined(box, support::moved(box, {0.7, 0.6, 0.5}));
   for (const double unit : {1.0, 1e-12, 1e-8, 3e8, 1e12}) {
     const Part part(support::moved(both, Vector3::Zero(), unit));
-    const auto cpu = makeCpuRenderer(part.field), gl = makeGlRenderer(part.field, GlChoice::software);
+    const auto cpu = makeCpuRenderer(part.field), gl = makeGlRenderer(part.field, support::testedGl());
     for (const SliceView& view : slices(part.field))
       EXPECT_TRUE(
           agree(cpu->slice(view, kWidth, kHeight), gl->slice(view, kWidth, kHeight), sliceTolerance(part.field)))

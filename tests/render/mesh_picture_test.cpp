@@ -201,9 +201,9 @@ TEST(MeshPicture, showsTheWholeMeshForAnyShapeOfMeshAndView) {
         }
 }
 
-/// Makes an OpenGL renderer on the software device (llvmpipe).
+/// Makes an OpenGL renderer on the device that the tests draw on.
 std::unique_ptr<BodyRenderer> makeGl(std::vector<TriangleMesh> meshes) {
-  return makeGlBodyRenderer(std::move(meshes), GlChoice::software);
+  return makeGlBodyRenderer(std::move(meshes), support::testedGl());
 }
 
 std::size_t differentPixels(const Image& a, const Image& b, int limit) {

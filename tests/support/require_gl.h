@@ -10,10 +10,18 @@
 
 namespace hpsdf::support {
 
-/// Returns why the software OpenGL device cannot be used; empty if it can.
+/// Returns the kind of OpenGL device that the tests draw on: the software device, or a graphics card if the environment
+/// variable HPSDF_TEST_GL is "hardware".
+inline render::GlChoice testedGl() {
+  const char* value = std::getenv("HPSDF_TEST_GL");
+  const bool hardware = value != nullptr && std::string(value) == "hardware";
+  return hardware ? render::GlChoice::hardware : render::GlChoice::software;
+}
+
+/// Returns why the OpenGL device of the tests cannot be used; empty if it can.
 inline std::string glProblem() {
   try {
-    render::glDescription(render::GlChoice::software);
+    render::glDescription(testedGl());
     return {};
   } catch (const Error& error) {
     return error.what();
