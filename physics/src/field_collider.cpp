@@ -146,12 +146,9 @@ class LowerBounds {
     const FieldData& data = field_.data();
     const int stored = node::degree(bits), degree = std::max(stored, 1);
     Piece piece{extentOf(leaf), degree, std::vector<double>(std::size_t(degree + 1) * (degree + 1) * (degree + 1))};
-    std::visit(
-        [&](const auto& coefficients) {
-          std::size_t next = node::offset(bits);
-          Piece::forEachTerm(0, stored, [&](int i, int j, int k) { piece.at(i, j, k) = coefficients[next++]; });
-        },
-        data.coefficients);
+    withCoefficients(data, bits, [&](const auto* c) {
+      Piece::forEachTerm(0, stored, [&](int i, int j, int k) { piece.at(i, j, k) = *c++; });
+    });
     if (data.blend == 0) return piece;
     for (int axis = 0; axis < 3; ++axis) {
       const double below = extentBeyond(leaf, axis, false), above = extentBeyond(leaf, axis, true);

@@ -116,14 +116,11 @@ class Definition {
 
   ValueAndGradient polynomial(const Cell& cell, const Vector3& x) const {
     const Vector3 half = cell.box.sizes() / 2, u = (x - cell.box.center()).cwiseQuotient(half);
-    return std::visit(
-        [&](const auto& c) {
-          ValueAndGradient result = query::evaluateWithGradient(c.data() + node::offset(field_.data().nodes[cell.id]),
-                                                                cell.degree, {u.x(), u.y(), u.z()});
-          result.gradient = result.gradient.cwiseQuotient(half);
-          return result;
-        },
-        field_.data().coefficients);
+    return withCoefficients(field_.data(), field_.data().nodes[cell.id], [&](const auto* c) {
+      ValueAndGradient result = query::evaluateWithGradient(c, cell.degree, {u.x(), u.y(), u.z()});
+      result.gradient = result.gradient.cwiseQuotient(half);
+      return result;
+    });
   }
 
   const Field& field_;

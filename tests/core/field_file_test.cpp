@@ -51,7 +51,7 @@ std::string refusal(const std::filesystem::path& file) {
 
 TEST(FieldFile, roundTripKeepsEveryByteAndValue) {
   support::TemporaryDirectory folder;
-  for (const auto type : {CoefficientType::float32, CoefficientType::float64}) {
+  for (const auto type : {CoefficientType::float32, CoefficientType::float64, CoefficientType::quantized}) {
     const Field field = small(type);
     save(field, folder.path() / "a.hpsdf");
     const Field again = load(folder.path() / "a.hpsdf");
@@ -110,7 +110,7 @@ std::vector<std::string> everyKind() {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "kind.hpsdf";
   const BuildOptions plain{.targetError = 1e-3, .grid = {2, 2, 1}, .maxDegree = 4, .maxDepth = 2};
-  std::vector<BuildOptions> kinds(7, plain);
+  std::vector<BuildOptions> kinds(8, plain);
   kinds[0].coefficients = CoefficientType::float32;
   kinds[1].coefficients = CoefficientType::float64;
   kinds[2].band = 0.2;
@@ -118,6 +118,7 @@ std::vector<std::string> everyKind() {
   kinds[4].blend = 0.1;
   kinds[5].continuityWeight = 1;
   kinds[6].maxSteps = 0;
+  kinds[7].coefficients = CoefficientType::quantized;
   std::vector<std::string> files;
   for (const BuildOptions& options : kinds) {
     save(build(torus, Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)), options), file);
@@ -184,9 +185,9 @@ constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8
                       kSinceVersion8 =
                           8 + 4 + 8 + 8 + 8 + 1 + 1 + 1 + 8 + 4 + 4 * 8 + 8;  // bytes that versions 3, 4 and 8 added
 
-/// Older files end their headers earlier: version 4 before settings and sizes of exact leaves, the tolerance and the
-/// number of measured points, version 3 before the inside test, version 2 before the settings that follow the number of
-/// steps, and version 1 before the number of steps.
+/// Older files end their headers earlier: version 8 before the step of quantized coefficients, version 4 before
+/// settings and sizes of exact leaves, the tolerance and the number of measured points, version 3 before the inside
+/// test, version 2 before the settings that follow the number of steps, and version 1 before the number of steps.
 TEST(FieldFile, filesOfOlderVersionsAreRead) {
   support::TemporaryDirectory folder;
   const auto file = folder.path() / "old.hpsdf";
@@ -197,6 +198,9 @@ TEST(FieldFile, filesOfOlderVersionsAreRead) {
   std::string bytes = readAll(file);
   const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
+  bytes[8] = 8;
+  writeAll(file, withChecksum(bytes));
+  EXPECT_EQ(load(file).data().coefficients, field.data().coefficients);
   bytes[8] = 4;
   writeAll(file, withChecksum(bytes.erase(nodes - kSinceVersion8, kSinceVersion8)));
   EXPECT_EQ(load(file).metadata().source.insideTest, field.metadata().source.insideTest);

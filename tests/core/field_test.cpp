@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "field/query/evaluate.h"
+#include "field/query/quantized.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 
@@ -197,12 +198,9 @@ TEST(Field, queriesEndInTheCellThatHoldsThePoint) {
       const Vector3 inside = x.cwiseMax(domain.min()).cwiseMin(domain.max());
       const Vector3 local = 2 * (inside - cell.box.min()).cwiseQuotient(cell.box.sizes()) - Vector3::Ones();
       const std::uint64_t bits = field.data().nodes[cell.id];
-      const double expected = std::visit(
-          [&](const auto& c) {
-            return query::evaluate(c.data() + node::offset(bits), node::degree(bits),
-                                   {local.x(), local.y(), local.z()});
-          },
-          field.data().coefficients);
+      const double expected = withCoefficients(field.data(), bits, [&](const auto* c) {
+        return query::evaluate(c, node::degree(bits), {local.x(), local.y(), local.z()});
+      });
       ASSERT_NEAR(field.value(x), expected + (x - inside).norm(), 1e-12) << x.transpose();
     }
   }
@@ -249,6 +247,12 @@ Field mixedField() {
     }
   }
   data.coefficients = coefficients;
+  return Field(std::move(data));
+}
+
+Field mixedQuantizedField() {
+  FieldData data = mixedField<double>().data();
+  EXPECT_TRUE(query::quantize(data, 1e-3));
   return Field(std::move(data));
 }
 
@@ -304,7 +308,7 @@ void expectBatchesEqualSingleQueries(const Field& field, std::span<const Vector3
 
 /// Tests every instruction set of the processor, down to scalar code.
 TEST(Field, batchesGiveTheSameBitsOnEveryInstructionSet) {
-  for (const Field& field : {mixedField<double>(), mixedField<float>()}) {
+  for (const Field& field : {mixedField<double>(), mixedField<float>(), mixedQuantizedField()}) {
     const FieldStatistics found = statistics(field);
     ASSERT_EQ(found.degreeLeaves.size(), 7u);
     ASSERT_EQ(found.depthLeaves.size(), 6u);

@@ -120,14 +120,11 @@ std::map<std::array<std::uint32_t, 2>, ReferenceJump> referenceJumps(const Field
   const basis::QuadratureRule rule = basis::gaussLegendre(24);
   const auto at = [&](const Cell& cell, const Vector3& x) {
     const Vector3 half = cell.box.sizes() / 2, u = (x - cell.box.center()).cwiseQuotient(half);
-    return std::visit(
-        [&](const auto& c) {
-          ValueAndGradient result = query::evaluateWithGradient(c.data() + node::offset(field.data().nodes[cell.id]),
-                                                                cell.degree, {u.x(), u.y(), u.z()});
-          result.gradient = result.gradient.cwiseQuotient(half);
-          return result;
-        },
-        field.data().coefficients);
+    return withCoefficients(field.data(), field.data().nodes[cell.id], [&](const auto* c) {
+      ValueAndGradient result = query::evaluateWithGradient(c, cell.degree, {u.x(), u.y(), u.z()});
+      result.gradient = result.gradient.cwiseQuotient(half);
+      return result;
+    });
   };
   std::map<std::array<std::uint32_t, 2>, ReferenceJump> found;
   for (const Cell& below : cells)

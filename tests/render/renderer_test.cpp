@@ -188,6 +188,19 @@ TEST(CpuSlice, acceptsBoxDomainsAndBothKindsOfCoefficients) {
   }
 }
 
+/// Returns the field of a torus with quantized coefficients.
+Field quantizedTorus() {
+  const auto torus = [](const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.6, x.z()) - 0.3; };
+  Field field = build(torus, kCube, {.targetError = 1e-5, .coefficients = CoefficientType::quantized});
+  EXPECT_EQ(precisionName(field), "quantized");
+  return field;
+}
+
+TEST(CpuSlice, acceptsQuantizedCoefficients) {
+  const Field field = quantizedTorus();
+  expectFieldsAnswers(field, axisSlice(field.domain(), 2, 0.25, kWidth, kHeight));
+}
+
 // --- The oracle's ray tracing against the exact surface --------------------------------------------------------------
 
 /// Returns the distances at which a ray enters and leaves the box; empty if it misses the box.
@@ -778,6 +791,15 @@ TEST_F(Gl, drawsSlicesOfDegreesUpTo30) {
     EXPECT_EQ(*std::max_element(buffers.degree.begin(), buffers.degree.end()), degree);
     expectSameSlice(field, axisSlice(field.domain(), 2, 0.1, kWidth, kHeight), {.value = 1e-5});
   }
+}
+
+TEST_F(Gl, drawsQuantizedCoefficients) {
+  const Field field = quantizedTorus();
+  expectSameSlice(field, axisSlice(field.domain(), 2, 0.1, kWidth, kHeight), {.value = 1e-5});
+  const auto cpu = makeCpuRenderer(field), gl = makeGlRenderer(field, support::testedGl());
+  for (const Camera& camera : cameras(field, 1, 2))
+    EXPECT_TRUE(agree(cpu->surface({camera, 0}, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight),
+                      surfaceTolerance(field), &camera));
 }
 
 TEST_F(Gl, drawsSlicesOfDeepOctreesAndBoxDomains) {

@@ -101,8 +101,7 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   if (metadata.source.insideTest != InsideTest::automatic)
     rows.emplace_back("Sign by", insideTestName(metadata.source.insideTest));
   rows.emplace_back("Leaf cells", grouped(counts.leaves) + exactCountText(counts));
-  rows.emplace_back("Coefficients",
-                    fmt::format("{} ({})", grouped(counts.coefficients), field.singlePrecision() ? "float" : "double"));
+  rows.emplace_back("Coefficients", fmt::format("{} ({})", grouped(counts.coefficients), precisionName(field)));
   if (counts.exact.leaves > 0) rows.emplace_back("Exact triangles", exactTrianglesText(counts.exact));
   rows.emplace_back("Memory", memoryText(field));
   if (hasTolerance(field)) {

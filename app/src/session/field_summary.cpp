@@ -93,7 +93,7 @@ Json fieldJson(const CurrentField& current) {
   Json json = {{"leaves", figures.leaves},
                {"nodes", figures.nodes},
                {"coefficients", figures.coefficients},
-               {"precision", field.singlePrecision() ? "float" : "double"},
+               {"precision", precisionName(field)},
                {"bytes", figures.bytes},
                {"file_bytes", current.fileBytes ? Json(*current.fileBytes) : Json()},
                {"total_error", metadata.hasEstimate() ? Json(metadata.totalError) : Json()},
@@ -241,8 +241,7 @@ std::string fieldLine(const Field& field) {
   const std::string triangles =
       figures.exact.leaves == 0 ? "" : fmt::format("{} triangles, ", grouped(figures.exact.triangles));
   return fmt::format("{} leaves{}, {} coefficients ({}), {}{}", grouped(figures.leaves), exactCountText(figures),
-                     grouped(figures.coefficients), field.singlePrecision() ? "float" : "double", triangles,
-                     memoryText(field));
+                     grouped(figures.coefficients), precisionName(field), triangles, memoryText(field));
 }
 
 /// Returns as text the build settings that a field file stores, except the target error. If `ofWords` is true, includes
@@ -279,8 +278,7 @@ std::string fieldText(const CurrentField& current) {
     row("normalized", fmt::format("field = {:.6g} · (mesh − {})", n.scale, vectorText(n.center)));
   row("domain", boxText(field.domain()));
   row("leaves", grouped(figures.leaves) + exactCountText(figures));
-  row("coefficients",
-      fmt::format("{} ({})", grouped(figures.coefficients), field.singlePrecision() ? "float" : "double"));
+  row("coefficients", fmt::format("{} ({})", grouped(figures.coefficients), precisionName(field)));
   if (figures.exact.leaves > 0) row("exact triangles", exactTrianglesText(figures.exact));
   row("memory", memoryText(field));
   if (current.fileBytes) row("file", bytesText(double(*current.fileBytes)));
@@ -300,7 +298,7 @@ std::string fieldText(const CurrentField& current) {
   }
   if (metadata.hasEstimate())
     row("weighted estimate", shortNumber(metadata.rmsEstimate(field.domain())) + ", √(ε/|Ω|)" + unitText(field));
-  if (field.singlePrecision()) row("change by float", shortNumber(metadata.roundingRms) + " RMS");
+  if (metadata.roundingRms > 0) row("change by rounding", shortNumber(metadata.roundingRms) + " RMS");
   row("exact distances", grouped(metadata.exactEvaluations));
   if (metadata.steps) row("refinement steps", grouped(*metadata.steps));
   row("base grid", fmt::format("{} x {} x {}", grid[0], grid[1], grid[2]));

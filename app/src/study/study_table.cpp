@@ -171,7 +171,7 @@ Json jsonOf(const TableRow& row) {
                {"target_error", estimate ? Json(metadata.settings.targetError.weighted()) : Json()},
                {"tolerance", metadata.settings.tolerance > 0 ? Json(metadata.settings.tolerance) : Json()},
                {"coefficients", row.figures.coefficients},
-               {"precision", row.field.singlePrecision() ? "float" : "double"},
+               {"precision", precisionName(row.field)},
                {"bytes", row.figures.bytes},
                {"estimated_rms", estimate ? Json(*estimate) : Json()},
                {"measured_rms", row.error.rms / row.scale()},

@@ -52,9 +52,20 @@ enum class NearnessKind : std::uint8_t {
   exponential,  ///< exp(−θ s/d) with the distance s and the domain's diagonal d (Koschier et al. 2017)
 };
 
-/// Precision of the stored coefficients. `automatic` chooses float32 if rounding changes the field by less than
-/// 1 % of the estimated RMS error and, if a maximum error is asked for, by less than 1 % of the maximum error.
-enum class CoefficientType : std::uint8_t { automatic, float32, float64 };
+/// Precision of the stored coefficients.
+enum class CoefficientType : std::uint8_t {
+  /// `float32` if rounding changes the field by less than 1 % of the estimated RMS error and, if a maximum error is
+  /// asked
+  /// for, by less than 1 % of the maximum error; else `float64`.
+  automatic,
+  float32,
+  float64,
+  /// Integers of few bits (`QuantizedCoefficients`). They change the field by about a tenth of the estimated RMS error
+  /// as RMS, which adds half a percent to this error, and at no point by more than 1 % of a maximum error or of a
+  /// tolerance that is asked for. Without such a goal, or where an integer would take more than 19 bits, the precision
+  /// is `float32`.
+  quantized,
+};
 
 /// The samples of the signed distance Φ to which a polynomial of one degree more is fitted on trial in a cell
 /// (p-trial).

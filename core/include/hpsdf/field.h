@@ -110,6 +110,9 @@ struct FieldStatistics {
 
 FieldStatistics statistics(const Field& field);
 
+/// Returns the precision of a field's coefficients as text: "double", "float" or "quantized".
+std::string precisionName(const Field& field);
+
 /// Returns a degree or a depth as text: "exact" for the degree of exact leaves, which is greater than every depth.
 std::string levelName(int level);
 

@@ -19,12 +19,6 @@ constexpr double kGrain = 0.25;      // least length of a step in a blend zone, 
 constexpr int kStepLimit = 1 << 16;
 constexpr int kMostRefinements = 24;
 
-/// Calls f(coefficients) with a pointer to a leaf's coefficients, which are of type float or double.
-template <typename F>
-auto withCoefficients(const FieldData& field, std::uint32_t leaf, F&& f) {
-  return std::visit([&](const auto& c) { return f(c.data() + node::offset(field.nodes[leaf])); }, field.coefficients);
-}
-
 /// The Legendre polynomials L_i(x) and their derivatives L_i'(x) for i = 0 to `degree`.
 struct Legendre {
   Legendre(double x, int degree) {
@@ -199,7 +193,7 @@ double TraceField::linearSlope(std::uint32_t leaf, const Vector3& direction) con
   const int p = degree(leaf);
   if (p == 0 || p == kExactDegree) return 0;
   // The coefficients c_ijk are in lexicographic order; the indices below are those of c_100, c_010 and c_001.
-  return withCoefficients(field_, leaf, [&](const auto* c) {
+  return withCoefficients(field_, field_.nodes[leaf], [&](const auto* c) {
     return c[coefficientCount(p) - coefficientCount(p - 1)] * direction.x() + c[p + 1] * direction.y() +
            c[1] * direction.z();
   });
@@ -233,7 +227,8 @@ Sample TraceField::sampleLeaf(std::uint32_t leaf, int depth, const Vector3& loca
     const ValueAndGradient world = evaluateExactLeaf(field_.exact, bits, worldPoint(p));
     return {world.value, localGradient(world.gradient, depth)};
   }
-  return withCoefficients(field_, leaf, [&](const auto* c) { return evaluate<true>(c, degree(leaf), local); });
+  return withCoefficients(field_, field_.nodes[leaf],
+                          [&](const auto* c) { return evaluate<true>(c, degree(leaf), local); });
 }
 
 Sample TraceField::sample(const CellPoint& leaf, const Vector3& local) const {
@@ -249,7 +244,7 @@ Sample TraceField::sample(const Hit& hit) const {
 double TraceField::value(const CellPoint& leaf, const Vector3& local) const {
   if (field_.blend > 0) return sampleBlended(leaf, local).value;
   if (node::isExact(field_.nodes[leaf.node])) return sample(leaf, local).value;
-  return withCoefficients(field_, leaf.node,
+  return withCoefficients(field_, field_.nodes[leaf.node],
                           [&](const auto* c) { return evaluate<false>(c, degree(leaf.node), local).value; });
 }
 

@@ -61,7 +61,7 @@ std::vector<float> uploadedCoefficients(const FieldData& field) {
   for (const std::uint64_t bits : field.nodes) {
     if (!node::isLeaf(bits) || node::isExact(bits)) continue;
     const int degree = node::degree(bits);
-    std::visit([&](const auto& c) { uploadLeaf(c.data() + node::offset(bits), degree, out); }, field.coefficients);
+    withCoefficients(field, bits, [&](const auto* c) { uploadLeaf(c, degree, out); });
     out += uploadedCount(degree);
   }
   return uploaded;

@@ -292,8 +292,7 @@ class LeafBounder {
 
   void assign(Polynomial& polynomial, const NodeBox& leaf, int size) const {
     const std::uint64_t bits = field_.nodes[leaf.node];
-    std::visit([&](const auto& c) { polynomial.assign(c.data() + node::offset(bits), node::degree(bits), size); },
-               field_.coefficients);
+    withCoefficients(field_, bits, [&](const auto* c) { polynomial.assign(c, node::degree(bits), size); });
   }
 
   const FieldData& field_;

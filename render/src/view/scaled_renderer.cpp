@@ -32,7 +32,10 @@ Field scaled(const Field& field, double factor) {
   data.domain = Box(factor * data.domain.min(), factor * data.domain.max());
   std::visit(
       [&](auto& coefficients) {
-        for (auto& c : coefficients) c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
+        if constexpr (requires { coefficients.step; })
+          coefficients.step *= factor;
+        else
+          for (auto& c : coefficients) c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
       },
       data.coefficients);
   std::visit(

@@ -107,20 +107,17 @@ std::vector<SurfaceBounds> surfaceBounds(const FieldData& field, const std::vect
   std::vector<SurfaceBounds> bounds(field.nodes.size());
   // Compute the bounds of all leaves.
   setExactBounds(field, bounds);
-  std::visit(
-      [&](const auto& coefficients) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size()), [&](const auto& range) {
-          for (std::size_t n = range.begin(); n < range.end(); ++n) {
-            if (!node::isLeaf(field.nodes[n])) continue;
-            if (!node::isExact(field.nodes[n]))
-              bounds[n] = leafBounds(coefficients.data() + node::offset(field.nodes[n]), node::degree(field.nodes[n]));
-            if (zones.empty()) continue;
-            bounds[n].lo -= zones[n].valueDifference;
-            bounds[n].hi += zones[n].valueDifference;
-          }
-        });
-      },
-      field.coefficients);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bounds.size()), [&](const auto& range) {
+    for (std::size_t n = range.begin(); n < range.end(); ++n) {
+      const std::uint64_t bits = field.nodes[n];
+      if (!node::isLeaf(bits)) continue;
+      if (!node::isExact(bits))
+        bounds[n] = withCoefficients(field, bits, [&](const auto* c) { return leafBounds(c, node::degree(bits)); });
+      if (zones.empty()) continue;
+      bounds[n].lo -= zones[n].valueDifference;
+      bounds[n].hi += zones[n].valueDifference;
+    }
+  });
   // Set the range of each parent to the union of its children's ranges. The loop runs backwards because children
   // follow their parents.
   for (std::size_t n = bounds.size(); n-- > 0;) {

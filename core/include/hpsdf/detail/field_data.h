@@ -2,6 +2,7 @@
 // The arrays of a field, and the record of how it was built.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <variant>
@@ -79,11 +80,35 @@ struct CellBound {
   float slope = 0;  ///< bound of ‖∇f‖
 };
 
+/// Coefficients that are stored as integers of few bits (`CoefficientType::quantized`). A coefficient c_ijk is
+/// q · `step` · √((2i+1)(2j+1)(2k+1)) with an integer q. In this orthonormal basis, rounding to a multiple of the step
+/// changes the field by the same amount, as RMS, whichever coefficient it is.
+///
+/// A leaf of degree p is a string of bits that starts at a byte, lowest bit first:
+/// * p numbers of 5 bits, the widths w_1 to w_p,
+/// * the integer of degree 0, of `meanBits` bits,
+/// * for each total degree d = 1 to p the (d+1)(d+2)/2 integers with i+j+k = d, of w_d bits each, in lexicographic
+/// order
+///   of (i, j, k).
+/// An integer q of w bits is stored as the number q + 2^(w−1); with w = 0, it is 0 and takes no bits.
+struct QuantizedCoefficients {
+  static constexpr int kWidthBits = 5;        ///< bits of a width
+  static constexpr int kMostBits = 19;        ///< greatest width, so that a read of 64 bits holds three integers
+  static constexpr int kMostMeanBits = 32;    ///< greatest value of `meanBits`
+  static constexpr std::size_t kPadding = 8;  ///< zero bytes at the end, so that 64 bits can be read at every integer
+
+  double step = 0;
+  std::uint32_t meanBits = 0;
+  std::vector<std::uint8_t> bytes;  ///< the leaves, and `kPadding` zero bytes
+
+  friend bool operator==(const QuantizedCoefficients&, const QuantizedCoefficients&) = default;
+};
+
 /// The finished octree as arrays. The first nodes are the base cells, x fastest, then y, then z. There are three kinds
 /// of nodes:
 /// * An internal node has bit 63 clear. Its low 32 bits are the index of its first child (child number x + 2y + 4z).
 /// * A leaf with a polynomial has bit 63 set. Its bits 32 to 39 are the degree p, and its low 32 bits are the offset of
-///   its n(p) coefficients.
+///   its n(p) coefficients: an index into the array of coefficients or, for `QuantizedCoefficients`, into its bytes.
 /// * An exact leaf has bit 63 set. Its bits 32 to 39 are `kExactDegree`, its bits 48 and 49 are the `ExactSign`. Its
 ///   low 32 bits are the offset of its list in `ExactTriangles::lists`.
 /// All other bits are 0.
@@ -95,7 +120,7 @@ struct FieldData {
   Box domain;
   std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< number of base cells along each axis
   std::vector<std::uint64_t> nodes;
-  std::variant<std::vector<double>, std::vector<float>> coefficients;
+  std::variant<std::vector<double>, std::vector<float>, QuantizedCoefficients> coefficients;
   ExactTriangles exact = {};  ///< the triangles of exact leaves; empty if the field has none
   /// Width of the zones along the faces of a leaf in which the leaf is blended with its neighbours, as a fraction of
   /// the leaf's edge: from 0 (no blending) to `kMaxBlend`.
@@ -126,6 +151,29 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n) {
 }
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
+
+/// Returns the bytes that the coefficients of a field take.
+std::size_t coefficientBytes(const FieldData& field);
+
+/// Computes the n(p) coefficients of a leaf of degree p, in the order of `FieldData`.
+void decodeLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out);
+
+/// Returns f(c) for a pointer c to the coefficients of a leaf with a polynomial. They are double or float; quantized
+/// coefficients are decoded to double. `leaf` is the packed node.
+template <typename F>
+decltype(auto) withCoefficients(const FieldData& field, std::uint64_t leaf, F&& f) {
+  return std::visit(
+      [&](const auto& coefficients) -> decltype(auto) {
+        if constexpr (requires { coefficients.data(); }) {
+          return f(coefficients.data() + node::offset(leaf));
+        } else {
+          std::array<double, std::size_t(coefficientCount(kMaxDegree))> decoded;
+          decodeLeaf(coefficients, leaf, decoded.data());
+          return f(static_cast<const double*>(decoded.data()));
+        }
+      },
+      field.coefficients);
+}
 
 /// Packs the blend extents at the six faces of a leaf into 32 bits. Near a face, the leaf's blending weight grows from
 /// 0 outside the leaf to 1 inside. The blend extent is the distance on either side of the face up to which the weight

@@ -238,11 +238,8 @@ class FaceMeter {
     }
     const std::uint64_t bits = data_.nodes[leaf.node];
     const Vector3 toWorld = 2 * cellSize(data_, leaf.depth).cwiseInverse();
-    std::visit(
-        [&](const auto& c) {
-          trace.evaluate(c.data() + node::offset(bits), node::degree(bits), axis, t, along_, toWorld);
-        },
-        data_.coefficients);
+    withCoefficients(data_, bits,
+                     [&](const auto* c) { trace.evaluate(c, node::degree(bits), axis, t, along_, toWorld); });
   }
 
   /// Evaluates the field, blended or exact, point by point at the samples of a face of the leaf `small`. The results

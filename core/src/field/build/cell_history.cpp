@@ -89,15 +89,12 @@ class Target {
     if (fit.degree != node::degree(bits)) return false;
     constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
     double scale = 0, difference = 0;
-    std::visit(
-        [&](const auto& coefficients) {
-          for (std::size_t i = 0; i < fit.coefficients.size(); ++i) {
-            const double stored = coefficients[node::offset(bits) + i];
-            scale = std::max(scale, std::abs(stored));
-            difference = std::max(difference, std::abs(stored - fit.coefficients[i]));
-          }
-        },
-        data.coefficients);
+    withCoefficients(data, bits, [&](const auto* stored) {
+      for (std::size_t i = 0; i < fit.coefficients.size(); ++i) {
+        scale = std::max(scale, std::abs(double(stored[i])));
+        difference = std::max(difference, std::abs(double(stored[i]) - fit.coefficients[i]));
+      }
+    });
     return difference <= kRounding * scale;
   }
 

@@ -1,11 +1,14 @@
 #include "field/cells/build_tree.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
 #include "field/cells/exact_lists.h"
 #include "field/query/float_coefficients.h"
+#include "field/query/quantized.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::detail {
@@ -145,6 +148,26 @@ FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch*
   return layOutTree(tree, std::move(metadata), search, [&](std::uint32_t n) { tree.nodes[n].fit = Fit{}; });
 }
 
+/// Quantizes the coefficients of a field as `CoefficientType::quantized` says. Returns false, and leaves the field as
+/// it is, if that is not possible.
+static bool quantizeCoefficients(FieldData& field) {
+  constexpr double kShareOfRms = 0.1, kShareOfMaximum = 0.01;
+  FieldMetadata& metadata = field.metadata;
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const auto limit = [&](double share, double error) { return error > 0 ? share * error : kNone; };
+  const double rms = metadata.hasEstimate() ? limit(kShareOfRms, metadata.rmsEstimate(field.domain)) : kNone;
+  const double max =
+      std::min(limit(kShareOfMaximum, metadata.settings.maxError), limit(kShareOfMaximum, metadata.settings.tolerance));
+  const double step = query::quantizationStep(field, rms, max);
+  FieldData quantized = field;
+  if (!(step > 0 && step < kNone) || !query::quantize(quantized, step)) return false;
+  metadata.roundingRms = query::quantizedRounding(field, quantized).rms;
+  field.nodes = std::move(quantized.nodes);
+  field.coefficients = std::move(quantized.coefficients);
+  query::roundVertices(field.exact);
+  return true;
+}
+
 void roundCoefficients(CoefficientType type, FieldData& field) {
   constexpr double kNegligible = 0.01;
   if (query::hasFloatVertices(field.exact)) query::roundVertices(field.exact);
@@ -156,6 +179,7 @@ void roundCoefficients(CoefficientType type, FieldData& field) {
                                 ? rounding.max < kNegligible * tolerance
                                 : rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
   if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isNegligible)) return;
+  if (type == CoefficientType::quantized && quantizeCoefficients(field)) return;
   query::toFloat(field);
   query::roundVertices(field.exact);
   metadata.roundingRms = rounding.rms;

@@ -238,8 +238,7 @@ float roundedUp(double number) {
 /// degree.
 std::vector<double> cubeOf(const FieldData& field, std::uint32_t leaf, int degree) {
   const std::uint64_t bits = field.nodes[leaf];
-  return std::visit([&](const auto& c) { return cubeFrom(c.data() + node::offset(bits), node::degree(bits), degree); },
-                    field.coefficients);
+  return withCoefficients(field, bits, [&](const auto* c) { return cubeFrom(c, node::degree(bits), degree); });
 }
 
 /// The box in which two touching leaves both have a blending weight. It extends on either side of the leaves' common

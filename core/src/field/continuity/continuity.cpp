@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "field/continuity/face_coupling.h"
 #include "field/nearness.h"
 #include "field/query/evaluate.h"
 #include "field/query/float_coefficients.h"
+#include "field/query/quantized.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
@@ -197,7 +200,10 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
   query::toDouble(data);
   const continuity::WeakContinuityFigures figures =
       withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
-  if (field.singlePrecision()) {
+  const auto* quantized = std::get_if<QuantizedCoefficients>(&field.data().coefficients);
+  if (quantized != nullptr && query::quantize(data, quantized->step)) {
+    data.metadata.roundingRms *= std::numbers::sqrt2;  // The field was rounded twice, to the same step.
+  } else if (quantized != nullptr || field.singlePrecision()) {
     data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, query::floatRounding(data).rms);
     query::toFloat(data);
   }

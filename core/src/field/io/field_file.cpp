@@ -23,16 +23,20 @@ namespace {
 constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
 // and criteria; version 4 the inside test; version 8 exact leaves, the tolerance, the measurement and
-// the settings that a replay of the construction needs. Versions 5 to 7 were never released.
-constexpr std::uint32_t kFieldVersion = 8;
+// the settings that a replay of the construction needs; version 9 quantized coefficients. Versions 5 to 7 were never
+// released.
+constexpr std::uint32_t kFieldVersion = 9, kExactLeavesVersion = 8;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
+constexpr std::uint32_t kQuantized = 1;  // stands in place of the bytes of a coefficient
 
 constexpr detail::FileKind kFieldFile{"field file", "a .hpsdf file", "build or copy it again"};
 
 struct Sizes {
   std::uint64_t nodes = 0;
-  std::uint64_t coefficients = 0;
-  std::uint32_t coefficientBytes = 8;
+  std::uint64_t coefficients = 0;      ///< number of coefficients, or of bytes if they are quantized
+  std::uint32_t coefficientBytes = 8;  ///< bytes of one coefficient, or `kQuantized`
+  double step = 0;                     ///< `QuantizedCoefficients::step`
+  std::uint32_t meanBits = 0;          ///< `QuantizedCoefficients::meanBits`
   std::uint64_t bounds = 0;
   std::uint32_t vertexBytes = 8;  ///< bytes of one coordinate of a vertex
   std::uint64_t vertices = 0, triangles = 0, lists = 0;
@@ -42,8 +46,15 @@ Sizes sizesOf(const FieldData& data) {
   Sizes sizes{.nodes = data.nodes.size(), .bounds = data.bounds.size()};
   std::visit(
       [&](const auto& c) {
-        sizes.coefficients = c.size();
-        sizes.coefficientBytes = sizeof(c[0]);
+        if constexpr (requires { c.step; }) {
+          sizes.coefficients = c.bytes.size();
+          sizes.coefficientBytes = kQuantized;
+          sizes.step = c.step;
+          sizes.meanBits = c.meanBits;
+        } else {
+          sizes.coefficients = c.size();
+          sizes.coefficientBytes = sizeof(c[0]);
+        }
       },
       data.coefficients);
   std::visit(
@@ -162,7 +173,7 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   if (version < 4) return;
   stream.item(m.source.insideTest);
   stream.item(m.source.thickness);
-  if (version < kFieldVersion) return;
+  if (version < kExactLeavesVersion) return;
   settingItems(stream, m.settings, 14, 22);
   stream.item(sizes.vertexBytes);
   stream.item(sizes.vertices);
@@ -170,6 +181,9 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(sizes.lists);
   stream.item(data.exact.offset);
   measurementItem(stream, m.measurement);
+  if (version < kFieldVersion || sizes.coefficientBytes != kQuantized) return;
+  stream.item(sizes.step);
+  stream.item(sizes.meanBits);
 }
 
 /// Reads an array of `size` numbers of type float or double, whose size in bytes is `bytes`, into a variant of vectors.
@@ -191,7 +205,14 @@ void save(const Field& field, const std::filesystem::path& file) {
   header(writer, data, sizes, kFieldVersion);
   const auto write = [&](const auto& array) { writer.array(array, array.size()); };
   write(data.nodes);
-  std::visit(write, data.coefficients);
+  std::visit(
+      [&](const auto& c) {
+        if constexpr (requires { c.step; })
+          write(c.bytes);
+        else
+          write(c);
+      },
+      data.coefficients);
   write(data.bounds);
   std::visit(write, data.exact.vertices);
   write(data.exact.triangles);
@@ -213,19 +234,28 @@ Field load(const std::filesystem::path& file) {
     reader.refuse(std::string("is not a .hpsdf file") + (isTooShort ? " (too short)" : "") +
                   "; build one with `hpsdf build`");
   constexpr std::uint32_t kLastBefore = 4;
-  if (*version == 0 || (*version > kLastBefore && *version != kFieldVersion))
-    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to 4 and " +
-                  std::to_string(kFieldVersion) + "; build it again");
+  if (*version == 0 || (*version > kLastBefore && *version < kExactLeavesVersion) || *version > kFieldVersion)
+    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to 4, " +
+                  std::to_string(kExactLeavesVersion) + " and " + std::to_string(kFieldVersion) + "; build it again");
   FieldData data;
   Sizes sizes;
   header(reader, data, sizes, *version);
-  reader.require(sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8, "its coefficients have an unknown type");
+  const bool isQuantized = sizes.coefficientBytes == kQuantized && *version == kFieldVersion;
+  reader.require(isQuantized || sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8,
+                 "its coefficients have an unknown type");
   reader.require(sizes.vertexBytes == 4 || sizes.vertexBytes == 8, "its vertices have an unknown type");
   Source& source = data.metadata.source;
   reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
   if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
   reader.array(data.nodes, sizes.nodes);
-  arrayOf<float, double>(reader, sizes.coefficientBytes, sizes.coefficients, data.coefficients);
+  if (isQuantized) {
+    auto& coefficients = data.coefficients.emplace<QuantizedCoefficients>();
+    coefficients.step = sizes.step;
+    coefficients.meanBits = sizes.meanBits;
+    reader.array(coefficients.bytes, sizes.coefficients);
+  } else {
+    arrayOf<float, double>(reader, sizes.coefficientBytes, sizes.coefficients, data.coefficients);
+  }
   reader.array(data.bounds, sizes.bounds);
   arrayOf<Eigen::Vector3f, Eigen::Vector3d>(reader, sizes.vertexBytes, sizes.vertices, data.exact.vertices);
   reader.array(data.exact.triangles, sizes.triangles);

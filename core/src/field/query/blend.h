@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "field/query/evaluate.h"
+#include "field/query/quantized.h"
 #include "hpsdf/detail/field_data.h"
 #include "hpsdf/detail/lookup_grid.h"
 
@@ -226,7 +227,7 @@ Result evaluateLeaf(const FieldData& field, const GridFrame& frame, const std::a
     evaluateExact(field.exact, leaf.bits, octantOf(leaf.local), {&x, 1}, &result);
     return result;
   }
-  std::visit([&](const auto& c) { evaluateLeaf(c.data(), frame, leaf, result); }, field.coefficients);
+  std::visit([&](const auto& c) { evaluateLeaf(c, frame, leaf, result); }, field.coefficients);
   return result;
 }
 

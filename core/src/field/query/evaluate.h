@@ -8,6 +8,7 @@
 #include <span>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "basis/legendre.h"
 #include "field/query/exact_leaf.h"
@@ -183,6 +184,8 @@ using basis::legendreValuesAndDerivatives;
 template <typename F>
 auto withDegree(int degree, const F& f) {
   switch (degree) {
+    case 1:
+      return f(Constant<1>());
     case 2:
       return f(Constant<2>());
     case 3:
@@ -208,18 +211,24 @@ ValueAndGradient evaluateWithGradient(const T* coefficients, int degree, const s
   return {value, {x, y, z}};
 }
 
+/// Scales a gradient from the local coordinates of a leaf to world units.
+inline void toWorldUnits(const GridFrame& frame, const LeafPoint& leaf, Vector3& gradient) {
+  const double scale = 2.0 * (std::uint32_t{1} << leaf.depth);
+  for (int axis = 0; axis < 3; ++axis) gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
+}
+
 /// Evaluates the polynomial of a leaf, which is not exact, at a point. The overload for `ValueAndGradient` gives the
-/// gradient in world units.
+/// gradient in world units. There are more overloads for quantized coefficients (quantized.h).
 template <typename T>
-void evaluateLeaf(const T* coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
-  value = evaluate(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
+  value = evaluate(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
 }
 
 template <typename T>
-void evaluateLeaf(const T* coefficients, const GridFrame& frame, const LeafPoint& leaf, ValueAndGradient& result) {
-  result = evaluateWithGradient(coefficients + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
-  const double scale = 2.0 * (std::uint32_t{1} << leaf.depth);
-  for (int axis = 0; axis < 3; ++axis) result.gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
+void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame& frame, const LeafPoint& leaf,
+                  ValueAndGradient& result) {
+  result = evaluateWithGradient(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  toWorldUnits(frame, leaf, result.gradient);
 }
 
 /// Returns true if x lies in the domain, and false if x contains NaN. A single combined condition is faster
@@ -257,7 +266,7 @@ inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
 }
 
 /// Makes the lookup grid of a field, an array of the octree nodes of one depth. Chooses the greatest depth at which the
-/// array takes at most a sixteenth of the bytes of the nodes and coefficients.
+/// array takes at most a sixteenth of the bytes of the nodes and coefficients, or an eighth if they are quantized.
 LookupGrid makeLookupGrid(const FieldData& field);
 
 /// Evaluates a field at many points. On every instruction set, the results are bit for bit equal to those of

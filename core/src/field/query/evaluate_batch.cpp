@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <type_traits>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "field/query/blend.h"
 #include "field/query/evaluate.h"
@@ -42,8 +44,52 @@ struct Lanes {
   friend HWY_INLINE Lanes operator*(Lanes a, Lanes b) { return hn::Mul(a.v, b.v); }
 };
 
+/// A SIMD vector with one word of 64 bits for each of several leaves.
+struct LaneWords {
+  hn::Vec<Unsigned> v;
+  HWY_INLINE LaneWords(hn::Vec<Unsigned> words) : v(words) {}
+  HWY_INLINE explicit LaneWords(std::uint64_t word) : v(hn::Set(Unsigned(), word)) {}
+  friend HWY_INLINE LaneWords operator+(LaneWords a, LaneWords b) { return hn::Add(a.v, b.v); }
+  friend HWY_INLINE LaneWords operator-(LaneWords a, LaneWords b) { return hn::Sub(a.v, b.v); }
+  friend HWY_INLINE LaneWords operator&(LaneWords a, LaneWords b) { return hn::And(a.v, b.v); }
+  friend HWY_INLINE LaneWords operator|(LaneWords a, LaneWords b) { return hn::Or(a.v, b.v); }
+  friend HWY_INLINE LaneWords operator<<(LaneWords a, LaneWords count) { return hn::Shl(a.v, count.v); }
+  friend HWY_INLINE LaneWords operator>>(LaneWords a, LaneWords count) { return hn::Shr(a.v, count.v); }
+};
+
+HWY_INLINE Lanes asNumber(LaneWords words) { return hn::BitCast(Tag(), words.v); }
+
+/// Loads the words that begin at `Count` places in an array of bytes. This is faster than a gather, and than a load of
+/// words that have just been stored one by one.
+template <std::size_t Count>
+HWY_INLINE auto wordsAt(const std::uint8_t* bytes, const std::uint64_t* at) {
+  const hn::FixedTag<std::uint64_t, Count> d;
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (Count > 1)
+    return hn::Combine(d, wordsAt<Count / 2>(bytes, at + Count / 2), wordsAt<Count / 2>(bytes, at));
+  else
+#endif
+    return hn::LoadU(d, reinterpret_cast<const std::uint64_t*>(bytes + *at));
+}
+
+/// The bits of several leaves in an array of bytes, in the form that decodeLeaves takes.
+struct LanesOfBits {
+  const std::uint8_t* bytes;
+  hn::Vec<Unsigned> begins;  ///< the first bit of each leaf in the array
+
+  HWY_INLINE LaneWords begin() const { return begins; }
+
+  /// Returns for each leaf at least 57 bits from a bit of the array on, the first in the lowest bit.
+  HWY_INLINE LaneWords read(LaneWords position) const {
+    HWY_ALIGN std::uint64_t at[kLanes];
+    hn::Store(hn::ShiftRight<3>(position.v), Unsigned(), at);
+    return LaneWords(wordsAt<kLanes>(bytes, at)) >> (position & LaneWords(7));
+  }
+};
+
 #include "basis/legendre-inl.h"
 #include "field/query/polynomial-inl.h"
+#include "field/query/quantized-inl.h"
 
 /// Number of points in a batch: large enough that loops over a batch overlap their memory accesses, small
 /// enough for a batch to fit into the L1 cache.
@@ -52,7 +98,7 @@ static_assert(kBatch % kLanes == 0);
 
 /// The lowest and the highest polynomial degree with SIMD code. `withDegree` has compile-time constants for the
 /// same degrees.
-constexpr int kMinVectorDegree = 2, kMaxVectorDegree = 4;
+constexpr int kMinVectorDegree = 1, kMaxVectorDegree = 4;
 
 /// Number of lists into which the points of a batch are sorted: one for each degree with SIMD code, and one for
 /// all other degrees.
@@ -157,20 +203,30 @@ void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch)
   for (std::size_t i = batch.count; i % kLanes != 0; ++i) batch.bits[i] = batch.bits[i - 1];
 }
 
+/// Prefetches the coefficients of a leaf: the same number of cache lines for each leaf, because a varying end of the
+/// loop would be mispredicted.
+template <typename T>
+HWY_INLINE void prefetch(const std::vector<T>& coefficients, std::size_t offset, int degree) {
+  const std::size_t last = coefficientCount(degree) - 1;
+  for (std::size_t at = 0; at < coefficientCount(kMaxVectorDegree); at += 64 / sizeof(T))
+    __builtin_prefetch(coefficients.data() + offset + std::min(at, last));
+}
+
+/// A quantized leaf of up to `kMaxVectorDegree` takes less than a cache line, nearly always.
+HWY_INLINE void prefetch(const QuantizedCoefficients& coefficients, std::size_t offset, int /*degree*/) {
+  __builtin_prefetch(coefficients.bytes.data() + offset);
+  __builtin_prefetch(coefficients.bytes.data() + std::min(offset + 63, coefficients.bytes.size() - 1));
+}
+
 /// Groups the points of a batch by the degree of their leaves, and prefetches the leaves' coefficients. No branch
 /// depends on the degree.
-template <typename T>
-void listByDegree(const T* coefficients, Batch& batch) {
+template <typename Coefficients>
+void listByDegree(const Coefficients& coefficients, Batch& batch) {
   std::array<std::size_t, kLists> counts{};
   for (std::size_t i = 0; i < batch.count; ++i) {
     const int degree = node::degree(batch.bits[i]);
     const bool isExact = degree == kExactDegree;
-    const T* first = coefficients + (isExact ? 0 : node::offset(batch.bits[i]));
-    const std::size_t last = isExact ? 0 : coefficientCount(degree) - 1;
-    // Prefetch the same number of cache lines for each leaf, because a varying end of the loop would be
-    // mispredicted.
-    for (std::size_t at = 0; at < coefficientCount(kMaxVectorDegree); at += 64 / sizeof(T))
-      __builtin_prefetch(first + std::min(at, last));
+    prefetch(coefficients, isExact ? 0 : node::offset(batch.bits[i]), isExact ? 0 : degree);
     for (std::size_t k = 0; k < kLists; ++k) batch.listed[k][counts[k]] = static_cast<std::uint8_t>(i);
     for (std::size_t k = 0; k + 1 < kLists; ++k) counts[k] += degree == kMinVectorDegree + int(k);
     counts[kLists - 1] += degree < kMinVectorDegree || degree > kMaxVectorDegree;
@@ -234,36 +290,76 @@ HWY_INLINE void loadAllTransposed(const std::array<const T*, kLanes>& from, std:
   }
 }
 
+/// Loads the coefficients of several leaves of degree P, one leaf for each lane.
+template <int P, typename T>
+HWY_INLINE void loadLeaves(const std::vector<T>& coefficients, const std::array<std::uint32_t, kLanes>& offsets,
+                           std::array<Lanes, coefficientCount(P)>& out) {
+  std::array<const T*, kLanes> leaves;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) leaves[lane] = coefficients.data() + offsets[lane];
+  loadAllTransposed(leaves, out);
+}
+
+/// Quantized coefficients are loaded in units of the step.
+template <int P>
+HWY_INLINE void loadLeaves(const QuantizedCoefficients& coefficients, const std::array<std::uint32_t, kLanes>& offsets,
+                           std::array<Lanes, coefficientCount(P)>& out) {
+  std::array<std::uint64_t, kLanes> begins;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) begins[lane] = std::uint64_t{offsets[lane]} << 3;
+  decodeLeaves<P>(LanesOfBits{coefficients.bytes.data(), hn::LoadU(Unsigned(), begins.data())}, coefficients.meanBits,
+                  out.data());
+}
+
+/// Returns loaded coefficients in the form that `evaluatePolynomial` takes.
+template <int P, typename T>
+HWY_INLINE const Lanes* asCoefficients(const std::vector<T>& /*coefficients*/, const Lanes* loaded) {
+  return loaded;
+}
+template <int P>
+HWY_INLINE OrthonormalIntegers<P, Lanes> asCoefficients(const QuantizedCoefficients& /*coefficients*/,
+                                                        const Lanes* loaded) {
+  return {loaded};
+}
+
+/// Converts results from the unit of loaded coefficients to that of the field.
+template <typename T>
+HWY_INLINE Vec inUnits(const std::vector<T>& /*coefficients*/, Vec result) {
+  return result;
+}
+HWY_INLINE Vec inUnits(const QuantizedCoefficients& coefficients, Vec result) {
+  return result * hn::Set(Tag(), coefficients.step);
+}
+
 /// Evaluates polynomials of degree P at the points that are listed for this degree, one SIMD vector of points
 /// at a time. The last point of the list is repeated in unused lanes.
-template <int P, typename T, typename Result>
-void evaluateListed(const T* coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
+template <int P, typename Coefficients, typename Result>
+void evaluateListed(const Coefficients& coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
   const Tag d;
   for (std::size_t n = 0; n < batch.listedCount[P - kMinVectorDegree]; n += kLanes) {
     const std::uint8_t* points = batch.listed[P - kMinVectorDegree] + n;
     std::array<const double*, kLanes> leafPoints;
-    std::array<const T*, kLanes> leaves;
+    std::array<std::uint32_t, kLanes> offsets;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       leafPoints[lane] = batch.leafPoints[points[lane]].local;
-      leaves[lane] = coefficients + node::offset(batch.bits[points[lane]]);
+      offsets[lane] = node::offset(batch.bits[points[lane]]);
     }
     std::array<Lanes, 4> leafPoint;
     std::array<Lanes, coefficientCount(P)> c;
     loadAllTransposed(leafPoints, leafPoint);
-    loadAllTransposed(leaves, c);
+    loadLeaves<P>(coefficients, offsets, c);
+    const auto loaded = asCoefficients<P>(coefficients, c.data());
     const std::array<Lanes, 3> local = {leafPoint[0], leafPoint[1], leafPoint[2]};
     if constexpr (std::is_same_v<Result, double>) {
       HWY_ALIGN double value[kLanes];
-      hn::Store(evaluatePolynomial(c.data(), Constant<P>(), local).v, d, value);
+      hn::Store(inUnits(coefficients, evaluatePolynomial(loaded, Constant<P>(), local).v), d, value);
       for (std::size_t lane = 0; lane < kLanes; ++lane) out[points[lane]] = value[lane];
     } else {
-      const auto result = evaluatePolynomialWithGradient(c.data(), Constant<P>(), local);
+      const auto result = evaluatePolynomialWithGradient(loaded, Constant<P>(), local);
       const auto scale = hn::Set(d, 2.0) * depthScale(hn::BitCast(Unsigned(), leafPoint[3].v));
       HWY_ALIGN double number[4][kLanes];
-      hn::Store(result[0].v, d, number[0]);
+      hn::Store(inUnits(coefficients, result[0].v), d, number[0]);
       for (int axis = 0; axis < 3; ++axis) {
         const auto toWorld = scale * hn::Set(d, frame.cells[axis]) / hn::Set(d, frame.size[axis]);
-        hn::Store(result[axis + 1].v * toWorld, d, number[axis + 1]);
+        hn::Store(inUnits(coefficients, result[axis + 1].v) * toWorld, d, number[axis + 1]);
       }
       for (std::size_t lane = 0; lane < kLanes; ++lane)
         out[points[lane]] = {number[0][lane], {number[1][lane], number[2][lane], number[3][lane]}};
@@ -301,9 +397,9 @@ void evaluateExactPoints(const ExactTriangles& exact, const GridFrame& frame, co
 }
 
 /// Evaluates, at each point of a batch, the leaf that holds the point, without blending.
-template <typename T, typename Result>
-void evaluateLeaves(const FieldData& field, const T* coefficients, const GridFrame& frame, const Batch& batch,
-                    Result* out) {
+template <typename Coefficients, typename Result>
+void evaluateLeaves(const FieldData& field, const Coefficients& coefficients, const GridFrame& frame,
+                    const Batch& batch, Result* out) {
   forEachUpTo(Constant<kMaxVectorDegree - kMinVectorDegree>(),
               [&](auto k) { evaluateListed<kMinVectorDegree + k>(coefficients, frame, batch, out); });
   std::array<ExactPoint, kBatch> exactPoints;
@@ -388,8 +484,8 @@ HWY_INLINE void addAcrossFace(const LookupGrid& lookupGrid, const Batch& batch, 
 
 /// Blends the field, like `blendInZone`, at all points of a batch that lie in blend zones. On entry `out` holds
 /// the result of each point's own leaf.
-template <typename T, typename Result>
-void blend(const FieldData& field, const LookupGrid& lookupGrid, const T* coefficients, const Batch& batch,
+template <typename Coefficients, typename Result>
+void blend(const FieldData& field, const LookupGrid& lookupGrid, const Coefficients& coefficients, const Batch& batch,
            Result* out) {
   // Blend the points that are near several faces of their leaf one by one. Collect the points that are near a
   // single face.
@@ -449,10 +545,10 @@ void evaluateAll(const FieldData& field, const LookupGrid& lookupGrid, std::span
       descend<false>(field, lookupGrid, batch);
     std::visit(
         [&](const auto& c) {
-          listByDegree(c.data(), batch);
+          listByDegree(c, batch);
           enterLeaves(batch);
-          evaluateLeaves(field, c.data(), lookupGrid.frame, batch, out.data() + first);
-          if (field.blend > 0) blend(field, lookupGrid, c.data(), batch, out.data() + first);
+          evaluateLeaves(field, c, lookupGrid.frame, batch, out.data() + first);
+          if (field.blend > 0) blend(field, lookupGrid, c, batch, out.data() + first);
           continueAllOutside(lookupGrid.frame, batch, out.data() + first);
         },
         field.coefficients);

@@ -12,6 +12,7 @@
 #include "basis/projection.h"
 #include "field/query/blend.h"
 #include "field/query/evaluate.h"
+#include "field/query/quantized.h"
 #include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/error.h"
 
@@ -77,9 +78,38 @@ void checkExactLeaf(const ExactTriangles& exact, const std::vector<std::uint32_t
     notAField("a cell's list of triangles does not fit its sign");
 }
 
+/// Returns true if the coefficients of a leaf lie within the array.
+template <typename T>
+bool hasLeaf(const std::vector<T>& coefficients, std::uint64_t leaf) {
+  return std::size_t(node::offset(leaf)) + coefficientCount(node::degree(leaf)) <= coefficients.size();
+}
+bool hasLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
+  return quantizedLeafBytes(coefficients, leaf) > 0;
+}
+
+template <typename T>
+void checkCoefficients(const std::vector<T>& coefficients) {
+  for (const T c : coefficients)
+    if (!std::isfinite(c)) notAField("a coefficient is not finite");
+}
+void checkCoefficients(const QuantizedCoefficients& coefficients) {
+  constexpr double kLargestStep = 1e200;  // Polynomials of such coefficients are finite.
+  if (!(coefficients.step > 0 && coefficients.step <= kLargestStep))
+    notAField("the step of its coefficients is no length");
+}
+
+/// Throws `Error` if the shared parts of quantized coefficients, without which no leaf can be read, are out of range.
+void checkQuantization(const FieldData& data) {
+  const auto* quantized = std::get_if<QuantizedCoefficients>(&data.coefficients);
+  if (quantized == nullptr) return;
+  if (quantized->bytes.size() < QuantizedCoefficients::kPadding) notAField("its coefficients are too short");
+  if (quantized->meanBits < 1 || quantized->meanBits > QuantizedCoefficients::kMostMeanBits)
+    notAField("the width of its coefficients is out of range");
+}
+
 /// Throws `Error` unless the nodes form trees: every group of children must belong to exactly one node, which precedes
 /// the group.
-void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coefficients) {
+void checkNodes(const FieldData& data, std::size_t baseCells) {
   const std::vector<std::uint32_t> lists = checkLists(data.exact);
   const auto& nodes = data.nodes;
   constexpr std::uint8_t kUnreached = 0xff;
@@ -96,8 +126,8 @@ void checkNodes(const FieldData& data, std::size_t baseCells, std::size_t coeffi
     if (node::isLeaf(nodes[n])) {
       const int degree = node::degree(nodes[n]);
       if (degree > kMaxDegree) notAField("a cell has degree " + std::to_string(degree));
-      if (std::size_t(node::offset(nodes[n])) + coefficientCount(degree) > coefficients)
-        notAField("a cell's coefficients lie beyond the end");
+      const bool areThere = std::visit([&](const auto& c) { return hasLeaf(c, nodes[n]); }, data.coefficients);
+      if (!areThere) notAField("a cell's coefficients lie beyond the end");
       continue;
     }
     const std::size_t first = node::firstChild(nodes[n]);
@@ -156,9 +186,8 @@ Cell makeCell(const FieldData& field, const GridFrame& frame, const OctreeNode& 
             .error = 0};
   const double volume = cellSize(field, leaf.depth).prod();
   if (node::isExact(bits)) return cell;
-  cell.error = std::visit(
-      [&](const auto& c) { return basis::topDegreeError(c.data() + node::offset(bits), cell.degree, volume); },
-      field.coefficients);
+  cell.error =
+      withCoefficients(field, bits, [&](const auto* c) { return basis::topDegreeError(c, cell.degree, volume); });
   return cell;
 }
 
@@ -186,23 +215,30 @@ bool FieldMetadata::hasEstimate() const {
 Field::Field(FieldData data) : data_(std::move(data)) {
   checkDomain(data_);
   const std::size_t baseCells = checkGrid(data_);
-  std::visit(
-      [&](const auto& coefficients) {
-        checkNodes(data_, baseCells, coefficients.size());
-        for (const auto c : coefficients)
-          if (!std::isfinite(c)) notAField("a coefficient is not finite");
-      },
-      data_.coefficients);
+  checkQuantization(data_);
+  checkNodes(data_, baseCells);
+  std::visit([](const auto& coefficients) { checkCoefficients(coefficients); }, data_.coefficients);
   checkExact(data_.exact);
   checkBlendAndBounds(data_);
   lookupGrid_ = makeLookupGrid(data_);
+}
+
+std::size_t coefficientBytes(const FieldData& field) {
+  return std::visit(
+      [](const auto& c) {
+        if constexpr (requires { c.bytes; })
+          return c.bytes.size();
+        else
+          return c.size() * sizeof(c[0]);
+      },
+      field.coefficients);
 }
 
 FieldBytes Field::bytesOfParts() const {
   const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
   const ExactTriangles& exact = data_.exact;
   return {.nodes = sizeOf(data_.nodes),
-          .coefficients = std::visit(sizeOf, data_.coefficients),
+          .coefficients = coefficientBytes(data_),
           .exactTriangles = std::visit(sizeOf, exact.vertices) + sizeOf(exact.triangles) + sizeOf(exact.lists),
           .lookupGrid = sizeOf(lookupGrid_.entries) + sizeOf(lookupGrid_.blendExtents),
           .bounds = sizeOf(data_.bounds)};
@@ -261,13 +297,18 @@ FieldStatistics statistics(const Field& field) {
     ++s.depthLeaves[cell.depth];
     s.degreeVolume[cell.degree] += share;
     s.depthVolume[cell.depth] += share;
+    if (cell.degree != kExactDegree) s.coefficients += coefficientCount(cell.degree);
     if (cell.degree == kExactDegree) exactLists.push_back(TriangleListView(data.exact, data.nodes[cell.id]).count());
   });
   s.nodes = data.nodes.size();
   s.bytes = field.bytes();
   s.exact = exactStatistics(std::move(exactLists), data.exact.triangles.size());
-  s.coefficients = std::visit([](const auto& c) { return c.size(); }, data.coefficients);
   return s;
+}
+
+std::string precisionName(const Field& field) {
+  constexpr std::array kNames = {"double", "float", "quantized"};
+  return kNames[field.data().coefficients.index()];
 }
 
 }  // namespace hpsdf

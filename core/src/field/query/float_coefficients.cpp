@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
+#include "basis/orthonormal.h"
 #include "basis/projection.h"
 #include "field/query/evaluate.h"
 
@@ -31,9 +34,10 @@ double vertexRounding(const ExactTriangles& exact) {
   return greatest;
 }
 
-}  // namespace
-
-Rounding floatRounding(const FieldData& field) {
+/// Returns the change of a field with double coefficients by rounding. rounded(node, c) returns a pointer to the
+/// rounded coefficients of a leaf, whose own are c.
+template <typename Rounded>
+Rounding roundingOf(const FieldData& field, const Rounded& rounded) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
   Rounding rounding;
   const double ofVertices = vertexRounding(field.exact);
@@ -44,9 +48,10 @@ Rounding floatRounding(const FieldData& field) {
     if (node::isExact(bits)) sum += ofVertices * ofVertices * cellSize(field, at.depth).prod();
     if (!node::isLeaf(bits) || node::isExact(bits)) return true;
     const double* c = &coefficients[node::offset(bits)];
+    const auto* after = rounded(at.node, c);
     double squares = 0, max = 0;
     basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int index) {
-      const double change = c[index] - double(float(c[index]));
+      const double change = c[index] - double(after[index]);
       squares += change * change * basis::squaredNorm(i, j, k);
       max += std::abs(change);
     });
@@ -56,6 +61,42 @@ Rounding floatRounding(const FieldData& field) {
   });
   rounding.rms = std::sqrt(sum / field.domain.sizes().prod());
   return rounding;
+}
+
+}  // namespace
+
+Rounding floatRounding(const FieldData& field) {
+  std::vector<float> rounded;
+  return roundingOf(field, [&](std::uint32_t node, const double* c) {
+    rounded.assign(c, c + coefficientCount(node::degree(field.nodes[node])));
+    return rounded.data();
+  });
+}
+
+Rounding quantizedRounding(const FieldData& field, const FieldData& quantized) {
+  std::vector<double> rounded(coefficientCount(kMaxDegree));
+  return roundingOf(field, [&](std::uint32_t node, const double*) {
+    decodeLeaf(std::get<QuantizedCoefficients>(quantized.coefficients), quantized.nodes[node], rounded.data());
+    return rounded.data();
+  });
+}
+
+double quantizationStep(const FieldData& field, double rms, double max) {
+  double volume = 0, integers = 0, greatestSum = 0;
+  visitNodes(field, [&](const OctreeNode& at) {
+    const std::uint64_t bits = field.nodes[at.node];
+    if (!node::isLeaf(bits) || node::isExact(bits)) return true;
+    const double cell = cellSize(field, at.depth).prod();
+    volume += cell;
+    integers += cell * coefficientCount(node::degree(bits));
+    double sum = 0;
+    basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int) { sum += basis::norm(i, j, k); });
+    greatestSum = std::max(greatestSum, sum);
+    return true;
+  });
+  if (volume == 0) return 0;
+  // An integer is wrong by half at most, with a mean square of 1/12.
+  return std::min(rms * std::sqrt(12 * volume / integers), 2 * max / greatestSum);
 }
 
 double throughFloat(double number) { return static_cast<float>(number); }
@@ -91,6 +132,21 @@ void roundVertices(ExactTriangles& exact) {
 }
 
 void toFloat(FieldData& field) { convert<float, double>(field); }
-void toDouble(FieldData& field) { convert<double, float>(field); }
+
+void toDouble(FieldData& field) {
+  convert<double, float>(field);
+  const auto* quantized = std::get_if<QuantizedCoefficients>(&field.coefficients);
+  if (quantized == nullptr) return;
+  std::vector<double> coefficients;
+  for (std::uint64_t& node : field.nodes) {
+    if (!node::isLeaf(node) || node::isExact(node)) continue;
+    const std::size_t offset = coefficients.size();
+    const int degree = node::degree(node);
+    coefficients.resize(offset + coefficientCount(degree));
+    decodeLeaf(*quantized, node, &coefficients[offset]);
+    node = node::leaf(degree, std::uint32_t(offset));
+  }
+  field.coefficients = std::move(coefficients);
+}
 
 }  // namespace hpsdf::query

@@ -1,5 +1,5 @@
 #pragma once
-// Conversion of coefficients between double, in which they are computed, and float, in which they are stored.
+// Conversion of coefficients between double, in which they are computed, and the precisions in which they are stored.
 
 #include "hpsdf/detail/field_data.h"
 
@@ -16,7 +16,14 @@ struct Rounding {
 /// moves by δ changes no distance by more than δ; in `rms`, all exact leaves count with the greatest such δ.
 Rounding floatRounding(const FieldData& field);
 
-/// Convert the coefficients of a field to float or to double. Coefficients that already have that type do not
+/// Computes by how much a field with double coefficients differs from the same field, quantized.
+Rounding quantizedRounding(const FieldData& field, const FieldData& quantized);
+
+/// Returns the greatest step of quantized coefficients that changes a field by no more than `rms`, to be expected, as
+/// RMS, and at no point by more than `max`. Returns 0 for a field without polynomials.
+double quantizationStep(const FieldData& field, double rms, double max);
+
+/// Convert the coefficients of a field from double to float, or from any type to double. Other coefficients do not
 /// change.
 void toFloat(FieldData& field);
 void toDouble(FieldData& field);

@@ -83,9 +83,9 @@ void fillLookupGrid(const FieldData& field, LookupGrid& lookupGrid) {
 LookupGrid makeLookupGrid(const FieldData& field) {
   LookupGrid lookupGrid;
   const std::size_t base = std::size_t(field.grid[0]) * field.grid[1] * field.grid[2];
-  const std::size_t bytes = std::visit([](const auto& c) { return c.size() * sizeof(c[0]); }, field.coefficients) +
-                            field.nodes.size() * sizeof(field.nodes[0]);
-  const std::size_t maxEntries = bytes / 16 / sizeof(lookupGrid.entries[0]);
+  const std::size_t bytes = coefficientBytes(field) + field.nodes.size() * sizeof(field.nodes[0]);
+  const std::size_t share = std::holds_alternative<QuantizedCoefficients>(field.coefficients) ? 8 : 16;
+  const std::size_t maxEntries = bytes / share / sizeof(lookupGrid.entries[0]);
   while (lookupGrid.depth < kMaxDepth && base << (3 * (lookupGrid.depth + 1)) <= maxEntries) ++lookupGrid.depth;
   lookupGrid.entries.resize(base << (3 * lookupGrid.depth));
   if (field.blend > 0) {

@@ -1,6 +1,6 @@
 // Evaluation of polynomials at single points and at batches of points. The template parameter `Number` is double or a
-// SIMD vector of doubles; the coefficients are double or float. Like legendre-inl.h, this file is included inside a
-// namespace, once for each instruction set.
+// SIMD vector of doubles; the coefficients are double, float or of type `Number`. Like legendre-inl.h, this file is
+// included inside a namespace, once for each instruction set.
 
 /// Calls f(0) to f(last).
 template <typename F>
@@ -13,12 +13,19 @@ template <int Last, typename F>
   (std::make_integer_sequence<int, Last + 1>());
 }
 
-template <typename Number, typename T, typename Degree>
-Number evaluatePolynomial(const T* c, Degree degree, const std::array<Number, 3>& local) {
+/// Adapts the values of Legendre polynomials to the basis of the coefficients. There is nothing to do for arrays of
+/// coefficients.
+template <typename T, typename Degree, typename Number>
+[[gnu::always_inline]] inline void toBasisOf(const T* /*coefficients*/, Degree, Number* /*values*/) {}
+
+/// `c` is a pointer to the coefficients, or an object that is used like one.
+template <typename Number, typename Coefficients, typename Degree>
+Number evaluatePolynomial(Coefficients c, Degree degree, const std::array<Number, 3>& local) {
   Number x[kDegreeCount<Degree>], y[kDegreeCount<Degree>], z[kDegreeCount<Degree>];
   legendreValues(local[0], degree, x);
   legendreValues(local[1], degree, y);
   legendreValues(local[2], degree, z);
+  for (Number* values : {x, y, z}) toBasisOf(c, degree, values);
   Number value(0);
   forEachUpTo(
       degree, [&](auto i) __attribute__((always_inline)) {
@@ -37,13 +44,15 @@ Number evaluatePolynomial(const T* c, Degree degree, const std::array<Number, 3>
 }
 
 /// Returns the value and the three components of the gradient in local coordinates.
-template <typename Number, typename T, typename Degree>
-std::array<Number, 4> evaluatePolynomialWithGradient(const T* c, Degree degree, const std::array<Number, 3>& local) {
+template <typename Number, typename Coefficients, typename Degree>
+std::array<Number, 4> evaluatePolynomialWithGradient(Coefficients c, Degree degree,
+                                                     const std::array<Number, 3>& local) {
   Number x[kDegreeCount<Degree>], y[kDegreeCount<Degree>], z[kDegreeCount<Degree>];
   Number dx[kDegreeCount<Degree>], dy[kDegreeCount<Degree>], dz[kDegreeCount<Degree>];
   legendreValuesAndDerivatives(local[0], degree, x, dx);
   legendreValuesAndDerivatives(local[1], degree, y, dy);
   legendreValuesAndDerivatives(local[2], degree, z, dz);
+  for (Number* values : {x, y, z, dx, dy, dz}) toBasisOf(c, degree, values);
   Number value(0), gx(0), gy(0), gz(0);
   forEachUpTo(
       degree, [&](auto i) __attribute__((always_inline)) {

@@ -1,0 +1,149 @@
+#include "field/query/quantized.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "basis/projection.h"
+
+namespace hpsdf::query {
+namespace {
+
+constexpr int kWidthBits = QuantizedCoefficients::kWidthBits;
+
+std::uint64_t lowBits(std::uint64_t word, int count) { return word & ((std::uint64_t{1} << count) - 1); }
+
+/// Returns the number that is added to integers of `width` bits before they are stored.
+std::int64_t biasOf(int width) { return (std::int64_t{1} << width) >> 1; }
+
+/// Returns the number of integers of a total degree.
+constexpr std::size_t integersOf(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
+
+int widthOf(const LeafBits& leaf, int degree) {
+  return static_cast<int>(lowBits(leaf.read(std::uint64_t(degree - 1) * kWidthBits), kWidthBits));
+}
+
+/// Appends numbers of few bits to an array of bytes.
+class BitWriter {
+ public:
+  explicit BitWriter(std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
+
+  void add(std::uint64_t number, int width) {
+    pending_ |= number << count_;
+    for (count_ += width; count_ >= 8; count_ -= 8, pending_ >>= 8) bytes_.push_back(std::uint8_t(pending_));
+  }
+
+  /// Fills the last byte with zeros.
+  void finishByte() {
+    if (count_ > 0) add(0, 8 - count_);
+  }
+
+ private:
+  std::vector<std::uint8_t>& bytes_;
+  std::uint64_t pending_ = 0;
+  int count_ = 0;
+};
+
+/// The integers of a leaf, grouped by total degree, and the bits that each degree needs.
+struct Integers {
+  std::array<std::vector<std::int64_t>, kMaxDegree + 1> ofDegree;
+  std::array<int, kMaxDegree + 1> widths{};
+
+  Integers(const double* c, int degree, double step) {
+    for (int d = 0; d <= degree; ++d) ofDegree[d].resize(integersOf(d));
+    basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
+      constexpr double kLargest = 0x1p40;  // more than any integer that can be stored
+      const double number = std::clamp(c[index] / (step * basis::norm(i, j, k)), -kLargest, kLargest);
+      const std::int64_t integer = std::llround(number);
+      const int d = i + j + k;
+      ofDegree[d][basis::rankInDegree(i, j, k)] = integer;
+      while (integer < -biasOf(widths[d]) || integer > std::max<std::int64_t>(biasOf(widths[d]) - 1, 0)) ++widths[d];
+    });
+  }
+
+  void write(int degree, int meanBits, std::vector<std::uint8_t>& bytes) const {
+    BitWriter writer(bytes);
+    for (int d = 1; d <= degree; ++d) writer.add(std::uint64_t(widths[d]), kWidthBits);
+    for (int d = 0; d <= degree; ++d) {
+      const int width = d == 0 ? meanBits : widths[d];
+      for (const std::int64_t integer : ofDegree[d]) writer.add(std::uint64_t(integer + biasOf(width)), width);
+    }
+    writer.finishByte();
+  }
+};
+
+/// Calls f(node) with each leaf of a field that has a polynomial.
+template <typename Nodes, typename F>
+void forEachPolynomial(Nodes& nodes, const F& f) {
+  for (auto& node : nodes)
+    if (node::isLeaf(node) && !node::isExact(node)) f(node);
+}
+
+}  // namespace
+
+void decodeAnyLeaf(const LeafBits& leaf, int degree, std::uint32_t meanBits, double* out) {
+  std::array<std::uint64_t, kMaxDegree + 1> begins, widths;
+  widths[0] = meanBits;
+  begins[0] = std::uint64_t(degree) * kWidthBits;
+  for (int d = 1; d <= degree; ++d) {
+    widths[d] = widthOf(leaf, d);
+    begins[d] = begins[d - 1] + integersOf(d - 1) * widths[d - 1];
+  }
+  basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
+    const int d = i + j + k, width = static_cast<int>(widths[d]);
+    const std::uint64_t stored = lowBits(leaf.read(begins[d] + basis::rankInDegree(i, j, k) * widths[d]), width);
+    out[index] = double(std::int64_t(stored) - biasOf(width)) * basis::norm(i, j, k);
+  });
+}
+
+std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
+  const std::size_t offset = node::offset(leaf), end = coefficients.bytes.size() - QuantizedCoefficients::kPadding;
+  const int degree = node::degree(leaf);
+  const auto bytesOf = [](std::size_t bits) { return (bits + 7) / 8; };
+  std::size_t bits = std::size_t(degree) * kWidthBits + coefficients.meanBits;
+  if (offset + bytesOf(bits) > end) return 0;
+  for (int d = 1; d <= degree; ++d) {
+    const int width = widthOf({coefficients.bytes.data() + offset}, d);
+    if (width > QuantizedCoefficients::kMostBits) return 0;
+    bits += integersOf(d) * width;
+  }
+  return offset + bytesOf(bits) > end ? 0 : bytesOf(bits);
+}
+
+bool quantize(FieldData& field, double step) {
+  const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  QuantizedCoefficients result{.step = step, .meanBits = 1, .bytes = {}};
+  bool fits = true;
+  forEachPolynomial(field.nodes, [&](std::uint64_t node) {
+    const Integers integers(&coefficients[node::offset(node)], node::degree(node), step);
+    fits &= *std::max_element(integers.widths.begin() + 1, integers.widths.end()) <= QuantizedCoefficients::kMostBits;
+    result.meanBits = std::max(result.meanBits, std::uint32_t(integers.widths[0]));
+  });
+  if (!fits || result.meanBits > QuantizedCoefficients::kMostMeanBits) return false;
+
+  std::vector<std::uint64_t> nodes = field.nodes;
+  forEachPolynomial(nodes, [&](std::uint64_t& node) {
+    const int degree = node::degree(node);
+    const Integers integers(&coefficients[node::offset(node)], degree, step);
+    node = node::leaf(degree, std::uint32_t(result.bytes.size()));
+    integers.write(degree, int(result.meanBits), result.bytes);
+  });
+  result.bytes.resize(result.bytes.size() + QuantizedCoefficients::kPadding);
+  if (result.bytes.size() > 0xffffffff) return false;
+  field.nodes = std::move(nodes);
+  field.coefficients = std::move(result);
+  return true;
+}
+
+}  // namespace hpsdf::query
+
+namespace hpsdf {
+
+void decodeLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out) {
+  const int degree = node::degree(leaf);
+  query::decodeAnyLeaf({coefficients.bytes.data() + node::offset(leaf)}, degree, coefficients.meanBits, out);
+  for (int i = 0; i < coefficientCount(degree); ++i) out[i] *= coefficients.step;
+}
+
+}  // namespace hpsdf

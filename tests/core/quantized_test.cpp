@@ -1,0 +1,211 @@
+// Quantized coefficients: what they change, what queries of them give, and which arrays are refused.
+#include "field/query/quantized.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <variant>
+#include <vector>
+
+#include "field/query/float_coefficients.h"
+#include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/error.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/safe_distance.h"
+#include "support/one_leaf_field.h"
+#include "support/random_field.h"
+#include "support/temporary_directory.h"
+
+namespace hpsdf {
+namespace quantized_test {
+
+double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
+Box cube() { return Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)); }
+
+FieldData quantizedData(const Field& field, double step) {
+  FieldData data = field.data();
+  EXPECT_TRUE(query::quantize(data, step));
+  return data;
+}
+
+Field torusOf(CoefficientType type, BuildOptions options = {.targetError = 1e-6}) {
+  options.coefficients = type;
+  return build(torus, cube(), options);
+}
+
+std::vector<Vector3> randomPoints(const Box& box, std::size_t count) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<Vector3> points(count);
+  for (Vector3& x : points)
+    x = box.min() + box.sizes().cwiseProduct(Vector3(unit(random), unit(random), unit(random)));
+  return points;
+}
+
+template <typename F>
+double rms(const std::vector<Vector3>& points, const F& f) {
+  double sum = 0;
+  for (const Vector3& x : points) sum += f(x) * f(x);
+  return std::sqrt(sum / double(points.size()));
+}
+
+/// Every coefficient is rounded to the nearest multiple of the step in the orthonormal basis, for all degrees.
+TEST(Quantized, roundsToTheNearestMultiples) {
+  constexpr double kStep = 0.01;
+  for (int degree = 0; degree <= kMaxDegree; ++degree) {
+    const Field field = oneLeafField(unsigned(degree), degree);
+    const auto& before = std::get<std::vector<double>>(field.data().coefficients);
+    const FieldData data = quantizedData(field, kStep);
+    std::vector<double> after(before.size());
+    decodeLeaf(std::get<QuantizedCoefficients>(data.coefficients), data.nodes[0], after.data());
+    int index = 0;
+    for (int i = 0; i <= degree; ++i)
+      for (int j = 0; j <= degree - i; ++j)
+        for (int k = 0; k <= degree - i - j; ++k, ++index) {
+          const double unit = kStep * std::sqrt((2 * i + 1.0) * (2 * j + 1.0) * (2 * k + 1.0));
+          ASSERT_NEAR(after[index], unit * std::round(before[index] / unit), 1e-12) << degree << ": " << index;
+        }
+  }
+}
+
+TEST(Quantized, queriesEvaluateTheRoundedPolynomials) {
+  const Field field = randomField(3, {.minDegree = 0, .maxDegree = 9});
+  FieldData data = quantizedData(field, 1e-3);
+  const Field quantized(data);
+  query::toDouble(data);
+  const Field decoded(data);
+  for (const Vector3& x : randomPoints(Box(Vector3::Constant(-1.2), Vector3::Constant(1.2)), 20000)) {
+    const ValueAndGradient one = quantized.valueAndGradient(x), other = decoded.valueAndGradient(x);
+    ASSERT_EQ(one.value, quantized.value(x));
+    ASSERT_NEAR(one.value, other.value, 1e-13);
+    ASSERT_LT((one.gradient - other.gradient).norm(), 1e-11);
+    ASSERT_DOUBLE_EQ(quantized.cellAt(x).error, decoded.cellAt(x).error);
+  }
+  EXPECT_EQ(statistics(quantized).coefficients, statistics(decoded).coefficients);
+}
+
+TEST(Quantized, blendedFieldsToo) {
+  const Field quantized = blended(Field(quantizedData(randomField(4), 1e-3)), 0.1);
+  FieldData data = quantized.data();
+  query::toDouble(data);
+  const Field decoded(std::move(data));
+  const std::vector<Vector3> points = randomPoints(quantized.domain(), 5000);
+  std::vector<ValueAndGradient> batch(points.size());
+  quantized.valuesAndGradients(points, batch);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ValueAndGradient one = quantized.valueAndGradient(points[i]), other = decoded.valueAndGradient(points[i]);
+    ASSERT_EQ(batch[i].value, one.value);
+    ASSERT_EQ(batch[i].gradient, one.gradient);
+    ASSERT_NEAR(one.value, other.value, 1e-13);
+    ASSERT_LT((one.gradient - other.gradient).norm(), 1e-11);
+  }
+}
+
+TEST(Quantized, theChangeIsAsForetoldAndAsStated) {
+  const Field field = randomField(5, {.maxDepth = 2, .minDegree = 2, .maxDegree = 4});
+  for (const double asked : {1e-3, 3e-4}) {
+    const double step = query::quantizationStep(field.data(), asked, 1);
+    const FieldData data = quantizedData(field, step);
+    const query::Rounding stated = query::quantizedRounding(field.data(), data);
+    EXPECT_NEAR(stated.rms / asked, 1, 0.1);
+    const Field quantized(data);
+    const std::vector<Vector3> points = randomPoints(field.domain(), 40000);
+    const auto change = [&](const Vector3& x) { return quantized.value(x) - field.value(x); };
+    EXPECT_NEAR(rms(points, change) / stated.rms, 1, 0.02);
+    for (const Vector3& x : points) ASSERT_LE(std::abs(change(x)), stated.max);
+
+    const double narrow = query::quantizationStep(field.data(), asked, asked / 2);
+    EXPECT_LT(narrow, step / 5);
+    EXPECT_LE(query::quantizedRounding(field.data(), quantizedData(field, narrow)).max, asked / 2 * (1 + 1e-12));
+  }
+}
+
+TEST(Quantized, aStepThatNeedsTooManyBitsIsRefused) {
+  const Field field = randomField(6);
+  FieldData data = field.data();
+  EXPECT_FALSE(query::quantize(data, 1e-9));
+  EXPECT_EQ(data.nodes, field.data().nodes);
+  EXPECT_EQ(data.coefficients, field.data().coefficients);
+}
+
+TEST(Quantized, constructionsKeepTheirErrorInAThirdOfTheBytes) {
+  const Field exact = torusOf(CoefficientType::float64), single = torusOf(CoefficientType::float32);
+  const Field quantized = torusOf(CoefficientType::quantized);
+  EXPECT_EQ(precisionName(quantized), "quantized");
+  EXPECT_LT(double(quantized.bytesOfParts().coefficients), 0.3 * double(single.bytesOfParts().coefficients));
+  EXPECT_LT(double(quantized.bytes()), 0.4 * double(single.bytes()));
+  const std::vector<Vector3> points = randomPoints(cube(), 40000);
+  const auto errorOf = [&](const Field& field) {
+    return rms(points, [&](const Vector3& x) { return field.value(x) - torus(x); });
+  };
+  EXPECT_LT(errorOf(quantized), 1.01 * errorOf(exact));
+  const double change = rms(points, [&](const Vector3& x) { return quantized.value(x) - exact.value(x); });
+  EXPECT_NEAR(change / quantized.metadata().roundingRms, 1, 0.05);
+}
+
+TEST(Quantized, aMaximumErrorBoundsTheChange) {
+  constexpr double kMost = 2e-3;
+  const BuildOptions options{.targetError = 1e-5, .maxError = kMost, .maxDegree = 3};
+  const Field exact = torusOf(CoefficientType::float64, options), quantized = torusOf(CoefficientType::quantized, options);
+  ASSERT_EQ(precisionName(quantized), "quantized");
+  for (const Vector3& x : randomPoints(cube(), 40000))
+    ASSERT_LE(std::abs(quantized.value(x) - exact.value(x)), 0.01 * kMost);
+}
+
+/// Without an error to compare it with, there is no step to choose.
+TEST(Quantized, fieldsWithoutAnErrorKeepFloats) {
+  const auto linear = [](const Vector3& x) { return x.x(); };
+  const Field field = build(linear, cube(), {.targetError = 1e-6, .coefficients = CoefficientType::quantized});
+  EXPECT_EQ(precisionName(field), "float");
+}
+
+TEST(Quantized, boundsHoldAfterRounding) {
+  const Field field =
+      torusOf(CoefficientType::quantized, {.targetError = 1e-4, .grid = {3, 3, 3}, .maxDepth = 3, .bounds = true});
+  ASSERT_EQ(precisionName(field), "quantized");
+  for (const Vector3& x : randomPoints(cube(), 40000)) {
+    const CellBound bound = field.data().bounds[field.cellAt(x).id];
+    const ValueAndGradient found = field.valueAndGradient(x);
+    ASSERT_LE(std::abs(found.value - torus(x)), double(bound.error));
+    ASSERT_LE(found.gradient.norm(), double(bound.slope) * (1 + 1e-12));
+  }
+}
+
+TEST(Quantized, weakContinuityKeepsTheStep) {
+  const Field field = torusOf(CoefficientType::quantized, {.targetError = 1e-4, .grid = {3, 3, 3}});
+  const Field smooth = weaklyContinuous(field, {}).field;
+  ASSERT_EQ(precisionName(smooth), "quantized");
+  EXPECT_EQ(std::get<QuantizedCoefficients>(smooth.data().coefficients).step,
+            std::get<QuantizedCoefficients>(field.data().coefficients).step);
+  EXPECT_GT(smooth.metadata().roundingRms, field.metadata().roundingRms);
+}
+
+TEST(Quantized, theSameBytesForAnyNumberOfThreads) {
+  const Field one = torusOf(CoefficientType::quantized, {.targetError = 1e-6, .threads = 1});
+  const Field two = torusOf(CoefficientType::quantized, {.targetError = 1e-6, .threads = 2});
+  EXPECT_EQ(one.data().nodes, two.data().nodes);
+  EXPECT_EQ(one.data().coefficients, two.data().coefficients);
+}
+
+TEST(Quantized, refusesInvalidArrays) {
+  const FieldData valid = quantizedData(randomField(7), 1e-3);
+  ASSERT_NO_THROW(Field{valid});
+  const auto refuses = [&](const auto& spoil) {
+    FieldData data = valid;
+    spoil(std::get<QuantizedCoefficients>(data.coefficients));
+    EXPECT_THROW(Field{std::move(data)}, Error);
+  };
+  refuses([](QuantizedCoefficients& c) { c.step = 0; });
+  refuses([](QuantizedCoefficients& c) { c.step = std::nan(""); });
+  refuses([](QuantizedCoefficients& c) { c.step = 1e300; });
+  refuses([](QuantizedCoefficients& c) { c.meanBits = 0; });
+  refuses([](QuantizedCoefficients& c) { c.meanBits = 33; });
+  refuses([](QuantizedCoefficients& c) { c.bytes.clear(); });
+  refuses([](QuantizedCoefficients& c) { c.bytes.pop_back(); });  // The last leaf reaches into the padding.
+  refuses([](QuantizedCoefficients& c) { std::fill(c.bytes.begin(), c.bytes.end(), 0xff); });  // Widths are 31.
+}
+
+}  // namespace quantized_test
+}  // namespace hpsdf
