@@ -39,8 +39,7 @@ std::vector<Vector3> randomPoints(const Box& box, std::size_t count) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<double> unit(0, 1);
   std::vector<Vector3> points(count);
-  for (Vector3& x : points)
-    x = box.min() + box.sizes().cwiseProduct(Vector3(unit(random), unit(random), unit(random)));
+  for (Vector3& x : points) x = box.min() + box.sizes().cwiseProduct(Vector3(unit(random), unit(random), unit(random)));
   return points;
 }
 
@@ -148,7 +147,8 @@ TEST(Quantized, constructionsKeepTheirErrorInAThirdOfTheBytes) {
 TEST(Quantized, aMaximumErrorBoundsTheChange) {
   constexpr double kMost = 2e-3;
   const BuildOptions options{.targetError = 1e-5, .maxError = kMost, .maxDegree = 3};
-  const Field exact = torusOf(CoefficientType::float64, options), quantized = torusOf(CoefficientType::quantized, options);
+  const Field exact = torusOf(CoefficientType::float64, options),
+              quantized = torusOf(CoefficientType::quantized, options);
   ASSERT_EQ(precisionName(quantized), "quantized");
   for (const Vector3& x : randomPoints(cube(), 40000))
     ASSERT_LE(std::abs(quantized.value(x) - exact.value(x)), 0.01 * kMost);

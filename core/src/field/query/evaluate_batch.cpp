@@ -57,6 +57,7 @@ struct LaneWords {
   friend HWY_INLINE LaneWords operator>>(LaneWords a, LaneWords count) { return hn::Shr(a.v, count.v); }
 };
 
+HWY_INLINE LaneWords orAnd(LaneWords a, LaneWords b, LaneWords c) { return hn::OrAnd(a.v, b.v, c.v); }
 HWY_INLINE Lanes asNumber(LaneWords words) { return hn::BitCast(Tag(), words.v); }
 
 /// Loads the words that begin at `Count` places in an array of bytes. This is faster than a gather, and than a load of

@@ -30,33 +30,27 @@ struct Digits {
 
   /// Returns the integer that is stored in the lowest bits of `words`.
   [[gnu::always_inline]] Number first(Words words) const {
-    return asNumber((words & mask) | Words(kWholeBits)) - bias;
+    return asNumber(orAnd(Words(kWholeBits), words, mask)) - bias;
   }
 
   Words mask;
   Number bias;  ///< 2^52 + 2^(width − 1), or 2^52 if the width is 0
 };
 
-template <int Times, typename Words>
-[[gnu::always_inline]] inline Words timesWords(Words word) {
-  if constexpr (Times == 1)
-    return word;
-  else
-    return word + timesWords<Times - 1>(word);
-}
-
-/// Decodes the integers of the total degree D that begin at the bit `position` of each leaf, of which `AtOnce` are read
-/// at once. Returns the position after them.
-template <int D, int AtOnce, typename Leaves, typename Words, typename Number>
+/// Decodes the integers of the total degree D that begin at the bit `position` of each leaf. Returns the position after
+/// them.
+template <int D, typename Leaves, typename Words, typename Number>
 [[gnu::always_inline]] inline Words decodeDegree(const Leaves& leaves, Words position, Words width, Number* out) {
-  constexpr int kCount = hpsdf::basis::termsOfDegree(D), kLast = (kCount - 1) % AtOnce + 1;
+  constexpr int kAtOnce = 3;  // A read gives 57 bits.
+  constexpr int kCount = hpsdf::basis::termsOfDegree(D), kLast = (kCount - 1) % kAtOnce + 1;
+  static_assert(kLast == kAtOnce || kLast == 1);
   const Digits<Number, Words> digits(width);
-  const Words step = timesWords<std::min(AtOnce, kCount)>(width);
+  const Words step = width + width + width;
   Words words = leaves.read(position);
   forEachUpTo(
       Constant<kCount - 1>(), [&](auto at) __attribute__((always_inline)) {
         constexpr int kAt = decltype(at)::value;
-        if constexpr (kAt > 0 && kAt % AtOnce == 0) {
+        if constexpr (kAt > 0 && kAt % kAtOnce == 0) {
           position = position + step;
           words = leaves.read(position);
         } else if constexpr (kAt > 0) {
@@ -64,18 +58,7 @@ template <int D, int AtOnce, typename Leaves, typename Words, typename Number>
         }
         out[kAt] = digits.first(words);
       });
-  return position + (kLast == AtOnce ? step : timesWords<kLast>(width));
-}
-
-template <int P, int AtOnce, typename Leaves, typename Words, typename Number>
-[[gnu::always_inline]] inline void decodeDegrees(const Leaves& leaves, Words head, Words position, Number* out) {
-  forEachUpTo(
-      Constant<P - 1>(), [&](auto below) __attribute__((always_inline)) {
-        constexpr int kBelow = decltype(below)::value;
-        constexpr int kWidthBits = QuantizedCoefficients::kWidthBits;
-        const Words width = (head >> Words(kBelow * kWidthBits)) & Words((1 << kWidthBits) - 1);
-        position = decodeDegree<kBelow + 1, AtOnce>(leaves, position, width, out + coefficientCount(kBelow));
-      });
+  return position + (kLast == kAtOnce ? step : width);
 }
 
 /// Decodes the integers of leaves of degree P, ordered by total degree.
@@ -87,5 +70,11 @@ template <int P, typename Leaves, typename Number>
   using Words = std::remove_const_t<decltype(begin)>;
   const Words head = leaves.read(begin);
   out[0] = Digits<Number, Words>(Words(meanBits)).first(head >> Words(P * kWidthBits));
-  decodeDegrees<P, 3>(leaves, head, begin + Words(P * kWidthBits + meanBits), out);
+  Words position = begin + Words(P * kWidthBits + meanBits);
+  forEachUpTo(
+      Constant<P - 1>(), [&](auto below) __attribute__((always_inline)) {
+        constexpr int kBelow = decltype(below)::value;
+        const Words width = (head >> Words(kBelow * kWidthBits)) & Words((1 << kWidthBits) - 1);
+        position = decodeDegree<kBelow + 1>(leaves, position, width, out + coefficientCount(kBelow));
+      });
 }

@@ -17,9 +17,6 @@ std::uint64_t lowBits(std::uint64_t word, int count) { return word & ((std::uint
 /// Returns the number that is added to integers of `width` bits before they are stored.
 std::int64_t biasOf(int width) { return (std::int64_t{1} << width) >> 1; }
 
-/// Returns the number of integers of a total degree.
-constexpr std::size_t integersOf(int degree) { return std::size_t(degree + 1) * (degree + 2) / 2; }
-
 int widthOf(const LeafBits& leaf, int degree) {
   return static_cast<int>(lowBits(leaf.read(std::uint64_t(degree - 1) * kWidthBits), kWidthBits));
 }
@@ -51,7 +48,7 @@ struct Integers {
   std::array<int, kMaxDegree + 1> widths{};
 
   Integers(const double* c, int degree, double step) {
-    for (int d = 0; d <= degree; ++d) ofDegree[d].resize(integersOf(d));
+    for (int d = 0; d <= degree; ++d) ofDegree[d].resize(std::size_t(basis::termsOfDegree(d)));
     basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
       constexpr double kLargest = 0x1p40;  // more than any integer that can be stored
       const double number = std::clamp(c[index] / (step * basis::norm(i, j, k)), -kLargest, kLargest);
@@ -83,18 +80,24 @@ void forEachPolynomial(Nodes& nodes, const F& f) {
 }  // namespace
 
 void decodeAnyLeaf(const LeafBits& leaf, int degree, std::uint32_t meanBits, double* out) {
-  std::array<std::uint64_t, kMaxDegree + 1> begins, widths;
-  widths[0] = meanBits;
-  begins[0] = std::uint64_t(degree) * kWidthBits;
-  for (int d = 1; d <= degree; ++d) {
-    widths[d] = widthOf(leaf, d);
-    begins[d] = begins[d - 1] + integersOf(d - 1) * widths[d - 1];
+  // Decode the integers, ordered by total degree.
+  std::array<std::int32_t, std::size_t(coefficientCount(kMaxDegree))> integers;
+  std::array<const std::int32_t*, kMaxDegree + 1> next;  // integer of each total degree that comes next in `out`
+  std::uint64_t position = std::uint64_t(degree) * kWidthBits;
+  std::int32_t* end = integers.data();
+  for (int d = 0; d <= degree; ++d) {
+    const int width = d == 0 ? static_cast<int>(meanBits) : widthOf(leaf, d);
+    const std::int64_t bias = biasOf(width);
+    next[d] = end;
+    for (int n = 0; n < basis::termsOfDegree(d); ++n, position += std::uint64_t(width))
+      *end++ = static_cast<std::int32_t>(std::int64_t(lowBits(leaf.read(position), width)) - bias);
   }
-  basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
-    const int d = i + j + k, width = static_cast<int>(widths[d]);
-    const std::uint64_t stored = lowBits(leaf.read(begins[d] + basis::rankInDegree(i, j, k) * widths[d]), width);
-    out[index] = double(std::int64_t(stored) - biasOf(width)) * basis::norm(i, j, k);
-  });
+  // Within a total degree, the order of `out` is that of the integers.
+  for (int i = 0; i <= degree; ++i)
+    for (int j = 0; j <= degree - i; ++j) {
+      const double root = basis::kRoot[i] * basis::kRoot[j];
+      for (int k = 0; k <= degree - i - j; ++k) *out++ = *next[i + j + k]++ * (root * basis::kRoot[k]);
+    }
 }
 
 std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
@@ -106,7 +109,7 @@ std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::u
   for (int d = 1; d <= degree; ++d) {
     const int width = widthOf({coefficients.bytes.data() + offset}, d);
     if (width > QuantizedCoefficients::kMostBits) return 0;
-    bits += integersOf(d) * width;
+    bits += std::size_t(basis::termsOfDegree(d)) * width;
   }
   return offset + bytesOf(bits) > end ? 0 : bytesOf(bits);
 }
