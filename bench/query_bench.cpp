@@ -1,5 +1,13 @@
 // Times of a field's queries at a million random points in random order, on one thread.
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <variant>
+#include <vector>
+
 #include "hpsdf/continuity.h"
 #include "scene.h"
 
@@ -36,6 +44,81 @@ void batchedGradients(benchmark::State& state, const Field& field) {
   timeEach(state, kPoints, [&] { field.valuesAndGradients(points, out); });
 }
 
+/// What the queries of a field read for some points: for each point the entry of the lookup grid and the nodes on the
+/// way down, each of which tells where the next one is, and the cache lines of the coefficients.
+class Reads {
+ public:
+  Reads(const Field& field, const std::vector<Vector3>& points) {
+    for (const Vector3& x : points) add(field, x);
+  }
+
+  /// Reads all of it and computes nothing. The reads of a point depend on each other as those of a query do.
+  std::uint64_t read() const {
+    const std::uint64_t none = none_;  // 0, but not for the compiler
+    std::uint64_t sum = 0;
+    for (const Read& read : reads_) {
+      std::uint64_t offset = 0;
+      for (const std::uint64_t* node : read.nodes) offset = *(node + offset) & none;
+      for (const char* line : read.lines) sum += std::uint64_t(*(line + offset));
+    }
+    return sum;
+  }
+
+ private:
+  /// Points that need fewer reads repeat the last one.
+  struct Read {
+    std::array<const std::uint64_t*, 4> nodes;
+    std::array<const char*, 3> lines;
+  };
+
+  void add(const Field& field, const Vector3& x) {
+    const LookupGrid& grid = field.lookupGrid();
+    std::array<std::int64_t, 3> fixed;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double coordinate = (x[axis] - grid.frame.lower[axis]) / grid.frame.size[axis] * grid.frame.cells[axis];
+      fixed[axis] = std::min(std::int64_t(std::ldexp(coordinate, kMaxDepth)), grid.frame.last[axis]);
+    }
+    const auto digitsTo = [&](int axis, int depth) { return fixed[axis] >> (kMaxDepth - depth); };
+    Read read;
+    const std::uint64_t* node = &grid.entries[std::size_t(
+        digitsTo(2, grid.depth) * grid.slab + digitsTo(1, grid.depth) * grid.row + digitsTo(0, grid.depth))];
+    std::size_t count = 0;
+    for (int depth = LookupGrid::depthOf(*node); count < read.nodes.size(); ++count) {
+      read.nodes[count] = node;
+      if (node::isLeaf(*node)) continue;
+      ++depth;
+      std::uint32_t child = 0;
+      for (int axis = 0; axis < 3; ++axis) child |= std::uint32_t(digitsTo(axis, depth) & 1) << axis;
+      node = &field.data().nodes[node::firstChild(*node) + child];
+    }
+    setLines(field, *node, read);
+    reads_.push_back(read);
+  }
+
+  /// Sets the cache lines of a leaf's coefficients.
+  static void setLines(const Field& field, std::uint64_t leaf, Read& read) {
+    const auto [first, bytes] = std::visit(
+        [&](const auto& c) -> std::pair<const char*, std::size_t> {
+          if constexpr (requires { c.bytes; })
+            return {reinterpret_cast<const char*>(&c.bytes[node::offset(leaf)]), 1};
+          else
+            return {reinterpret_cast<const char*>(&c[node::offset(leaf)]),
+                    coefficientCount(node::degree(leaf)) * sizeof(c[0])};
+        },
+        field.data().coefficients);
+    for (std::size_t n = 0; n < read.lines.size(); ++n) read.lines[n] = first + std::min(64 * n, bytes - 1);
+  }
+
+  std::vector<Read> reads_;
+  volatile std::uint64_t none_ = 0;
+};
+
+/// The time of a query's reads alone, below which no query can be.
+void reads(benchmark::State& state, const Field& field) {
+  const Reads reads(field, uniformPoints(kPoints));
+  timeEach(state, kPoints, [&] { benchmark::DoNotOptimize(reads.read()); });
+}
+
 /// Returns the bunny's field, blended with the default width of the blend zones.
 const Field& blendedBunny() {
   static const Field field = blended(bunnyField());
@@ -46,6 +129,11 @@ void bunnyValue(benchmark::State& state) { values(state, bunnyField()); }
 void bunnyGradient(benchmark::State& state) { gradients(state, bunnyField()); }
 void bunnyBatched(benchmark::State& state) { batched(state, bunnyField()); }
 void bunnyBatchedGradient(benchmark::State& state) { batchedGradients(state, bunnyField()); }
+void bunnyReads(benchmark::State& state) { reads(state, bunnyField()); }
+void quantizedValue(benchmark::State& state) { values(state, quantizedBunnyField()); }
+void quantizedGradient(benchmark::State& state) { gradients(state, quantizedBunnyField()); }
+void quantizedBatched(benchmark::State& state) { batched(state, quantizedBunnyField()); }
+void quantizedReads(benchmark::State& state) { reads(state, quantizedBunnyField()); }
 void blendedValue(benchmark::State& state) { values(state, blendedBunny()); }
 void blendedGradient(benchmark::State& state) { gradients(state, blendedBunny()); }
 void blendedBatched(benchmark::State& state) { batched(state, blendedBunny()); }
@@ -57,6 +145,11 @@ BENCHMARK(bunnyValue)->Name("query/bunny/value");
 BENCHMARK(bunnyGradient)->Name("query/bunny/gradient");
 BENCHMARK(bunnyBatched)->Name("query/bunny/batched");
 BENCHMARK(bunnyBatchedGradient)->Name("query/bunny/batched_gradient");
+BENCHMARK(bunnyReads)->Name("query/bunny/reads");
+BENCHMARK(quantizedValue)->Name("query/quantized/value");
+BENCHMARK(quantizedGradient)->Name("query/quantized/gradient");
+BENCHMARK(quantizedBatched)->Name("query/quantized/batched");
+BENCHMARK(quantizedReads)->Name("query/quantized/reads");
 BENCHMARK(blendedValue)->Name("query/blended/value");
 BENCHMARK(blendedGradient)->Name("query/blended/gradient");
 BENCHMARK(blendedBatched)->Name("query/blended/batched");

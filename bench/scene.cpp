@@ -30,6 +30,12 @@ const Field& bunnyField() {
   return field;
 }
 
+const Field& quantizedBunnyField() {
+  static const Field field =
+      build(bunnyDistance(), paperDomain(), {.targetError = 1e-6, .coefficients = CoefficientType::quantized});
+  return field;
+}
+
 const Field& armadilloField() {
   static const Field field =
       build(ExactDistance(testMesh("paper/armadillo_100k.obj")), paperDomain(), {.targetError = 1e-6});

@@ -24,6 +24,9 @@ const ExactDistance& bunnyDistance();
 const Field& bunnyField();
 const Field& armadilloField();
 
+/// Returns the bunny's field with quantized coefficients.
+const Field& quantizedBunnyField();
+
 Box paperDomain();  ///< [-1.1, 1.1]³
 
 /// Returns random points, uniformly distributed in the domain.
