@@ -7,7 +7,10 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <variant>
 
+#include "basis/orthonormal.h"
+#include "basis/projection.h"
 #include "field/build/least_bytes.h"
 #include "field/build/refiner.h"
 #include "field/build/tolerance_build.h"
@@ -88,14 +91,17 @@ class Target {
     if (fit.isExact()) return TriangleListView(data.exact, bits).count() == fit.list.triangles.size();
     if (fit.degree != node::degree(bits)) return false;
     constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
-    double scale = 0, difference = 0;
-    withCoefficients(data, bits, [&](const auto* stored) {
-      for (std::size_t i = 0; i < fit.coefficients.size(); ++i) {
-        scale = std::max(scale, std::abs(double(stored[i])));
-        difference = std::max(difference, std::abs(double(stored[i]) - fit.coefficients[i]));
-      }
+    const auto* quantized = std::get_if<QuantizedCoefficients>(&data.coefficients);
+    const double halfStep = quantized ? quantized->step / 2 : 0;
+    return withCoefficients(data, bits, [&](const auto* stored) {
+      double scale = 0, difference = 0;  // beyond that by quantizing
+      basis::forEachCoefficient(fit.degree, [&](int i, int j, int k, int index) {
+        const double found = std::abs(double(stored[index]) - fit.coefficients[index]);
+        scale = std::max(scale, std::abs(double(stored[index])));
+        difference = std::max(difference, found - halfStep * basis::norm(i, j, k));
+      });
+      return difference <= kRounding * scale;
     });
-    return difference <= kRounding * scale;
   }
 
  private:
