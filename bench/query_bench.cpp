@@ -113,7 +113,7 @@ class Reads {
   volatile std::uint64_t none_ = 0;
 };
 
-/// The time of a query's reads alone, below which no query can be.
+/// Measures the time of the reads of queries alone.
 void reads(benchmark::State& state, const Field& field) {
   const Reads reads(field, uniformPoints(kPoints));
   timeEach(state, kPoints, [&] { benchmark::DoNotOptimize(reads.read()); });

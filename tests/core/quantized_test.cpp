@@ -12,8 +12,10 @@
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/error.h"
+#include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/safe_distance.h"
+#include "hpsdf/shapes.h"
 #include "support/one_leaf_field.h"
 #include "support/random_field.h"
 #include "support/temporary_directory.h"
@@ -28,6 +30,11 @@ FieldData quantizedData(const Field& field, double step) {
   FieldData data = field.data();
   EXPECT_TRUE(query::quantize(data, step));
   return data;
+}
+
+query::Rounding changeBy(const Field& field, double step) {
+  const query::Quantized quantized = query::quantized(field.data(), step).value();
+  return query::quantizedRounding(field.data(), quantized.nodes, quantized.coefficients);
 }
 
 Field torusOf(CoefficientType type, BuildOptions options = {.targetError = 1e-6}) {
@@ -107,7 +114,7 @@ TEST(Quantized, theChangeIsAsForetoldAndAsStated) {
   for (const double asked : {1e-3, 3e-4}) {
     const double step = query::quantizationStep(field.data(), asked, 1);
     const FieldData data = quantizedData(field, step);
-    const query::Rounding stated = query::quantizedRounding(field.data(), data);
+    const query::Rounding stated = changeBy(field, step);
     EXPECT_NEAR(stated.rms / asked, 1, 0.1);
     const Field quantized(data);
     const std::vector<Vector3> points = randomPoints(field.domain(), 40000);
@@ -117,7 +124,7 @@ TEST(Quantized, theChangeIsAsForetoldAndAsStated) {
 
     const double narrow = query::quantizationStep(field.data(), asked, asked / 2);
     EXPECT_LT(narrow, step / 5);
-    EXPECT_LE(query::quantizedRounding(field.data(), quantizedData(field, narrow)).max, asked / 2 * (1 + 1e-12));
+    EXPECT_LE(changeBy(field, narrow).max, asked / 2 * (1 + 1e-12));
   }
 }
 
@@ -159,6 +166,26 @@ TEST(Quantized, fieldsWithoutAnErrorKeepFloats) {
   const auto linear = [](const Vector3& x) { return x.x(); };
   const Field field = build(linear, cube(), {.targetError = 1e-6, .coefficients = CoefficientType::quantized});
   EXPECT_EQ(precisionName(field), "float");
+}
+
+/// Beside exact leaves, polynomials are more exact than the field is on average.
+TEST(Quantized, fieldsWithExactLeavesKeepTheirErrorAtTheSurface) {
+  const TriangleMesh mesh = loadMesh("builtin:gear,teeth=5,segments=2");
+  const ExactDistance distance(mesh);
+  BuildOptions options{.targetError = 1e-6, .grid = {3, 3, 3}, .strategy = Strategy::hpx};
+  options.coefficients = CoefficientType::quantized;
+  EXPECT_EQ(precisionName(build(distance, domainAround(mesh), options)), "float");
+  options = {.tolerance = 2e-2, .coefficients = CoefficientType::quantized};
+  const Field field = build(distance, domainAround(mesh), options);
+  ASSERT_EQ(precisionName(field), "quantized");
+  ASSERT_GT(statistics(field).exact.leaves, 0u);
+  for (const Vector3& x : randomPoints(field.domain(), 20000))
+    ASSERT_LE(std::abs(field.value(x) - distance(x)), 2e-2 + 0.01 * std::abs(distance(x)));
+}
+
+TEST(Quantized, certificatesAndLimitsOfBytesAreRefused) {
+  EXPECT_THROW(torusOf(CoefficientType::quantized, {.tolerance = 1e-2, .certified = true}), Error);
+  EXPECT_THROW(torusOf(CoefficientType::quantized, {.targetError = 0, .maxBytes = 100'000}), Error);
 }
 
 TEST(Quantized, boundsHoldAfterRounding) {

@@ -27,6 +27,15 @@ void warnOfErrorLeft(const Console& console, const FieldMetadata& built) {
                      shortNumber(built.measuredError), shortNumber(built.settings.maxError)));
 }
 
+/// Tells that a field was asked for with quantized coefficients, but has others.
+void noteOtherPrecision(const Console& console, CoefficientType asked, const Field& field) {
+  if (asked == CoefficientType::quantized && precisionName(field) != "quantized")
+    note(console,
+         fmt::format("the coefficients are {}: integers would spoil exact cells, or would need too many bits for "
+                     "the error that is asked for",
+                     precisionName(field)));
+}
+
 void refuseInsideTestOfAnalytic(const std::string& surface, const Arguments& arguments) {
   if (!surface.starts_with(kAnalytic)) return;
   for (const char* name : {"sign", "thickness", "hull"})
@@ -106,6 +115,7 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
       return measured(buildResumably(*input.exact, input.domain, input.options, state, progress), input, progress);
     });
     warnOfErrorLeft(console, field.metadata());
+    noteOtherPrecision(console, input.options.coefficients, field);
     if (input.options.bounds) warnOfBounds(console, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   };

@@ -55,15 +55,16 @@ enum class NearnessKind : std::uint8_t {
 /// Precision of the stored coefficients.
 enum class CoefficientType : std::uint8_t {
   /// `float32` if rounding changes the field by less than 1 % of the estimated RMS error and, if a maximum error is
-  /// asked
-  /// for, by less than 1 % of the maximum error; else `float64`.
+  /// asked for, by less than 1 % of the maximum error; else `float64`.
   automatic,
   float32,
   float64,
   /// Integers of few bits (`QuantizedCoefficients`). They change the field by about a tenth of the estimated RMS error
-  /// as RMS, which adds half a percent to this error, and at no point by more than 1 % of a maximum error or of a
-  /// tolerance that is asked for. Without such a goal, or where an integer would take more than 19 bits, the precision
-  /// is `float32`.
+  /// over the domain, as RMS, which adds half a percent to this error, and at no point by more than 1 % of a maximum
+  /// error or of a tolerance that is asked for. The precision is `float32` instead where an integer would take more
+  /// than
+  /// 19 bits, which is usual with a maximum error or a small tolerance, and for fields with exact leaves unless one of
+  /// these is asked for. Excludes `certified` and `maxBytes`.
   quantized,
 };
 

@@ -88,12 +88,11 @@ struct CellBound {
 /// * p numbers of 5 bits, the widths w_1 to w_p,
 /// * the integer of degree 0, of `meanBits` bits,
 /// * for each total degree d = 1 to p the (d+1)(d+2)/2 integers with i+j+k = d, of w_d bits each, in lexicographic
-/// order
-///   of (i, j, k).
+///   order of (i, j, k).
 /// An integer q of w bits is stored as the number q + 2^(w−1); with w = 0, it is 0 and takes no bits.
 struct QuantizedCoefficients {
-  static constexpr int kWidthBits = 5;        ///< bits of a width
-  static constexpr int kMostBits = 19;        ///< greatest width, so that a read of 64 bits holds three integers
+  static constexpr int kWidthBits = 5;  ///< bits of a width
+  static constexpr int kMostBits = 19;  ///< greatest width: 64 bits from a byte on hold three integers (7 + 3 · 19)
   static constexpr int kMostMeanBits = 32;    ///< greatest value of `meanBits`
   static constexpr std::size_t kPadding = 8;  ///< zero bytes at the end, so that 64 bits can be read at every integer
 

@@ -107,6 +107,9 @@ void checkEnds(const BuildOptions& options) {
   checkOutlived(options);
   if (options.certified && options.blend > 0)
     refuse("blending changes what is certified: leave out blending or the certificate");
+  if (options.coefficients == CoefficientType::quantized && (options.certified || options.maxBytes))
+    refuse("quantized coefficients are neither certified nor counted in advance: leave out ",
+           options.certified ? "the certificate" : "the limit of bytes", " or take float coefficients");
   if (options.estimator == Estimator::checked && options.trialSamples == TrialSamples::own)
     refuse("the checked estimator needs trials by the children's samples: take the estimator embedded or residual");
   if (options.criterion != Criterion::optimal) return;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -158,12 +159,15 @@ static bool quantizeCoefficients(FieldData& field) {
   const double rms = metadata.hasEstimate() ? limit(kShareOfRms, metadata.rmsEstimate(field.domain)) : kNone;
   const double max =
       std::min(limit(kShareOfMaximum, metadata.settings.maxError), limit(kShareOfMaximum, metadata.settings.tolerance));
+  // The polynomials beside exact leaves are much more exact than the field is on average.
+  if (!field.exact.triangles.empty() && max == kNone) return false;
   const double step = query::quantizationStep(field, rms, max);
-  FieldData quantized = field;
-  if (!(step > 0 && step < kNone) || !query::quantize(quantized, step)) return false;
-  metadata.roundingRms = query::quantizedRounding(field, quantized).rms;
-  field.nodes = std::move(quantized.nodes);
-  field.coefficients = std::move(quantized.coefficients);
+  if (!(step > 0 && step < kNone)) return false;
+  std::optional<query::Quantized> quantized = query::quantized(field, step);
+  if (!quantized) return false;
+  metadata.roundingRms = query::quantizedRounding(field, quantized->nodes, quantized->coefficients).rms;
+  field.nodes = std::move(quantized->nodes);
+  field.coefficients = std::move(quantized->coefficients);
   query::roundVertices(field.exact);
   return true;
 }

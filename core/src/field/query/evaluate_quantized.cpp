@@ -27,14 +27,14 @@ HWY_INLINE double asNumber(std::uint64_t bits) { return std::bit_cast<double>(bi
 #include "field/query/polynomial-inl.h"
 #include "field/query/quantized-inl.h"
 
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2  // better targets have lower numbers
 
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Numbers = hn::FixedTag<double, 4>;
 using Words = hn::FixedTag<std::uint64_t, 4>;
 
-/// The greatest width of which four integers can be read at once.
+/// The greatest width of which four integers can be read at once. Degree 1 has only three.
 constexpr int kMostAtOnce = 14;
 
 /// Decodes the integers of the total degree D, four at a time. Returns the position after them.

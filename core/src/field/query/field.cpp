@@ -95,7 +95,7 @@ void checkCoefficients(const std::vector<T>& coefficients) {
 void checkCoefficients(const QuantizedCoefficients& coefficients) {
   constexpr double kLargestStep = 1e200;  // Polynomials of such coefficients are finite.
   if (!(coefficients.step > 0 && coefficients.step <= kLargestStep))
-    notAField("the step of its coefficients is no length");
+    notAField("the step of its coefficients is not a number above 0");
 }
 
 /// Throws `Error` if the shared parts of quantized coefficients, without which no leaf can be read, are out of range.
@@ -127,7 +127,7 @@ void checkNodes(const FieldData& data, std::size_t baseCells) {
       const int degree = node::degree(nodes[n]);
       if (degree > kMaxDegree) notAField("a cell has degree " + std::to_string(degree));
       const bool areThere = std::visit([&](const auto& c) { return hasLeaf(c, nodes[n]); }, data.coefficients);
-      if (!areThere) notAField("a cell's coefficients lie beyond the end");
+      if (!areThere) notAField("a cell's coefficients lie beyond the end, or are not well formed");
       continue;
     }
     const std::size_t first = node::firstChild(nodes[n]);

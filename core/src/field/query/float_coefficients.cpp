@@ -8,6 +8,7 @@
 #include "basis/orthonormal.h"
 #include "basis/projection.h"
 #include "field/query/evaluate.h"
+#include "hpsdf/error.h"
 
 namespace hpsdf::query {
 namespace {
@@ -73,10 +74,11 @@ Rounding floatRounding(const FieldData& field) {
   });
 }
 
-Rounding quantizedRounding(const FieldData& field, const FieldData& quantized) {
+Rounding quantizedRounding(const FieldData& field, std::span<const std::uint64_t> nodes,
+                           const QuantizedCoefficients& coefficients) {
   std::vector<double> rounded(coefficientCount(kMaxDegree));
   return roundingOf(field, [&](std::uint32_t node, const double*) {
-    decodeLeaf(std::get<QuantizedCoefficients>(quantized.coefficients), quantized.nodes[node], rounded.data());
+    decodeLeaf(coefficients, nodes[node], rounded.data());
     return rounded.data();
   });
 }
@@ -142,6 +144,8 @@ void toDouble(FieldData& field) {
     if (!node::isLeaf(node) || node::isExact(node)) continue;
     const std::size_t offset = coefficients.size();
     const int degree = node::degree(node);
+    if (offset + std::size_t(coefficientCount(degree)) > 0xffffffff)
+      throw Error("the field has more than 2^32 coefficients, which are too many unless they are quantized");
     coefficients.resize(offset + coefficientCount(degree));
     decodeLeaf(*quantized, node, &coefficients[offset]);
     node = node::leaf(degree, std::uint32_t(offset));

@@ -1,6 +1,9 @@
 #pragma once
 // Conversion of coefficients between double, in which they are computed, and the precisions in which they are stored.
 
+#include <cstdint>
+#include <span>
+
 #include "hpsdf/detail/field_data.h"
 
 namespace hpsdf::query {
@@ -16,11 +19,12 @@ struct Rounding {
 /// moves by δ changes no distance by more than δ; in `rms`, all exact leaves count with the greatest such δ.
 Rounding floatRounding(const FieldData& field);
 
-/// Computes by how much a field with double coefficients differs from the same field, quantized.
-Rounding quantizedRounding(const FieldData& field, const FieldData& quantized);
+/// Computes by how much a field with double coefficients differs from the same field with these nodes and coefficients.
+Rounding quantizedRounding(const FieldData& field, std::span<const std::uint64_t> nodes,
+                           const QuantizedCoefficients& coefficients);
 
-/// Returns the greatest step of quantized coefficients that changes a field by no more than `rms`, to be expected, as
-/// RMS, and at no point by more than `max`. Returns 0 for a field without polynomials.
+/// Returns a step of quantized coefficients that changes a field by about `rms` at most, as RMS, and at no point by
+/// more than `max`. Returns 0 for a field without polynomials.
 double quantizationStep(const FieldData& field, double rms, double max);
 
 /// Convert the coefficients of a field from double to float, or from any type to double. Other coefficients do not

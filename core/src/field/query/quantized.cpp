@@ -114,28 +114,36 @@ std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::u
   return offset + bytesOf(bits) > end ? 0 : bytesOf(bits);
 }
 
-bool quantize(FieldData& field, double step) {
+std::optional<Quantized> quantized(const FieldData& field, double step) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
-  QuantizedCoefficients result{.step = step, .meanBits = 1, .bytes = {}};
-  bool fits = true;
+  Quantized result{.nodes = field.nodes, .coefficients = {.step = step, .meanBits = 1, .bytes = {}}};
+  QuantizedCoefficients& out = result.coefficients;
+  int most = 0;
   forEachPolynomial(field.nodes, [&](std::uint64_t node) {
     const Integers integers(&coefficients[node::offset(node)], node::degree(node), step);
-    fits &= *std::max_element(integers.widths.begin() + 1, integers.widths.end()) <= QuantizedCoefficients::kMostBits;
-    result.meanBits = std::max(result.meanBits, std::uint32_t(integers.widths[0]));
+    most = std::max(most, *std::max_element(integers.widths.begin() + 1, integers.widths.end()));
+    out.meanBits = std::max(out.meanBits, std::uint32_t(integers.widths[0]));
   });
-  if (!fits || result.meanBits > QuantizedCoefficients::kMostMeanBits) return false;
+  if (most > QuantizedCoefficients::kMostBits || out.meanBits > QuantizedCoefficients::kMostMeanBits)
+    return std::nullopt;
 
-  std::vector<std::uint64_t> nodes = field.nodes;
-  forEachPolynomial(nodes, [&](std::uint64_t& node) {
+  forEachPolynomial(result.nodes, [&](std::uint64_t& node) {
     const int degree = node::degree(node);
     const Integers integers(&coefficients[node::offset(node)], degree, step);
-    node = node::leaf(degree, std::uint32_t(result.bytes.size()));
-    integers.write(degree, int(result.meanBits), result.bytes);
+    node = node::leaf(degree, std::uint32_t(out.bytes.size()));
+    integers.write(degree, int(out.meanBits), out.bytes);
   });
-  result.bytes.resize(result.bytes.size() + QuantizedCoefficients::kPadding);
-  if (result.bytes.size() > 0xffffffff) return false;
-  field.nodes = std::move(nodes);
-  field.coefficients = std::move(result);
+  out.bytes.resize(out.bytes.size() + QuantizedCoefficients::kPadding);
+  out.bytes.shrink_to_fit();
+  if (out.bytes.size() > 0xffffffff) return std::nullopt;
+  return result;
+}
+
+bool quantize(FieldData& field, double step) {
+  std::optional<Quantized> result = quantized(field, step);
+  if (!result) return false;
+  field.nodes = std::move(result->nodes);
+  field.coefficients = std::move(result->coefficients);
   return true;
 }
 

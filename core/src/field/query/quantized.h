@@ -5,7 +5,8 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <type_traits>
+#include <optional>
+#include <vector>
 
 #include "basis/orthonormal.h"
 #include "field/query/evaluate.h"
@@ -39,8 +40,18 @@ void evaluateLeaf(const QuantizedCoefficients& coefficients, const GridFrame& fr
 /// Returns the number of bytes that a leaf takes; 0 if it does not lie within the array, or is not well formed.
 std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::uint64_t leaf);
 
-/// Rounds the coefficients of a field from double to multiples of `step` in the orthonormal basis. Returns false, and
-/// leaves the field as it is, if that takes more bits than `QuantizedCoefficients` has.
+/// The arrays of a field that differ once its coefficients are quantized.
+struct Quantized {
+  std::vector<std::uint64_t> nodes;
+  QuantizedCoefficients coefficients;
+};
+
+/// Rounds the coefficients of a field from double to multiples of `step` in the orthonormal basis. Returns std::nullopt
+/// if that takes more bits than `QuantizedCoefficients` has.
+std::optional<Quantized> quantized(const FieldData& field, double step);
+
+/// Quantizes the coefficients of a field. Returns false, and leaves the field as it is, where `quantized` has no
+/// result.
 bool quantize(FieldData& field, double step);
 
 }  // namespace hpsdf::query
