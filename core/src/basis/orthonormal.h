@@ -25,19 +25,19 @@ constexpr double norm(int i, int j, int k) { return kRoot[i] * kRoot[j] * kRoot[
 /// Returns the number of terms of total degree `degree`.
 constexpr int termsOfDegree(int degree) { return (degree + 1) * (degree + 2) / 2; }
 
-/// Returns the position of (i, j, k) among the terms of its total degree in lexicographic order.
-constexpr int rankInDegree(int i, int j, int k) { return i * (i + j + k + 1) - i * (i - 1) / 2 + j; }
+/// Returns the position of the term (i, j, k) if all terms are ordered by total degree first, then lexicographically.
+constexpr int placeByDegree(int i, int j, int k) {
+  return coefficientCount(i + j + k - 1) + i * (i + j + k + 1) - i * (i - 1) / 2 + j;
+}
 
-/// For the terms of a polynomial of degree P in the order of `FieldData`: their positions if all terms are ordered by
-/// total degree first, then lexicographically.
+/// For the terms of a polynomial of degree P in the order of `FieldData`: their positions by `placeByDegree`.
 template <int P>
 constexpr auto kPlaceByDegree = [] {
   std::array<int, std::size_t(coefficientCount(P))> places{};
   int index = 0;
   for (int i = 0; i <= P; ++i)
     for (int j = 0; j <= P - i; ++j)
-      for (int k = 0; k <= P - i - j; ++k)
-        places[index++] = (i + j + k == 0 ? 0 : coefficientCount(i + j + k - 1)) + rankInDegree(i, j, k);
+      for (int k = 0; k <= P - i - j; ++k) places[index++] = placeByDegree(i, j, k);
   return places;
 }();
 

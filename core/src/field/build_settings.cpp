@@ -272,8 +272,8 @@ const std::vector<Row> kRows = {
      member<&BuildOptions::coefficients>,
      "Precision of the coefficients. auto takes float where that changes the error by less than 1 %. quantized takes "
      "integers of few bits, about a quarter of the bytes of float, and raises the RMS error over the domain by about "
-     "0.5 %; "
-     "it gives float, and a note, for fields with exact cells and where a small maximum error or tolerance needs it."},
+     "0.5 %; it gives float, and a note, for fields with exact cells and where a small maximum error or tolerance "
+     "needs it."},
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,
      "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of the distances "
      "for the same error."},

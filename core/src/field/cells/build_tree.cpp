@@ -175,6 +175,7 @@ static bool quantizeCoefficients(FieldData& field) {
 void roundCoefficients(CoefficientType type, FieldData& field) {
   constexpr double kNegligible = 0.01;
   if (query::hasFloatVertices(field.exact)) query::roundVertices(field.exact);
+  if (type == CoefficientType::quantized && quantizeCoefficients(field)) return;
   const query::Rounding rounding = query::floatRounding(field);
   FieldMetadata& metadata = field.metadata;
   const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;
@@ -183,7 +184,6 @@ void roundCoefficients(CoefficientType type, FieldData& field) {
                                 ? rounding.max < kNegligible * tolerance
                                 : rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
   if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isNegligible)) return;
-  if (type == CoefficientType::quantized && quantizeCoefficients(field)) return;
   query::toFloat(field);
   query::roundVertices(field.exact);
   metadata.roundingRms = rounding.rms;

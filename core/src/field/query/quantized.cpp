@@ -42,29 +42,39 @@ class BitWriter {
   int count_ = 0;
 };
 
-/// The integers of a leaf, grouped by total degree, and the bits that each degree needs.
+/// Returns the integer of a coefficient, whose unit is the step times the norm.
+std::int64_t integerOf(double coefficient, double unit) {
+  constexpr double kLargest = 0x1p40;  // more than any integer that can be stored
+  return std::llround(std::clamp(coefficient / unit, -kLargest, kLargest));
+}
+
+/// Returns the number of bits that an integer takes, or `least` if that is more.
+int widthFor(std::int64_t integer, int least) {
+  int width = least;
+  while (integer < -biasOf(width) || integer > std::max<std::int64_t>(biasOf(width) - 1, 0)) ++width;
+  return width;
+}
+
+/// The integers of a leaf, ordered by total degree, and the bits that each degree needs.
 struct Integers {
-  std::array<std::vector<std::int64_t>, kMaxDegree + 1> ofDegree;
+  std::array<std::int64_t, std::size_t(coefficientCount(kMaxDegree))> all;
   std::array<int, kMaxDegree + 1> widths{};
 
   Integers(const double* c, int degree, double step) {
-    for (int d = 0; d <= degree; ++d) ofDegree[d].resize(std::size_t(basis::termsOfDegree(d)));
     basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
-      constexpr double kLargest = 0x1p40;  // more than any integer that can be stored
-      const double number = std::clamp(c[index] / (step * basis::norm(i, j, k)), -kLargest, kLargest);
-      const std::int64_t integer = std::llround(number);
-      const int d = i + j + k;
-      ofDegree[d][basis::rankInDegree(i, j, k)] = integer;
-      while (integer < -biasOf(widths[d]) || integer > std::max<std::int64_t>(biasOf(widths[d]) - 1, 0)) ++widths[d];
+      const std::int64_t integer = integerOf(c[index], step * basis::norm(i, j, k));
+      all[basis::placeByDegree(i, j, k)] = integer;
+      widths[i + j + k] = widthFor(integer, widths[i + j + k]);
     });
   }
 
   void write(int degree, int meanBits, std::vector<std::uint8_t>& bytes) const {
     BitWriter writer(bytes);
     for (int d = 1; d <= degree; ++d) writer.add(std::uint64_t(widths[d]), kWidthBits);
+    const std::int64_t* next = all.data();
     for (int d = 0; d <= degree; ++d) {
       const int width = d == 0 ? meanBits : widths[d];
-      for (const std::int64_t integer : ofDegree[d]) writer.add(std::uint64_t(integer + biasOf(width)), width);
+      for (int n = 0; n < basis::termsOfDegree(d); ++n) writer.add(std::uint64_t(*next++ + biasOf(width)), width);
     }
     writer.finishByte();
   }
@@ -118,21 +128,23 @@ std::optional<Quantized> quantized(const FieldData& field, double step) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
   Quantized result{.nodes = field.nodes, .coefficients = {.step = step, .meanBits = 1, .bytes = {}}};
   QuantizedCoefficients& out = result.coefficients;
-  int most = 0;
   forEachPolynomial(field.nodes, [&](std::uint64_t node) {
-    const Integers integers(&coefficients[node::offset(node)], node::degree(node), step);
-    most = std::max(most, *std::max_element(integers.widths.begin() + 1, integers.widths.end()));
-    out.meanBits = std::max(out.meanBits, std::uint32_t(integers.widths[0]));
+    const std::int64_t mean = integerOf(coefficients[node::offset(node)], step);
+    out.meanBits = std::uint32_t(widthFor(mean, int(out.meanBits)));
   });
-  if (most > QuantizedCoefficients::kMostBits || out.meanBits > QuantizedCoefficients::kMostMeanBits)
-    return std::nullopt;
+  if (out.meanBits > QuantizedCoefficients::kMostMeanBits) return std::nullopt;
 
+  bool fits = true;
   forEachPolynomial(result.nodes, [&](std::uint64_t& node) {
+    if (!fits) return;
     const int degree = node::degree(node);
     const Integers integers(&coefficients[node::offset(node)], degree, step);
+    fits = *std::max_element(integers.widths.begin() + 1, integers.widths.end()) <= QuantizedCoefficients::kMostBits;
+    if (!fits) return;
     node = node::leaf(degree, std::uint32_t(out.bytes.size()));
     integers.write(degree, int(out.meanBits), out.bytes);
   });
+  if (!fits) return std::nullopt;
   out.bytes.resize(out.bytes.size() + QuantizedCoefficients::kPadding);
   out.bytes.shrink_to_fit();
   if (out.bytes.size() > 0xffffffff) return std::nullopt;
