@@ -178,7 +178,7 @@ TEST_F(Continuity, continuityIsStudied) {
     for (std::size_t row = first + 1; row < first + 4; ++row) {  // each row has a smaller weight than the previous row
       EXPECT_LT(figure(row, "jump_rms"), figure(row - 1, "jump_rms")) << row;
       EXPECT_GT(figure(row, "rms"), figure(row - 1, "rms")) << row;
-      EXPECT_EQ(figure(row, "bytes"), figure(first, "bytes")) << row;
+      EXPECT_NEAR(figure(row, "bytes") / figure(first, "bytes"), 1, 0.01) << row;
     }
   EXPECT_TRUE(rows[0].at("weight").is_null());
   EXPECT_EQ(figure(0, "jump_rms_ratio"), 1);

@@ -259,7 +259,7 @@ TEST_F(FieldFile, badFieldFilesAreRefused) {
     expectRefused({{"slice", at(name), "-o", at("s.png"), "--cpu"}}, name, before);
     expectRefused({{"query", at(name), "-o", at("q.csv")}, "0 0 0\n"}, name, before);
   }
-  expectRefused({{"info", at("newer.hpsdf")}}, "version 10", before);
+  expectRefused({{"info", at("newer.hpsdf")}}, "version 11", before);
   expectRefused({{"info", at("missing.hpsdf")}}, "missing.hpsdf", before);
 }
 

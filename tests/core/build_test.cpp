@@ -335,27 +335,28 @@ TEST(Build, floatCoefficientsChangeTheFieldByWhatIsStated) {
 }
 
 TEST(Build, automaticPrecisionFollowsTheTarget) {
-  EXPECT_TRUE(build(sphere, cube(), {.targetError = 1e-6}).singlePrecision());
-  // An RMS error of 1e-9 is requested; rounding coefficients to float would add more than 1 % of it.
+  EXPECT_EQ(precisionName(build(sphere, cube(), {.targetError = 1e-6})), "quantized");
+  // An RMS error of 1e-9 is requested: integers would be too long, and rounding to float would add more than 1 %.
   const auto smooth = [](const Vector3& x) { return 0.1 * x.x() * x.y() * x.z() + std::sin(x.x()) + 10; };
-  EXPECT_FALSE(build(smooth, cube(), {.targetError = 1e-17, .nearness = 0}).singlePrecision());
+  EXPECT_EQ(precisionName(build(smooth, cube(), {.targetError = 1e-17, .nearness = 0})), "double");
 }
 
-/// Coefficients are stored as floats if the rounding error is below 1 % of the estimated error, otherwise as doubles.
+/// Coefficients are quantized with a change of a tenth of the estimated error, or else stored as doubles.
 TEST(Build, automaticPrecisionComparesRoundingWithTheEstimate) {
-  const auto smooth = [](const Vector3& x) { return std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()); };
-  int floats = 0, doubles = 0;
+  const auto smooth = [](const Vector3& x) { return 3 + std::sin(x.x()) * std::cos(x.y()) * std::exp(x.z()); };
+  int quantized = 0, doubles = 0;
   for (double target = 1e-6; target > 1e-17; target /= 10) {
-    BuildOptions options{.targetError = target, .grid = {2, 2, 2}, .coefficients = CoefficientType::float32};
-    const Field rounded = build(smooth, cube(), options);
-    options.coefficients = CoefficientType::automatic;
-    const Field chosen = build(smooth, cube(), options);
-    const double share = rounded.metadata().roundingRms / rounded.metadata().rmsEstimate(rounded.domain());
-    EXPECT_EQ(chosen.singlePrecision(), share < 0.01) << share;
-    floats += share < 0.01;
-    doubles += share >= 0.01 && share < 0.5;
+    const Field chosen = build(smooth, cube(), {.targetError = target, .grid = {2, 2, 2}, .nearness = 0});
+    if (precisionName(chosen) == "double") {
+      ++doubles;
+      continue;
+    }
+    ++quantized;
+    ASSERT_EQ(precisionName(chosen), "quantized");
+    EXPECT_EQ(doubles, 0) << "only for the least errors";
+    EXPECT_NEAR(chosen.metadata().roundingRms / chosen.metadata().rmsEstimate(chosen.domain()), 0.1, 0.02);
   }
-  EXPECT_GT(floats, 0);
+  EXPECT_GT(quantized, 0);
   EXPECT_GT(doubles, 0);
 }
 

@@ -185,6 +185,23 @@ constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8
                       kSinceVersion8 =
                           8 + 4 + 8 + 8 + 8 + 1 + 1 + 1 + 8 + 4 + 4 * 8 + 8;  // bytes that versions 3, 4 and 8 added
 
+/// Version 9 had no shifts and no wide leaves, which differ from 0 only with limits of the change.
+TEST(FieldFile, quantizedFilesOfVersion9AreRead) {
+  support::TemporaryDirectory folder;
+  const auto file = folder.path() / "old.hpsdf";
+  const Field field =
+      build([](const Vector3& x) { return x.norm() - 0.7; }, Box(Vector3::Constant(-1), Vector3::Ones()),
+            {.targetError = 1e-4, .grid = {2, 2, 2}, .coefficients = CoefficientType::quantized});
+  ASSERT_EQ(precisionName(field), "quantized");
+  save(field, file);
+  std::string bytes = readAll(file);
+  ASSERT_EQ(bytes[8], 10);
+  bytes[8] = 9;
+  writeAll(file, withChecksum(bytes));
+  EXPECT_EQ(load(file).data().coefficients, field.data().coefficients);
+  EXPECT_EQ(load(file).data().nodes, field.data().nodes);
+}
+
 /// Older files end their headers earlier: version 8 before the step of quantized coefficients, version 4 before
 /// settings and sizes of exact leaves, the tolerance and the number of measured points, version 3 before the inside
 /// test, version 2 before the settings that follow the number of steps, and version 1 before the number of steps.

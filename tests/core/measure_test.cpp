@@ -21,7 +21,8 @@ namespace measure_test {
 struct Torus {
   TriangleMesh mesh = shapes::mesh("torus,segments=48,sides=24");
   ExactDistance exact{mesh};
-  Field field = build(exact, domainAround(mesh), {.targetError = 1e-4, .strategy = Strategy::hp});
+  Field field = build(exact, domainAround(mesh),
+                      {.targetError = 1e-4, .strategy = Strategy::hp, .coefficients = CoefficientType::float32});
 };
 
 TEST(Measure, agreesWithManyMorePoints) {

@@ -3,11 +3,18 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <random>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "basis/orthonormal.h"
+#include "basis/projection.h"
+#include "field/cells/round_coefficients.h"
 #include "field/query/float_coefficients.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
@@ -26,14 +33,20 @@ namespace quantized_test {
 double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
 Box cube() { return Box(Vector3::Constant(-1.1), Vector3::Constant(1.1)); }
 
+std::optional<query::Quantized> quantizedBy(const Field& field, double step) {
+  return query::quantized(field.data(), std::vector<double>(field.data().nodes.size(), step));
+}
+
 FieldData quantizedData(const Field& field, double step) {
+  query::Quantized quantized = quantizedBy(field, step).value();
   FieldData data = field.data();
-  EXPECT_TRUE(query::quantize(data, step));
+  data.nodes = std::move(quantized.nodes);
+  data.coefficients = std::move(quantized.coefficients);
   return data;
 }
 
 query::Rounding changeBy(const Field& field, double step) {
-  const query::Quantized quantized = query::quantized(field.data(), step).value();
+  const query::Quantized quantized = quantizedBy(field, step).value();
   return query::quantizedRounding(field.data(), quantized.nodes, quantized.coefficients);
 }
 
@@ -109,31 +122,83 @@ TEST(Quantized, blendedFieldsToo) {
   }
 }
 
+/// Returns the step with which the RMS error `rms` grows by half a percent.
+double stepFor(const Field& field, double rms) {
+  detail::QuantizedPart part;
+  field.forEachCell([&](const Cell& cell) { part.add(cell.box.volume(), coefficientCount(cell.degree)); });
+  return part.stepForRms(rms);
+}
+
 TEST(Quantized, theChangeIsAsForetoldAndAsStated) {
   const Field field = randomField(5, {.maxDepth = 2, .minDegree = 2, .maxDegree = 4});
-  for (const double asked : {1e-3, 3e-4}) {
-    const double step = query::quantizationStep(field.data(), asked, 1);
+  for (const double error : {1e-2, 3e-3}) {
+    const double step = stepFor(field, error);
     const FieldData data = quantizedData(field, step);
     const query::Rounding stated = changeBy(field, step);
-    EXPECT_NEAR(stated.rms / asked, 1, 0.1);
+    EXPECT_NEAR(stated.rms / error, 0.1, 0.01);
     const Field quantized(data);
     const std::vector<Vector3> points = randomPoints(field.domain(), 40000);
     const auto change = [&](const Vector3& x) { return quantized.value(x) - field.value(x); };
     EXPECT_NEAR(rms(points, change) / stated.rms, 1, 0.02);
     for (const Vector3& x : points) ASSERT_LE(std::abs(change(x)), stated.max);
-
-    const double narrow = query::quantizationStep(field.data(), asked, asked / 2);
-    EXPECT_LT(narrow, step / 5);
-    EXPECT_LE(changeBy(field, narrow).max, asked / 2 * (1 + 1e-12));
   }
+}
+
+/// Each leaf keeps to the step that is asked for it, by a power of two, and is wide where its integers are long.
+TEST(Quantized, leavesHaveStepsOfTheirOwn) {
+  const Field field = randomField(5, {.maxDepth = 2, .minDegree = 0, .maxDegree = 6});
+  const FieldData& data = field.data();
+  std::mt19937_64 random(3);
+  std::vector<double> steps(data.nodes.size());
+  for (double& step : steps) step = std::exp2(-std::uniform_real_distribution<double>(6, 28)(random));
+  const query::Quantized quantized = query::quantized(data, steps).value();
+  std::array<int, 2> count{};
+  for (std::size_t n = 0; n < data.nodes.size(); ++n) {
+    if (!node::isLeaf(data.nodes[n])) continue;
+    const double step = quantized.coefficients.stepOf(quantized.nodes[n]);
+    ASSERT_LE(step, steps[n]);
+    ASSERT_GT(2 * step, steps[n]);
+    const int degree = node::degree(data.nodes[n]);
+    std::vector<double> decoded(coefficientCount(degree));
+    decodeLeaf(quantized.coefficients, quantized.nodes[n], decoded.data());
+    withCoefficients(data, data.nodes[n], [&](const auto* c) {
+      basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
+        ASSERT_NEAR(decoded[index], c[index], step / 2 * basis::norm(i, j, k) * (1 + 1e-9));
+      });
+    });
+    ++count[node::isWide(quantized.nodes[n]) ? 1 : 0];
+  }
+  EXPECT_GT(std::ranges::min(count), 20);
+
+  // Single and batched queries, with and without blending, agree with the decoded field.
+  FieldData own = data;
+  own.nodes = quantized.nodes;
+  own.coefficients = quantized.coefficients;
+  FieldData plain = own;
+  query::toDouble(plain);
+  for (const double blend : {0.0, 0.1}) {
+    own.blend = plain.blend = blend;
+    const Field a(own), b(plain);
+    const std::vector<Vector3> points = randomPoints(field.domain(), 3000);
+    std::vector<ValueAndGradient> batch(points.size());
+    a.valuesAndGradients(points, batch);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const ValueAndGradient one = a.valueAndGradient(points[i]), other = b.valueAndGradient(points[i]);
+      ASSERT_EQ(batch[i].value, one.value);
+      ASSERT_EQ(batch[i].gradient, one.gradient);
+      ASSERT_NEAR(one.value, other.value, 1e-13);
+      ASSERT_LT((one.gradient - other.gradient).norm(), 1e-10);
+    }
+  }
+  EXPECT_EQ(query::stepsOf(quantized.coefficients, quantized.nodes).size(), data.nodes.size());
 }
 
 TEST(Quantized, aStepThatNeedsTooManyBitsIsRefused) {
   const Field field = randomField(6);
-  FieldData data = field.data();
-  EXPECT_FALSE(query::quantize(data, 1e-9));
-  EXPECT_EQ(data.nodes, field.data().nodes);
-  EXPECT_EQ(data.coefficients, field.data().coefficients);
+  EXPECT_TRUE(quantizedBy(field, 1e-8));
+  EXPECT_FALSE(quantizedBy(field, 1e-11));
+  EXPECT_FALSE(quantizedBy(field, 0));
+  EXPECT_FALSE(quantizedBy(field, std::numeric_limits<double>::infinity()));
 }
 
 TEST(Quantized, constructionsKeepTheirErrorInAThirdOfTheBytes) {
@@ -168,24 +233,67 @@ TEST(Quantized, fieldsWithoutAnErrorKeepFloats) {
   EXPECT_EQ(precisionName(field), "float");
 }
 
-/// Beside exact leaves, polynomials are more exact than the field is on average.
+/// Beside exact leaves, polynomials are more exact than the field is on average, and stay so.
 TEST(Quantized, fieldsWithExactLeavesKeepTheirErrorAtTheSurface) {
   const TriangleMesh mesh = loadMesh("builtin:gear,teeth=5,segments=2");
   const ExactDistance distance(mesh);
   BuildOptions options{.targetError = 1e-6, .grid = {3, 3, 3}, .strategy = Strategy::hpx};
+  options.coefficients = CoefficientType::float32;
+  const Field single = build(distance, domainAround(mesh), options);
   options.coefficients = CoefficientType::quantized;
-  EXPECT_EQ(precisionName(build(distance, domainAround(mesh), options)), "float");
-  options = {.tolerance = 2e-2, .coefficients = CoefficientType::quantized};
   const Field field = build(distance, domainAround(mesh), options);
   ASSERT_EQ(precisionName(field), "quantized");
-  ASSERT_GT(statistics(field).exact.leaves, 0u);
-  for (const Vector3& x : randomPoints(field.domain(), 20000))
-    ASSERT_LE(std::abs(field.value(x) - distance(x)), 2e-2 + 0.01 * std::abs(distance(x)));
+  EXPECT_LT(double(field.bytesOfParts().coefficients), 0.6 * double(single.bytesOfParts().coefficients));
+  const double length = field.metadata().referenceLength;
+  int near = 0;
+  for (const Vector3& x : randomPoints(field.domain(), 20000)) {
+    if (std::abs(distance(x)) > options.exactWithin * length) continue;
+    ++near;
+    ASSERT_NEAR(field.value(x), single.value(x), 2e-7 * length);
+  }
+  EXPECT_GT(near, 100);
 }
 
-TEST(Quantized, certificatesAndLimitsOfBytesAreRefused) {
-  EXPECT_THROW(torusOf(CoefficientType::quantized, {.tolerance = 1e-2, .certified = true}), Error);
-  EXPECT_THROW(torusOf(CoefficientType::quantized, {.targetError = 0, .maxBytes = 100'000}), Error);
+/// Returns true if the errors of a field at random points are within its tolerance.
+bool isWithinTolerance(const Field& field, const ExactDistance& distance) {
+  const AllowedError allowed = allowedError(field.metadata().settings, field.metadata().referenceLength);
+  return std::ranges::all_of(randomPoints(field.domain(), 20000), [&](const Vector3& x) {
+    return std::abs(field.value(x) - distance(x)) <= allowed.at(distance(x));
+  });
+}
+
+TEST(Quantized, aToleranceIsKept) {
+  const TriangleMesh mesh = shapes::mesh("torus,segments=24,sides=12");
+  const ExactDistance distance(mesh);
+  const auto made = [&](BuildOptions options) { return build(distance, domainAround(mesh), options); };
+  for (const double tolerance : {2e-2, 1e-2}) {
+    const Field field = made({.tolerance = tolerance});
+    ASSERT_EQ(precisionName(field), "quantized");
+    EXPECT_LE(field.metadata().measuredError, tolerance);
+    EXPECT_TRUE(isWithinTolerance(field, distance));
+    EXPECT_LT(field.bytes(), made({.tolerance = tolerance, .coefficients = CoefficientType::float32}).bytes());
+  }
+  const Field certified = made({.tolerance = 2e-2, .certified = true});
+  ASSERT_EQ(precisionName(certified), "quantized");
+  EXPECT_TRUE(isWithinTolerance(certified, distance));
+}
+
+TEST(Quantized, aLimitOfBytesIsKept) {
+  const std::vector<Vector3> points = randomPoints(cube(), 40000);
+  const auto errorOf = [&](const Field& field) {
+    return rms(points, [&](const Vector3& x) { return field.value(x) - torus(x); });
+  };
+  for (const Criterion criterion : {Criterion::paper, Criterion::optimal})
+    for (const double maxError : {0.0, 2e-3}) {
+      if (criterion == Criterion::optimal && maxError > 0) continue;
+      const BuildOptions options{.targetError = 0, .maxError = maxError, .maxBytes = 40'000, .criterion = criterion};
+      const Field field = torusOf(CoefficientType::automatic, options);
+      const Field single = torusOf(CoefficientType::float32, options);
+      ASSERT_EQ(precisionName(field), "quantized");
+      EXPECT_LE(field.bytes(), 40'000u);
+      EXPECT_GT(field.bytes(), 32'000u);
+      EXPECT_LT(errorOf(field), 0.6 * errorOf(single));
+    }
 }
 
 TEST(Quantized, boundsHoldAfterRounding) {

@@ -31,8 +31,8 @@ void warnOfErrorLeft(const Console& console, const FieldMetadata& built) {
 void noteOtherPrecision(const Console& console, CoefficientType asked, const Field& field) {
   if (asked == CoefficientType::quantized && precisionName(field) != "quantized")
     note(console,
-         fmt::format("the coefficients are {}: integers would spoil exact cells, or would need too many bits for "
-                     "the error that is asked for",
+         fmt::format("the coefficients are {}: integers would need too many bits for the error that is asked for, or "
+                     "the field has no error to compare with",
                      precisionName(field)));
 }
 

@@ -54,17 +54,16 @@ enum class NearnessKind : std::uint8_t {
 
 /// Precision of the stored coefficients.
 enum class CoefficientType : std::uint8_t {
-  /// `float32` if rounding changes the field by less than 1 % of the estimated RMS error and, if a maximum error is
-  /// asked for, by less than 1 % of the maximum error; else `float64`.
+  /// `quantized`, which takes the fewest bytes. Where that is not possible, `float32` if rounding changes the field by
+  /// less than 1 % of the estimated RMS error and of a maximum error or tolerance that is asked for; else `float64`.
   automatic,
   float32,
   float64,
   /// Integers of few bits (`QuantizedCoefficients`). They change the field by about a tenth of the estimated RMS error
-  /// over the domain, as RMS, which adds half a percent to this error, and at no point by more than 1 % of a maximum
-  /// error or of a tolerance that is asked for. The precision is `float32` instead where an integer would take more
-  /// than
-  /// 19 bits, which is usual with a maximum error or a small tolerance, and for fields with exact leaves unless one of
-  /// these is asked for. Excludes `certified` and `maxBytes`.
+  /// over the domain, as RMS, which adds half a percent to this error; and at no point by more than 1 % of a maximum
+  /// error or 5 % of a tolerance that is asked for, nor by more than floats do where `Strategy::hpx` makes the field
+  /// exact. A limit of bytes may demand a greater change. The precision is `float32` instead where the field has no
+  /// error to compare with, or where an integer would take more than 31 bits.
   quantized,
 };
 
@@ -180,7 +179,7 @@ struct BuildOptions {
   bool certified = false;
   /// Greatest number of bytes of the field in memory. The construction builds the best field within this limit that the
   /// other settings allow. If `maxError` is set too, the construction ends as soon as this error is reached. With a
-  /// limit of bytes, `CoefficientType::automatic` chooses float32.
+  /// limit of bytes, `CoefficientType::automatic` never chooses float64.
   std::optional<std::uint64_t> maxBytes = {};
   Estimator estimator = Estimator::checked;
   Criterion criterion = Criterion::paper;

@@ -2,6 +2,7 @@
 // The arrays of a field, and the record of how it was built.
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -80,25 +81,36 @@ struct CellBound {
   float slope = 0;  ///< bound of ‖∇f‖
 };
 
-/// Coefficients that are stored as integers of few bits (`CoefficientType::quantized`). A coefficient c_ijk is
-/// q · `step` · √((2i+1)(2j+1)(2k+1)) with an integer q. In this orthonormal basis, rounding to a multiple of the step
-/// changes the field by the same amount, as RMS, whichever coefficient it is.
+/// Coefficients that are stored as integers of few bits (`CoefficientType::quantized`). A coefficient c_ijk of a leaf
+/// is q · h · √((2i+1)(2j+1)(2k+1)) with an integer q. The leaf's step h is `step` / 2^s, where the shift s is a number
+/// in the leaf's node (see `FieldData`). In this orthonormal basis, rounding to a multiple of the step changes the
+/// field by the same amount, as RMS, whichever coefficient it is.
 ///
 /// A leaf of degree p is a string of bits that starts at a byte, lowest bit first:
 /// * p numbers of 5 bits, the widths w_1 to w_p,
-/// * the integer of degree 0, of `meanBits` bits,
+/// * the integer of degree 0, of `meanBits` bits, or of `kMostMeanBits` bits in a wide leaf,
 /// * for each total degree d = 1 to p the (d+1)(d+2)/2 integers with i+j+k = d, of w_d bits each, in lexicographic
 ///   order of (i, j, k).
-/// An integer q of w bits is stored as the number q + 2^(w−1); with w = 0, it is 0 and takes no bits.
+/// An integer q of w bits is stored as the number q + 2^(w−1); with w = 0, it is 0 and takes no bits. The widths are at
+/// most `kMostBits`, or `kMostWideBits` in a wide leaf. The leaf's node tells whether it is wide.
 struct QuantizedCoefficients {
-  static constexpr int kWidthBits = 5;  ///< bits of a width
-  static constexpr int kMostBits = 19;  ///< greatest width: 64 bits from a byte on hold three integers (7 + 3 · 19)
-  static constexpr int kMostMeanBits = 32;    ///< greatest value of `meanBits`
+  static constexpr int kWidthBits = 5;      ///< bits of a width
+  static constexpr int kMostBits = 19;      ///< 64 bits from a byte on hold three such integers (7 + 3 · 19)
+  static constexpr int kMostWideBits = 31;  ///< as many as `kWidthBits` can tell
+  static constexpr int kMostMeanBits = 32;  ///< greatest value of `meanBits`
+  static constexpr int kMostShift = 31;
   static constexpr std::size_t kPadding = 8;  ///< zero bytes at the end, so that 64 bits can be read at every integer
+  static constexpr double kLeastStep = 1e-200, kGreatestStep = 1e200;  ///< within them, leaves have normal numbers
 
-  double step = 0;
+  double step = 0;  ///< from `kLeastStep` to `kGreatestStep`
   std::uint32_t meanBits = 0;
   std::vector<std::uint8_t> bytes;  ///< the leaves, and `kPadding` zero bytes
+
+  /// Returns the step of a leaf. `leaf` is the packed node.
+  double stepOf(std::uint64_t leaf) const {
+    const std::uint64_t shift = leaf >> 48 & 31;
+    return std::bit_cast<double>(std::bit_cast<std::uint64_t>(step) - (shift << 52));  // step / 2^shift
+  }
 
   friend bool operator==(const QuantizedCoefficients&, const QuantizedCoefficients&) = default;
 };
@@ -108,6 +120,7 @@ struct QuantizedCoefficients {
 /// * An internal node has bit 63 clear. Its low 32 bits are the index of its first child (child number x + 2y + 4z).
 /// * A leaf with a polynomial has bit 63 set. Its bits 32 to 39 are the degree p, and its low 32 bits are the offset of
 ///   its n(p) coefficients: an index into the array of coefficients or, for `QuantizedCoefficients`, into its bytes.
+///   For these, its bits 48 to 52 are the shift of the leaf's step, and its bit 53 is set if the leaf is wide.
 /// * An exact leaf has bit 63 set. Its bits 32 to 39 are `kExactDegree`, its bits 48 and 49 are the `ExactSign`. Its
 ///   low 32 bits are the offset of its list in `ExactTriangles::lists`.
 /// All other bits are 0.
@@ -143,10 +156,15 @@ constexpr std::uint64_t exactLeaf(ExactSign sign, std::uint32_t offset) {
 }
 constexpr bool isExact(std::uint64_t n) { return isLeaf(n) && degree(n) == kExactDegree; }
 constexpr ExactSign exactSign(std::uint64_t n) { return static_cast<ExactSign>(n >> 48 & 3); }
-constexpr bool hasOnlyKnownBits(std::uint64_t n) {
+constexpr int shift(std::uint64_t n) { return static_cast<int>(n >> 48 & 31); }
+constexpr bool isWide(std::uint64_t n) { return (n >> 53 & 1) != 0; }
+constexpr std::uint64_t quantizedLeaf(int degree, int shift, bool isWide, std::uint32_t offset) {
+  return leaf(degree, offset) | std::uint64_t(shift) << 48 | std::uint64_t(isWide) << 53;
+}
+constexpr bool hasOnlyKnownBits(std::uint64_t n, bool isQuantized) {
   if (!isLeaf(n)) return n <= 0xffffffff;
   if (isExact(n)) return n == exactLeaf(exactSign(n), offset(n));
-  return n == leaf(degree(n), offset(n));
+  return n == (isQuantized ? quantizedLeaf(degree(n), shift(n), isWide(n), offset(n)) : leaf(degree(n), offset(n)));
 }
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node

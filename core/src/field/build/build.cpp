@@ -16,6 +16,7 @@
 #include "field/build/tolerance_build.h"
 #include "field/cells/cell_bounds.h"
 #include "field/cells/prune.h"
+#include "field/cells/round_coefficients.h"
 #include "field/continuity/continuity.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/threads.h"
@@ -45,6 +46,10 @@ BuildOptions settled(BuildOptions options, const DistanceFunction& distance, con
     options.strategy =
         automaticStrategy(distance.triangleSearch(), options, referenceLength(distance.source(), domain));
   if (options.strategy != Strategy::hpx) return options;
+  if (!exactCells(distance, domain, options)) {
+    options.strategy = Strategy::hp;
+    return options;
+  }
   if (isFree) {
     const ExactEstimate estimate = exactEstimate(distance, options, domain, kMostNodesOfAutomatic, progress);
     if (estimate.nodes > kMostNodesOfAutomatic) options.strategy = Strategy::hp;
@@ -126,8 +131,8 @@ class Construction {
     // Reduce the jumps between cells in double precision, then round the coefficients. The coefficients are then final.
     if (options.continuityWeight)
       continuity::makeWeaklyContinuous(field, {.weight = *options.continuityWeight}, setup_.progress);
-    roundCoefficients(budget_.coefficientType(), field);
     field.blend = options.blend;
+    roundCoefficients(budget_.coefficientType(), field, mostCoefficientBytes(field));
 
     // Compute the error bounds, which hold for the rounded coefficients and include blending.
     if (options.bounds) field.metadata.exactEvaluations += findBounds(field, setup_.distance, setup_.progress);
@@ -138,9 +143,14 @@ class Construction {
   /// Returns the field of the present state, as it would be if no stages followed the refinement.
   Field fieldSoFar() const {
     FieldData field = layOut(state_.tree, metadata(sumOfErrors(state_.tree)), setup_.distance.triangleSearch());
-    roundCoefficients(CoefficientType::float32, field);
     field.blend = setup_.options.blend;
+    roundCoefficients(CoefficientType::float32, field);
     return Field(std::move(field));
+  }
+
+  /// Returns the bytes that the limit leaves for the coefficients of a field.
+  double mostCoefficientBytes(const FieldData& field) const {
+    return budget_.limit() - state_.exactSize.inField - budget_.nodeBytes() * double(field.nodes.size());
   }
 
   /// Returns true if twice the octree would not exceed the allowed memory.
@@ -149,8 +159,10 @@ class Construction {
   void prune(BuildTree& tree) const {
     const BuildOptions& options = setup_.options;
     PruneLimits limits{.goal = setup_.goal, .nodeBytes = budget_.nodeBytes()};
-    for (int degree = 0; degree <= kMaxDegree; ++degree) limits.leafBytes[degree] = budget_.leafBytes(degree);
-    limits.leafBytes[kExactDegree] = budget_.bytes(1, 0);
+    for (int degree = 0; degree <= kMaxDegree; ++degree)
+      limits.coefficients[degree] = double(budget_.finalCoefficients(degree));
+    limits.coefficientBytes = budget_.coefficientBytes();
+    if (budget_.mayQuantize()) limits.quantization = setup_.quantizationLimits();
     // If the refinement missed its goal for another reason than the limit of bytes, relax the goal of pruning, so
     // that pruning can still undo refinements.
     if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)

@@ -92,7 +92,7 @@ class Target {
     if (fit.degree != node::degree(bits)) return false;
     constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
     const auto* quantized = std::get_if<QuantizedCoefficients>(&data.coefficients);
-    const double halfStep = quantized ? quantized->step / 2 : 0;
+    const double halfStep = quantized ? quantized->stepOf(bits) / 2 : 0;
     return withCoefficients(data, bits, [&](const auto* stored) {
       double scale = 0, difference = 0;  // beyond that by quantizing
       basis::forEachCoefficient(fit.degree, [&](int i, int j, int k, int index) {
@@ -110,6 +110,14 @@ class Target {
   std::array<std::uint32_t, 3> index_{};
 };
 
+/// Returns the bytes of a coefficient of a field that has polynomials, on average.
+double averageCoefficientBytes(const FieldData& field) {
+  double count = 0;
+  for (const std::uint64_t node : field.nodes)
+    if (node::isLeaf(node) && !node::isExact(node)) count += coefficientCount(node::degree(node));
+  return double(coefficientBytes(field)) / std::max(count, 1.0);
+}
+
 /// Repeats Algorithm 1 for one leaf.
 class RefinementReplay {
  public:
@@ -123,7 +131,8 @@ class RefinementReplay {
         setup_(makeSetup(distance, field.domain(), options_, budget_, progress)),
         fitter_(distance, options_, state_.nearness, setup_.nearDistance, progress),
         refiner_{setup_, fitter_, state_, observer_},
-        scale_(std::pow(setup_.referenceLength / 2, 5)) {
+        scale_(std::pow(setup_.referenceLength / 2, 5)),
+        averageCoefficientBytes_(averageCoefficientBytes(field.data())) {
     state_.nearness = nearnessOf(options_, field.domain());
     state_.tree.domain = field.domain();
     state_.tree.grid = field.grid();
@@ -349,7 +358,7 @@ class RefinementReplay {
   void compare(const Visited& visited, CellStep& step) const {
     const Fit& fit = visited.node.fit;
     const Trial& trial = *visited.trial;
-    const double coefficientBytes = budget_.bytes(0, 1);
+    const double coefficientBytes = averageCoefficientBytes_;
     step.listIsTooLong = setup_.exactCells && !options_.maxBytes && !trial.exact;
     if (trial.exact) {
       step.exactTrial = CellAlternative{.bytes = listBytesOf(packedWords(trial.exact->list, trial.exact->sign), 0)};
@@ -361,16 +370,17 @@ class RefinementReplay {
     if (trial.raised && allowed != Refinement::octree) {
       step.trialDegree = fit.degree + 1;
       const double added = double(budget_.finalCoefficients(fit.degree + 1)) - double(budget_.finalCoefficients(fit));
-      step.degreeTrial = CellAlternative{.bytes = budget_.bytes(0, added),
+      step.degreeTrial = CellAlternative{.bytes = added * coefficientBytes,
                                          .error = trial.raised->error.weighted / scale_,
                                          .gain = *gains.degree / coefficientBytes / scale_};
     }
     if (trial.children) {
       double error = 0;
       for (const Fit& child : *trial.children) error += child.error.weighted;
-      step.octreeTrial = CellAlternative{.bytes = budget_.bytes(8, 7 * double(budget_.finalCoefficients(fit))),
-                                         .error = error / scale_,
-                                         .gain = *gains.octree / coefficientBytes / scale_};
+      step.octreeTrial = CellAlternative{
+          .bytes = 8 * budget_.nodeBytes() + 7 * double(budget_.finalCoefficients(fit)) * coefficientBytes,
+          .error = error / scale_,
+          .gain = *gains.octree / coefficientBytes / scale_};
     }
   }
 
@@ -385,6 +395,7 @@ class RefinementReplay {
   GrowthObserver observer_ = {};
   Refiner refiner_;
   double scale_;
+  double averageCoefficientBytes_;  ///< in the finished field
   CellHistory history_;
 };
 
@@ -479,7 +490,12 @@ class ToleranceReplay {
         bytes += bytesBelow(node::firstChild(bits) + child, place.child(child));
       return bytes;
     }
-    if (!node::isExact(bits)) return setup_.budget.bytes(1, coefficientCount(node::degree(bits)));
+    if (!node::isExact(bits)) {
+      const int degree = node::degree(bits);
+      return withCoefficients(field_.data(), bits, [&](const auto* c) {
+        return cells_.polynomialBytes(std::vector<double>(c, c + coefficientCount(degree)), degree);
+      });
+    }
     return setup_.budget.nodeBytes() + listBytes(bits, setup_.tree.boxOf(place));
   }
 

@@ -20,7 +20,7 @@ namespace {
 constexpr Magic kCheckpointMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
 // Version of the checkpoint file. It must be increased whenever the file's layout changes or a construction
 // would continue differently from the same state.
-constexpr std::uint32_t kCheckpointVersion = 5;
+constexpr std::uint32_t kCheckpointVersion = 6;
 constexpr FileKind kCheckpointKind{"checkpoint", "another output", "delete it to build from the start"};
 
 class Digest {
@@ -254,6 +254,7 @@ void scalarItems(Stream& stream, ConstructionState& state, std::uint64_t& evalua
                        &state.totals.farSquared, &state.totals.farVolume, &state.lastSum, &state.measuredError})
     stream.item(*number);
   stream.flag(state.isFull);
+  stream.item(state.coefficientBytes);
   stream.item(state.processed);
 }
 
@@ -332,6 +333,8 @@ void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluat
 std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const ConstructionSetup& setup) {
   std::uint64_t evaluations = 0;
   scalarItems(reader, state, evaluations);
+  reader.require(state.coefficientBytes >= 0 && state.coefficientBytes <= sizeof(double),
+                 "its bytes of a coefficient are out of range");
   reader.require(state.stage <= ConstructionState::Stage::probe && state.nearness.kind <= NearnessKind::exponential,
                  "it is at an unknown stage");
   readTree(reader, state, setup);

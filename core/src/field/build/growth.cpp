@@ -135,6 +135,7 @@ class Growth {
     state_.exactSize = setup_.exactSize(tree);
     if (setup_.goal.byDistance()) chooseNearness();
     refiner_.sumTotals();
+    refiner_.countCoefficientBytes();
     requireRoomForFirstCells();
     for (std::size_t n = 0; n < count; ++n)
       if (tree.nodes[n].firstChild == 0) enqueue(static_cast<std::uint32_t>(n));
@@ -142,14 +143,18 @@ class Growth {
   }
 
   void requireRoomForFirstCells() const {
+    const auto bytesOfNode = [&](double coefficients) {
+      return setup_.budget.nodeBytes() + state_.coefficientBytes * coefficients;
+    };
     double least = state_.exactSize.inField;
     for (const BuildNode& node : state_.tree.nodes) {
       if (node.firstChild != 0 || node.fit.isFinal) {
-        least += setup_.budget.bytes(1, double(node.fit.coefficients.size()));
+        least += bytesOfNode(double(node.fit.coefficients.size()));
         continue;
       }
       const bool mayLower = setup_.options.criterion == Criterion::optimal && !node.fit.outsideBand;
-      least += setup_.budget.leafBytes(mayLower ? leastDegree(setup_.options) : node.fit.degree);
+      const int degree = mayLower ? leastDegree(setup_.options) : node.fit.degree;
+      least += bytesOfNode(double(setup_.budget.finalCoefficients(degree)));
     }
     setup_.budget.requireRoomForFirstCells(refiner_.bytes(), least, state_.exactSize.inField);
   }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "field/cells/exact_lists.h"
+#include "field/query/quantized.h"
 
 namespace hpsdf::detail {
 namespace {
@@ -26,6 +27,12 @@ void LeastBytes::consider(CheapCell& cell, Fit&& fit, double bytes, double ratio
   cell.fit = std::move(fit);
   cell.bytes = bytes;
   cell.leafRatio = ratio;
+}
+
+double LeastBytes::polynomialBytes(std::span<const double> coefficients, int degree) const {
+  if (!budget_.mayQuantize()) return budget_.bytes(1, double(coefficients.size()));
+  const double step = fitter_.quantizationLimits().greatestStep(coefficients, degree);
+  return budget_.nodeBytes() + query::quantizedBytes(coefficients, degree, step);
 }
 
 /// Returns the bytes of a leaf without error.
@@ -56,8 +63,9 @@ void LeastBytes::makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&
 
 bool LeastBytes::makeLeaf(CheapCell& cell, const CellPlace& place, double ratioAbove,
                           std::vector<LeafTrial>* trials) const {
-  constexpr double kSmallestChild = 4;  // coefficients
-  const double leastOfChildren = budget_.bytes(8, 8 * kSmallestChild);
+  constexpr double kFewestCoefficients = 4, kFewestQuantizedBytes = 6;
+  const double leastOfChildren =
+      8 * (budget_.mayQuantize() ? budget_.nodeBytes() + kFewestQuantizedBytes : budget_.bytes(1, kFewestCoefficients));
   const Box box = tree_.boxOf(place);
   constexpr std::uint64_t kBetweenChecks = 4096;
   if (++cells_ % kBetweenChecks == 0) requireRoom_(cells_);

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -67,12 +68,15 @@ class LeastBytes {
   /// Makes the octree of a cell: all of the above, down to its leaves.
   void solve(CheapCell& cell, const CellPlace& place, double ratioAbove) const;
 
+  /// Returns the bytes that a leaf with a polynomial takes.
+  double polynomialBytes(std::span<const double> coefficients, int degree) const;
+
   /// Number of cells that were looked at so far.
   std::uint64_t cells() const { return cells_; }
 
  private:
   void consider(CheapCell& cell, Fit&& fit, double bytes, double ratio, std::vector<LeafTrial>* trials) const;
-  double polynomialBytes(const Fit& fit) const { return budget_.bytes(1, double(fit.coefficients.size())); }
+  double polynomialBytes(const Fit& fit) const { return polynomialBytes(fit.coefficients, fit.degree); }
   double exactBytes(const Fit& fit, const Box& box) const;
   void makeSmallestLeaf(CheapCell& cell, const Box& box, ToleranceFit&& polynomial,
                         std::vector<LeafTrial>* trials) const;

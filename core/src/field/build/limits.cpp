@@ -107,9 +107,6 @@ void checkEnds(const BuildOptions& options) {
   checkOutlived(options);
   if (options.certified && options.blend > 0)
     refuse("blending changes what is certified: leave out blending or the certificate");
-  if (options.coefficients == CoefficientType::quantized && (options.certified || options.maxBytes))
-    refuse("quantized coefficients are neither certified nor counted in advance: leave out ",
-           options.certified ? "the certificate" : "the limit of bytes", " or take float coefficients");
   if (options.estimator == Estimator::checked && options.trialSamples == TrialSamples::own)
     refuse("the checked estimator needs trials by the children's samples: take the estimator embedded or residual");
   if (options.criterion != Criterion::optimal) return;
@@ -124,14 +121,17 @@ void checkEnds(const BuildOptions& options) {
 }
 
 /// Returns the part of the byte limit that is left for nodes and coefficients. The lookup grid takes the rest:
-/// one entry for each base cell, or a sixteenth of the bytes of nodes and coefficients if that is more. Blending
-/// makes each entry half as large again.
+/// one entry for each base cell or, if that is more, an eighth of the bytes of nodes and coefficients, and a sixteenth
+/// if they are not quantized. Blending makes each entry half as large again.
 double limitWithoutLookup(const BuildOptions& options) {
   if (!options.maxBytes) return HUGE_VAL;
   const auto limit = double(*options.maxBytes);
   const double entries = options.blend > 0 ? 1.5 : 1;
+  const bool isFloat =
+      options.coefficients == CoefficientType::float32 || options.coefficients == CoefficientType::float64;
+  const double share = isFloat ? 16 : 8;
   const double baseEntries = 8 * baseCells(options);
-  return std::min(limit / (1 + entries / 16), limit - entries * baseEntries);
+  return std::min(limit / (1 + entries / share), limit - entries * baseEntries);
 }
 
 }  // namespace
@@ -274,7 +274,7 @@ void ByteBudget::requireRoomForFirstCells(double bytes, double leastBytes, doubl
 
 CoefficientType ByteBudget::coefficientType() const {
   const bool isFree = options_.coefficients == CoefficientType::automatic;
-  return isFree && options_.maxBytes ? CoefficientType::float32 : options_.coefficients;
+  return isFree && options_.maxBytes ? CoefficientType::quantized : options_.coefficients;
 }
 
 void checkOptions(const Box& domain, const BuildOptions& options) {

@@ -53,8 +53,8 @@ double mostNodes(const BuildOptions& options);
 /// octree; they count only in the memory that the error suggests.
 void requireMemoryForExact(const ExactEstimate& estimate, std::size_t fixedBytes, const BuildOptions& options);
 
-/// Computes the bytes of the finished field from its numbers of nodes and coefficients. The lookup grid and the
-/// triangles of exact leaves do not count.
+/// Computes the bytes of the finished field from its numbers of nodes and coefficients, as far as these are not
+/// quantized. The lookup grid and the triangles of exact leaves do not count.
 class ByteBudget {
  public:
   explicit ByteBudget(const BuildOptions& options);
@@ -74,6 +74,8 @@ class ByteBudget {
   double bytes(double nodes, double coefficients) const {
     return nodeBytes() * nodes + coefficientBytes_ * coefficients;
   }
+  /// Returns the bytes of a coefficient that is not quantized. Quantized ones must be counted.
+  double coefficientBytes() const { return coefficientBytes_; }
 
   /// Returns the byte limit for nodes, coefficients and the triangles of exact leaves, or infinity if there is no
   /// limit.
@@ -85,8 +87,13 @@ class ByteBudget {
   /// `leastBytes`, the fewest that pruning can leave, exceeds the limit. Both include `exactBytes`.
   void requireRoomForFirstCells(double bytes, double leastBytes, double exactBytes) const;
 
-  /// Returns the precision of the finished field's coefficients. It is float if bytes are limited and no
-  /// precision is set.
+  /// Returns true if the finished field's coefficients are quantized where that is possible.
+  bool mayQuantize() const {
+    return coefficientType() == CoefficientType::quantized || coefficientType() == CoefficientType::automatic;
+  }
+
+  /// Returns the precision of the finished field's coefficients. They are quantized, or else float, if bytes are
+  /// limited and no precision is set.
   CoefficientType coefficientType() const;
 
  private:

@@ -1,10 +1,13 @@
 #include "field/build/refiner.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "basis/projection.h"
 #include "field/cells/probes.h"
+#include "field/cells/round_coefficients.h"
+#include "hpsdf/detail/triangle_search.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::detail {
@@ -70,6 +73,11 @@ ErrorTotals sumOfErrors(const BuildTree& tree) {
   for (const BuildNode& node : tree.nodes)
     if (node.firstChild == 0) sum.add(node.fit.error);
   return sum;
+}
+
+QuantizationLimits ConstructionSetup::quantizationLimits() const {
+  const TriangleSearch* search = distance.triangleSearch();
+  return {options, referenceLength, search != nullptr ? search->offset() : 0};
 }
 
 std::optional<Refinement> Refiner::allowed(const BuildNode& leaf) const {
@@ -143,8 +151,7 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
   const ByteBudget& budget = setup.budget;
   const std::size_t before = budget.finalCoefficients(tree.nodes[leaf].fit.degree);
   const std::size_t added = raises ? budget.finalCoefficients(trial.raised->degree) - before : 7 * before;
-  if (bytes() + budget.bytes(0, double(added)) + (raises ? 0 : 8 * budget.nodeBytes()) >
-      budget.growthLimit(state.exactSize.inField)) {
+  if (!hasRoom(double(tree.nodes.size()) + (raises ? 0 : 8), double(state.coefficients + added))) {
     state.isFull = true;
     return;
   }
@@ -163,6 +170,27 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
     for (std::uint32_t child = first; child < first + 8; ++child) state.totals.add(tree.nodes[child].fit.error);
   }
   countStep();
+}
+
+void Refiner::countCoefficientBytes() {
+  state.coefficientBytes = setup.budget.coefficientBytes();
+  if (!setup.options.maxBytes || !setup.budget.mayQuantize()) return;
+  std::size_t coefficients = 0;
+  for (const BuildNode& node : state.tree.nodes)
+    if (node.firstChild == 0) coefficients += node.fit.coefficients.size();
+  if (coefficients == 0) return;
+  const double rms = std::sqrt(sumOfErrors(state.tree).weighted / state.tree.domain.volume());
+  const double bytes = quantizedBytes(state.tree, setup.quantizationLimits(), rms) / double(coefficients);
+  state.coefficientBytes = std::min(state.coefficientBytes, bytes);
+}
+
+bool Refiner::hasRoom(double nodes, double coefficients) {
+  const double limit = setup.budget.growthLimit(state.exactSize.inField);
+  if (bytesWith(nodes, coefficients) <= limit) return true;
+  // Since the bytes were counted, the octree has grown, and its coefficients have become more exact.
+  if (!setup.options.maxBytes) return false;
+  countCoefficientBytes();
+  return bytesWith(nodes, coefficients) <= limit;
 }
 
 void Refiner::countStep() {

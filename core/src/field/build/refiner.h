@@ -9,6 +9,7 @@
 #include "field/build/limits.h"
 #include "field/cells/build_tree.h"
 #include "field/cells/exact_leaves.h"
+#include "field/cells/round_coefficients.h"
 
 namespace hpsdf::detail {
 
@@ -29,6 +30,7 @@ struct ConstructionState {
   BuildTree tree;
   std::vector<std::uint32_t> deferred;  ///< leaves set aside while the near or the far error meets its goal
   std::vector<std::uint32_t> pending;   ///< leaves whose maximum error is measured, in this order
+  double coefficientBytes = 0;          ///< bytes of a coefficient in the finished field, on average
   std::size_t coefficients = 0;         ///< number of coefficients of the finished field; derived, not stored
   ExactSize exactSize;                  ///< memory of the exact leaves; derived, not stored
 };
@@ -45,6 +47,8 @@ struct ConstructionSetup {
   const ByteBudget& budget;
   std::optional<ExactCells> exactCells = {};  ///< makes exact leaves; only for `Strategy::hpx`
 
+  /// Returns by how much quantizing may change the polynomials of this construction.
+  QuantizationLimits quantizationLimits() const;
   /// Returns the memory of the exact leaves of a tree of this construction.
   ExactSize exactSize(const BuildTree& tree) const {
     return detail::exactSize(tree, distance.triangleSearch(), budget.coefficientType());
@@ -105,9 +109,14 @@ struct Refiner {
   /// Replaces the fit of a leaf by a fit without error.
   void makeExact(std::uint32_t leaf, Fit&& fit);
   /// Returns the size in bytes of the field that would be made from the present octree.
-  double bytes() const {
-    return setup.budget.bytes(double(state.tree.nodes.size()), double(state.coefficients)) + state.exactSize.inField;
+  double bytes() const { return bytesWith(double(state.tree.nodes.size()), double(state.coefficients)); }
+  double bytesWith(double nodes, double coefficients) const {
+    return setup.budget.nodeBytes() * nodes + state.coefficientBytes * coefficients + state.exactSize.inField;
   }
+  /// Counts the bytes of a coefficient, which change with the octree if the coefficients are quantized.
+  void countCoefficientBytes();
+  /// Returns true if the limit of bytes allows a field with so many nodes and coefficients.
+  bool hasRoom(double nodes, double coefficients);
   /// Returns the memory that the octree needs if it grows by `leastFactor` at least and probably by `likelyFactor`.
   MemoryNeed memoryNeed(double leastFactor = 1, double likelyFactor = 1) const;
   /// Throws `Error` if the octree exceeds the allowed memory now, or will exceed it after growing by these factors.

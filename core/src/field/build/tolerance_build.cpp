@@ -15,6 +15,7 @@
 #include "field/build/least_bytes.h"
 #include "field/build/limits.h"
 #include "field/cells/cell_bounds.h"
+#include "field/cells/round_coefficients.h"
 #include "hpsdf/detail/build_settings.h"
 
 namespace hpsdf::detail {
@@ -61,8 +62,8 @@ class ToleranceBuild {
     double worst = 0;
     for (std::uint32_t n = 0; n < roots_.size(); ++n) worst = std::max(worst, moveToTree(n, std::move(roots_[n])));
     FieldData field = layOut(std::move(tree_), metadata(worst), distance_.triangleSearch());
-    roundCoefficients(options_.coefficients, field);
     field.blend = options_.blend;
+    roundCoefficients(options_.coefficients, field);
     if (options_.bounds) field.metadata.exactEvaluations += findBounds(field, distance_, progress_);
     return field;
   }

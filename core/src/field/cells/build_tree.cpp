@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "field/cells/exact_lists.h"
 #include "field/query/float_coefficients.h"
-#include "field/query/quantized.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::detail {
@@ -147,48 +145,6 @@ FieldData layOut(const BuildTree& tree, FieldMetadata metadata, const TriangleSe
 
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search) {
   return layOutTree(tree, std::move(metadata), search, [&](std::uint32_t n) { tree.nodes[n].fit = Fit{}; });
-}
-
-/// Quantizes the coefficients of a field as `CoefficientType::quantized` says. Returns false, and leaves the field as
-/// it is, if that is not possible.
-static bool quantizeCoefficients(FieldData& field) {
-  constexpr double kShareOfRms = 0.1, kShareOfMaximum = 0.01;
-  FieldMetadata& metadata = field.metadata;
-  constexpr double kNone = std::numeric_limits<double>::infinity();
-  const auto limit = [&](double share, double error) { return error > 0 ? share * error : kNone; };
-  const double rms = metadata.hasEstimate() ? limit(kShareOfRms, metadata.rmsEstimate(field.domain)) : kNone;
-  const double max =
-      std::min(limit(kShareOfMaximum, metadata.settings.maxError), limit(kShareOfMaximum, metadata.settings.tolerance));
-  // The polynomials beside exact leaves are much more exact than the field is on average.
-  if (!field.exact.triangles.empty() && max == kNone) return false;
-  const double step = query::quantizationStep(field, rms, max);
-  if (!(step > 0 && step < kNone)) return false;
-  std::optional<query::Quantized> quantized = query::quantized(field, step);
-  if (!quantized) return false;
-  metadata.roundingRms = query::quantizedRounding(field, quantized->nodes, quantized->coefficients).rms;
-  field.nodes = std::move(quantized->nodes);
-  field.coefficients = std::move(quantized->coefficients);
-  query::roundVertices(field.exact);
-  return true;
-}
-
-void roundCoefficients(CoefficientType type, FieldData& field) {
-  constexpr double kNegligible = 0.01;
-  if (query::hasFloatVertices(field.exact)) query::roundVertices(field.exact);
-  if (type == CoefficientType::quantized && quantizeCoefficients(field)) return;
-  const query::Rounding rounding = query::floatRounding(field);
-  FieldMetadata& metadata = field.metadata;
-  const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;
-  const double tolerance = metadata.settings.tolerance;
-  const bool isNegligible = tolerance > 0
-                                ? rounding.max < kNegligible * tolerance
-                                : rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
-  if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isNegligible)) return;
-  query::toFloat(field);
-  query::roundVertices(field.exact);
-  metadata.roundingRms = rounding.rms;
-  const bool spoilsTolerance = tolerance > 0 && rounding.max > kNegligible * tolerance;
-  if (spoilsMaximum || spoilsTolerance) metadata.measuredError += rounding.max;
 }
 
 }  // namespace hpsdf::detail

@@ -72,9 +72,4 @@ ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, Coeffic
 FieldData layOut(const BuildTree& tree, FieldMetadata metadata, const TriangleSearch* search);
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search);
 
-/// Rounds the coefficients of a field, and the vertices of its exact leaves, from double to `type`. Vertices that are
-/// floats already are stored as floats in any case. Sets `roundingRms` and `measuredError` in the
-/// field's metadata.
-void roundCoefficients(CoefficientType type, FieldData& field);
-
 }  // namespace hpsdf::detail

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "basis/projection.h"
+#include "field/query/quantized.h"
 
 namespace hpsdf::detail {
 namespace {
@@ -39,9 +40,11 @@ class Pruning {
         limits_(limits),
         squared_(tree.nodes.size()),
         weight_(tree.nodes.size()),
+        bytes_(tree.nodes.size()),
         chosen_(tree.nodes.size()) {
     tbb::parallel_for(std::size_t{0}, tree.nodes.size(), [&](std::size_t n) {
       const Fit& fit = tree.nodes[n].fit;
+      chosen_[n] = tree.nodes[n].firstChild == 0 ? static_cast<std::uint8_t>(fit.degree) : kSplit;
       if (isFixed(n)) return;
       squared_[n] = squaredErrors(fit);
       weight_[n] = fit.outsideBand ? 0 : nearness.weight(fit.coefficients[0]);
@@ -49,12 +52,12 @@ class Pruning {
   }
 
   void run() {
-    // Choose λ, the error that is worth one byte. With a greater λ the error grows and the bytes fall. Take the
-    // greatest λ that keeps the error goal or, if greater, the least λ that keeps the limit of bytes.
-    double lambda = bracket([&](const Totals& sum) { return limits_.goal.reached(sum.errors); }).first;
-    if (limits_.mostBytes)
-      lambda = std::max(lambda, bracket([&](const Totals& sum) { return sum.bytes > *limits_.mostBytes; }).second);
-    choose(lambda);
+    // The bytes of quantized coefficients depend on their step, which depends on the error of the pruned tree.
+    const int rounds = limits_.quantization ? 3 : 1;
+    for (int round = 0; round < rounds; ++round) {
+      countBytes();
+      chooseAll();
+    }
     cut();
   }
 
@@ -62,7 +65,51 @@ class Pruning {
   struct Totals {
     ErrorTotals errors;
     double bytes = 0;
+    QuantizedPart part;
   };
+
+  /// Chooses the pruned tree. λ is the error that is worth one byte: with a greater λ the error grows and the bytes
+  /// fall. Takes the greatest λ that keeps the error goal or, if greater, the least λ that keeps the limit of bytes.
+  void chooseAll() {
+    double lambda = bracket([&](const Totals& sum) { return limits_.goal.reached(sum.errors); }).first;
+    if (limits_.mostBytes)
+      lambda = std::max(lambda, bracket([&](const Totals& sum) { return sum.bytes > *limits_.mostBytes; }).second);
+    choose(lambda);
+  }
+
+  /// Computes the bytes of all nodes as leaves of each degree, with the step that suits the tree as it is chosen now.
+  void countBytes() {
+    double forRms = 0;
+    if (limits_.quantization) {
+      const Totals sum = totals();
+      forRms = sum.part.stepForRms(std::sqrt(sum.errors.weighted / tree_.domain.volume()));
+    }
+    tbb::parallel_for(std::size_t{0}, tree_.nodes.size(), [&](std::size_t n) { bytes_[n] = leafBytes(n, forRms); });
+  }
+
+  /// Returns the bytes of a node as a leaf of each degree that it may have, from 0 on. A leaf that stays as it is has
+  /// only one element, and lists of triangles count elsewhere.
+  std::vector<float> leafBytes(std::size_t n, double forRms) const {
+    const Fit& fit = tree_.nodes[n].fit;
+    if (fit.isExact()) return {float(limits_.nodeBytes)};
+    const std::vector<double>& c = isFixed(n) ? fit.coefficients : fit.cached.coefficients;
+    if (c.empty()) return {};
+    const int top = isFixed(n) ? fit.degree : fit.cached.degree;
+    std::vector<float> bytes(std::size_t(top) + 1);
+    if (!limits_.quantization) {
+      for (int degree = 0; degree <= top; ++degree)
+        bytes[degree] = float(limits_.nodeBytes + limits_.coefficientBytes * limits_.coefficients[degree]);
+    } else {
+      const double step = std::min(forRms, limits_.quantization->greatestStep(c, top));
+      const auto quantized = query::quantizedBytesByDegree(c, top, step);
+      for (int degree = 0; degree <= top; ++degree) {
+        // Where degrees are raised at the end, the additional coefficients are not known yet.
+        const double more = limits_.coefficients[degree] / coefficientCount(degree);
+        bytes[degree] = float(limits_.nodeBytes + more * quantized[degree]);
+      }
+    }
+    return isFixed(n) ? std::vector{bytes.back()} : bytes;
+  }
 
   /// Returns true for a leaf without error, which stays as it is, and for a node that was split before it had a fit,
   /// which stays split.
@@ -97,7 +144,7 @@ class Pruning {
     const Fit& fit = tree_.nodes[n].fit;
     if (isFixed(n)) {
       chosen_[n] = static_cast<std::uint8_t>(fit.degree);
-      return lambda * (limits_.leafBytes[fit.degree] + bytesOf(fit.list));
+      return lambda * (fit.coefficients.empty() && !fit.isExact() ? 0 : bytes_[n].back() + bytesOf(fit.list));
     }
     const int top = std::min<int>(limits_.mostDegree, fit.cached.degree);
     // Keep the degree of a cell outside the narrow band. Its error does not count, so that pruning would choose
@@ -105,7 +152,7 @@ class Pruning {
     const int low = fit.outsideBand ? fit.degree : std::min(limits_.leastDegree, top);
     double least = HUGE_VAL;
     for (int degree = low; degree <= top; ++degree) {
-      const double cost = weight_[n] * squared_[n][degree] + lambda * limits_.leafBytes[degree];
+      const double cost = weight_[n] * squared_[n][degree] + lambda * bytes_[n][degree];
       if (cost >= least) continue;
       least = cost;
       chosen_[n] = static_cast<std::uint8_t>(degree);
@@ -125,8 +172,10 @@ class Pruning {
           sum.bytes += limits_.nodeBytes;
           for (std::uint32_t child = 0; child < 8; ++child) stack.push_back(tree_.nodes[n].firstChild + child);
         } else {
-          sum.bytes += limits_.leafBytes[chosen_[n]];
+          const bool isExact = tree_.nodes[n].fit.isExact();
+          if (!bytes_[n].empty()) sum.bytes += isFixed(n) ? bytes_[n].back() : bytes_[n][chosen_[n]];
           sum.errors.add(errorAt(n, chosen_[n]));
+          if (!isExact) sum.part.add(tree_.boxOf(tree_.nodes[n]).volume(), coefficientCount(chosen_[n]));
         }
       }
     }
@@ -186,7 +235,8 @@ class Pruning {
   const PruneLimits& limits_;
   std::vector<std::vector<double>> squared_;  ///< squared errors by node and degree
   std::vector<double> weight_;
-  std::vector<std::uint8_t> chosen_;  ///< for each node, its degree as a leaf or kSplit
+  std::vector<std::vector<float>> bytes_;  ///< by node and degree
+  std::vector<std::uint8_t> chosen_;       ///< for each node, its degree as a leaf or kSplit
 };
 
 }  // namespace

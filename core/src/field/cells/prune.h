@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "field/cells/build_tree.h"
+#include "field/cells/round_coefficients.h"
 #include "field/nearness.h"
 
 namespace hpsdf::detail {
@@ -12,9 +13,12 @@ namespace hpsdf::detail {
 struct PruneLimits {
   ErrorGoal goal;                        ///< errors that the pruned tree must not exceed
   std::optional<double> mostBytes = {};  ///< limit of bytes, kept even if the error goal is missed
-  double nodeBytes = 8;                  ///< bytes of an internal node
-  /// Bytes of a leaf with its coefficients, by degree. The entry of `kExactDegree` is the bytes of its node alone.
-  std::array<double, kExactDegree + 1> leafBytes = {};
+  double nodeBytes = 8;                  ///< bytes of a node
+  /// Number of coefficients that a leaf gets, by its degree in the pruned tree.
+  std::array<double, kExactDegree + 1> coefficients = {};
+  double coefficientBytes = 8;  ///< bytes of a coefficient that is not quantized
+  /// Given if coefficients are quantized. Their bytes then depend on the leaf, and on the error of the pruned tree.
+  std::optional<QuantizationLimits> quantization = {};
   int leastDegree = 1;  ///< least degree of a leaf
   int mostDegree = kMaxDegree;
 };

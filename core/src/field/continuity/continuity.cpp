@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -201,8 +202,12 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
   const continuity::WeakContinuityFigures figures =
       withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
   const auto* quantized = std::get_if<QuantizedCoefficients>(&field.data().coefficients);
-  if (quantized != nullptr && query::quantize(data, quantized->step)) {
-    data.metadata.roundingRms *= std::numbers::sqrt2;  // The field was rounded twice, to the same step.
+  std::optional<query::Quantized> again;
+  if (quantized != nullptr) again = query::quantized(data, query::stepsOf(*quantized, field.data().nodes));
+  if (again) {
+    data.nodes = std::move(again->nodes);
+    data.coefficients = std::move(again->coefficients);
+    data.metadata.roundingRms *= std::numbers::sqrt2;  // The field was rounded twice, to the same steps.
   } else if (quantized != nullptr || field.singlePrecision()) {
     data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, query::floatRounding(data).rms);
     query::toFloat(data);

@@ -23,9 +23,9 @@ namespace {
 constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1a'};
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
 // and criteria; version 4 the inside test; version 8 exact leaves, the tolerance, the measurement and
-// the settings that a replay of the construction needs; version 9 quantized coefficients. Versions 5 to 7 were never
-// released.
-constexpr std::uint32_t kFieldVersion = 9, kExactLeavesVersion = 8;
+// the settings that a replay of the construction needs; version 9 quantized coefficients; version 10 their shifts and
+// wide leaves. Versions 5 to 7 were never released.
+constexpr std::uint32_t kFieldVersion = 10, kQuantizedVersion = 9, kExactLeavesVersion = 8;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 constexpr std::uint32_t kQuantized = 1;  // stands in place of the bytes of a coefficient
 
@@ -181,7 +181,7 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(sizes.lists);
   stream.item(data.exact.offset);
   measurementItem(stream, m.measurement);
-  if (version < kFieldVersion || sizes.coefficientBytes != kQuantized) return;
+  if (version < kQuantizedVersion || sizes.coefficientBytes != kQuantized) return;
   stream.item(sizes.step);
   stream.item(sizes.meanBits);
 }
@@ -235,12 +235,12 @@ Field load(const std::filesystem::path& file) {
                   "; build one with `hpsdf build`");
   constexpr std::uint32_t kLastBefore = 4;
   if (*version == 0 || (*version > kLastBefore && *version < kExactLeavesVersion) || *version > kFieldVersion)
-    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to 4, " +
-                  std::to_string(kExactLeavesVersion) + " and " + std::to_string(kFieldVersion) + "; build it again");
+    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to 4 and " +
+                  std::to_string(kExactLeavesVersion) + " to " + std::to_string(kFieldVersion) + "; build it again");
   FieldData data;
   Sizes sizes;
   header(reader, data, sizes, *version);
-  const bool isQuantized = sizes.coefficientBytes == kQuantized && *version == kFieldVersion;
+  const bool isQuantized = sizes.coefficientBytes == kQuantized && *version >= kQuantizedVersion;
   reader.require(isQuantized || sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8,
                  "its coefficients have an unknown type");
   reader.require(sizes.vertexBytes == 4 || sizes.vertexBytes == 8, "its vertices have an unknown type");

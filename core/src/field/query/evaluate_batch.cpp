@@ -228,9 +228,10 @@ void listByDegree(const Coefficients& coefficients, Batch& batch) {
     const int degree = node::degree(batch.bits[i]);
     const bool isExact = degree == kExactDegree;
     prefetch(coefficients, isExact ? 0 : node::offset(batch.bits[i]), isExact ? 0 : degree);
+    const int key = degree + (node::isWide(batch.bits[i]) ? kMaxVectorDegree : 0);  // Wide leaves have no SIMD code.
     for (std::size_t k = 0; k < kLists; ++k) batch.listed[k][counts[k]] = static_cast<std::uint8_t>(i);
-    for (std::size_t k = 0; k + 1 < kLists; ++k) counts[k] += degree == kMinVectorDegree + int(k);
-    counts[kLists - 1] += degree < kMinVectorDegree || degree > kMaxVectorDegree;
+    for (std::size_t k = 0; k + 1 < kLists; ++k) counts[k] += key == kMinVectorDegree + int(k);
+    counts[kLists - 1] += key < kMinVectorDegree || key > kMaxVectorDegree;
   }
   for (std::size_t k = 0; k < kLists; ++k) {
     if (counts[k] > 0) std::fill_n(batch.listed[k] + counts[k], kLanes - 1, batch.listed[k][counts[k] - 1]);
@@ -321,13 +322,15 @@ HWY_INLINE OrthonormalIntegers<P, Lanes> asCoefficients(const QuantizedCoefficie
   return {loaded};
 }
 
-/// Converts results from the unit of loaded coefficients to that of the field.
+/// Converts results from the unit of loaded coefficients to that of the field. `bits` are the packed nodes.
 template <typename T>
-HWY_INLINE Vec inUnits(const std::vector<T>& /*coefficients*/, Vec result) {
+HWY_INLINE Vec inUnits(const std::vector<T>& /*coefficients*/, Lanes /*bits*/, Vec result) {
   return result;
 }
-HWY_INLINE Vec inUnits(const QuantizedCoefficients& coefficients, Vec result) {
-  return result * hn::Set(Tag(), coefficients.step);
+HWY_INLINE Vec inUnits(const QuantizedCoefficients& coefficients, Lanes bits, Vec result) {
+  const auto shift = hn::And(hn::ShiftRight<48>(hn::BitCast(Unsigned(), bits.v)), hn::Set(Unsigned(), 31));
+  const auto step = hn::BitCast(Unsigned(), hn::Set(Tag(), coefficients.step));
+  return result * hn::BitCast(Tag(), step - hn::ShiftLeft<52>(shift));
 }
 
 /// Evaluates polynomials of degree P at the points that are listed for this degree, one SIMD vector of points
@@ -351,16 +354,16 @@ void evaluateListed(const Coefficients& coefficients, const GridFrame& frame, co
     const std::array<Lanes, 3> local = {leafPoint[0], leafPoint[1], leafPoint[2]};
     if constexpr (std::is_same_v<Result, double>) {
       HWY_ALIGN double value[kLanes];
-      hn::Store(inUnits(coefficients, evaluatePolynomial(loaded, Constant<P>(), local).v), d, value);
+      hn::Store(inUnits(coefficients, leafPoint[3], evaluatePolynomial(loaded, Constant<P>(), local).v), d, value);
       for (std::size_t lane = 0; lane < kLanes; ++lane) out[points[lane]] = value[lane];
     } else {
       const auto result = evaluatePolynomialWithGradient(loaded, Constant<P>(), local);
       const auto scale = hn::Set(d, 2.0) * depthScale(hn::BitCast(Unsigned(), leafPoint[3].v));
       HWY_ALIGN double number[4][kLanes];
-      hn::Store(inUnits(coefficients, result[0].v), d, number[0]);
+      hn::Store(inUnits(coefficients, leafPoint[3], result[0].v), d, number[0]);
       for (int axis = 0; axis < 3; ++axis) {
         const auto toWorld = scale * hn::Set(d, frame.cells[axis]) / hn::Set(d, frame.size[axis]);
-        hn::Store(inUnits(coefficients, result[axis + 1].v) * toWorld, d, number[axis + 1]);
+        hn::Store(inUnits(coefficients, leafPoint[3], result[axis + 1].v) * toWorld, d, number[axis + 1]);
       }
       for (std::size_t lane = 0; lane < kLanes; ++lane)
         out[points[lane]] = {number[0][lane], {number[1][lane], number[2][lane], number[3][lane]}};

@@ -67,9 +67,9 @@ HWY_INLINE void decode(const std::uint8_t* leaf, std::uint32_t meanBits, double*
   const LeafBits bits{leaf};
   const std::uint64_t head = bits.read(0);
   const auto widthOf = [&](int degree) { return head >> ((degree - 1) * kWidthBits) & ((1 << kWidthBits) - 1); };
-  bool isWide = false;
-  for (int degree = 2; degree <= P; ++degree) isWide |= widthOf(degree) > kMostAtOnce;
-  if (isWide) [[unlikely]]
+  bool areLong = false;
+  for (int degree = 2; degree <= P; ++degree) areLong |= widthOf(degree) > kMostAtOnce;
+  if (areLong) [[unlikely]]
     return decodeLeaves<P>(bits, meanBits, out);
   out[0] = Digits<double, std::uint64_t>(meanBits).first(head >> (P * kWidthBits));
   std::uint64_t position = P * kWidthBits + meanBits;
@@ -135,36 +135,37 @@ HWY_EXPORT(valueAndGradientOf);
 
 constexpr int kMostVectorDegree = 4;
 
-/// Returns true if SIMD decodes leaves of this degree.
-bool isVectorDegree(int degree) { return degree >= 1 && degree <= kMostVectorDegree; }
+/// Returns true if SIMD decodes a leaf.
+bool hasVectorCode(std::uint64_t leaf) {
+  return node::degree(leaf) >= 1 && node::degree(leaf) <= kMostVectorDegree && !node::isWide(leaf);
+}
 
-/// Returns f(coefficients, degree) for a leaf of any degree.
+/// Returns f(coefficients, degree) for any leaf.
 template <typename F>
 auto withAnyDecoded(const QuantizedCoefficients& coefficients, std::uint64_t leaf, const F& f) {
   std::array<double, std::size_t(coefficientCount(kMaxDegree))> decoded;
-  decodeAnyLeaf({coefficients.bytes.data() + node::offset(leaf)}, node::degree(leaf), coefficients.meanBits,
-                decoded.data());
+  decodeAnyLeaf(coefficients, leaf, decoded.data());
   return f(static_cast<const double*>(decoded.data()), node::degree(leaf));
 }
 
 }  // namespace
 
 void evaluateLeaf(const QuantizedCoefficients& coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
-  value = isVectorDegree(node::degree(leaf.bits))
-              ? HWY_DYNAMIC_DISPATCH(valueOf)(coefficients, leaf.bits, leaf.local)
-              : withAnyDecoded(coefficients, leaf.bits,
-                               [&](const double* c, int degree) { return evaluatePolynomial(c, degree, leaf.local); });
-  value *= coefficients.step;
+  value = hasVectorCode(leaf.bits) ? HWY_DYNAMIC_DISPATCH(valueOf)(coefficients, leaf.bits, leaf.local)
+                                   : withAnyDecoded(coefficients, leaf.bits, [&](const double* c, int degree) {
+                                       return evaluatePolynomial(c, degree, leaf.local);
+                                     });
+  value *= coefficients.stepOf(leaf.bits);
 }
 
 void evaluateLeaf(const QuantizedCoefficients& coefficients, const GridFrame& frame, const LeafPoint& leaf,
                   ValueAndGradient& result) {
-  const auto [value, x, y, z] = isVectorDegree(node::degree(leaf.bits))
+  const auto [value, x, y, z] = hasVectorCode(leaf.bits)
                                     ? HWY_DYNAMIC_DISPATCH(valueAndGradientOf)(coefficients, leaf.bits, leaf.local)
                                     : withAnyDecoded(coefficients, leaf.bits, [&](const double* c, int degree) {
                                         return evaluatePolynomialWithGradient(c, degree, leaf.local);
                                       });
-  const double step = coefficients.step;
+  const double step = coefficients.stepOf(leaf.bits);
   result = {value * step, {x * step, y * step, z * step}};
   toWorldUnits(frame, leaf, result.gradient);
 }

@@ -93,9 +93,9 @@ void checkCoefficients(const std::vector<T>& coefficients) {
     if (!std::isfinite(c)) notAField("a coefficient is not finite");
 }
 void checkCoefficients(const QuantizedCoefficients& coefficients) {
-  constexpr double kLargestStep = 1e200;  // Polynomials of such coefficients are finite.
-  if (!(coefficients.step > 0 && coefficients.step <= kLargestStep))
-    notAField("the step of its coefficients is not a number above 0");
+  if (!(coefficients.step >= QuantizedCoefficients::kLeastStep &&
+        coefficients.step <= QuantizedCoefficients::kGreatestStep))
+    notAField("the step of its coefficients is out of range");
 }
 
 /// Throws `Error` if the shared parts of quantized coefficients, without which no leaf can be read, are out of range.
@@ -112,13 +112,15 @@ void checkQuantization(const FieldData& data) {
 void checkNodes(const FieldData& data, std::size_t baseCells) {
   const std::vector<std::uint32_t> lists = checkLists(data.exact);
   const auto& nodes = data.nodes;
+  const bool isQuantized = std::holds_alternative<QuantizedCoefficients>(data.coefficients);
   constexpr std::uint8_t kUnreached = 0xff;
   if ((nodes.size() - baseCells) % 8 != 0) notAField("its nodes do not come in groups of eight");
   std::vector<std::uint8_t> depth(nodes.size(), kUnreached);
   std::fill_n(depth.begin(), baseCells, std::uint8_t{0});
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     if (depth[n] == kUnreached) notAField("node " + std::to_string(n) + " is no other node's child");
-    if (!node::hasOnlyKnownBits(nodes[n])) notAField("node " + std::to_string(n) + " has bits without a meaning");
+    if (!node::hasOnlyKnownBits(nodes[n], isQuantized))
+      notAField("node " + std::to_string(n) + " has bits without a meaning");
     if (node::isExact(nodes[n])) {
       checkExactLeaf(data.exact, lists, nodes[n]);
       continue;

@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "basis/orthonormal.h"
 #include "basis/projection.h"
 #include "field/query/evaluate.h"
 #include "hpsdf/error.h"
@@ -24,15 +23,6 @@ void convert(FieldData& field) {
 
 const std::vector<Eigen::Vector3d>* doubleVertices(const ExactTriangles& exact) {
   return std::get_if<std::vector<Eigen::Vector3d>>(&exact.vertices);
-}
-
-/// Returns the greatest distance by which `roundVertices` moves a vertex.
-double vertexRounding(const ExactTriangles& exact) {
-  const auto* vertices = doubleVertices(exact);
-  if (vertices == nullptr || !mayRoundVertices(exact)) return 0;
-  double greatest = 0;
-  for (const Eigen::Vector3d& vertex : *vertices) greatest = std::max(greatest, (throughFloat(vertex) - vertex).norm());
-  return greatest;
 }
 
 /// Returns the change of a field with double coefficients by rounding. rounded(node, c) returns a pointer to the
@@ -66,6 +56,14 @@ Rounding roundingOf(const FieldData& field, const Rounded& rounded) {
 
 }  // namespace
 
+double vertexRounding(const ExactTriangles& exact) {
+  const auto* vertices = doubleVertices(exact);
+  if (vertices == nullptr || !mayRoundVertices(exact)) return 0;
+  double greatest = 0;
+  for (const Eigen::Vector3d& vertex : *vertices) greatest = std::max(greatest, (throughFloat(vertex) - vertex).norm());
+  return greatest;
+}
+
 Rounding floatRounding(const FieldData& field) {
   std::vector<float> rounded;
   return roundingOf(field, [&](std::uint32_t node, const double* c) {
@@ -81,24 +79,6 @@ Rounding quantizedRounding(const FieldData& field, std::span<const std::uint64_t
     decodeLeaf(coefficients, nodes[node], rounded.data());
     return rounded.data();
   });
-}
-
-double quantizationStep(const FieldData& field, double rms, double max) {
-  double volume = 0, integers = 0, greatestSum = 0;
-  visitNodes(field, [&](const OctreeNode& at) {
-    const std::uint64_t bits = field.nodes[at.node];
-    if (!node::isLeaf(bits) || node::isExact(bits)) return true;
-    const double cell = cellSize(field, at.depth).prod();
-    volume += cell;
-    integers += cell * coefficientCount(node::degree(bits));
-    double sum = 0;
-    basis::forEachCoefficient(node::degree(bits), [&](int i, int j, int k, int) { sum += basis::norm(i, j, k); });
-    greatestSum = std::max(greatestSum, sum);
-    return true;
-  });
-  if (volume == 0) return 0;
-  // An integer is wrong by half at most, with a mean square of 1/12.
-  return std::min(rms * std::sqrt(12 * volume / integers), 2 * max / greatestSum);
 }
 
 double throughFloat(double number) { return static_cast<float>(number); }

@@ -15,6 +15,9 @@ struct Rounding {
   double max = 0;  ///< upper bound of the change at any point
 };
 
+/// Returns the greatest distance by which `roundVertices` moves a vertex.
+double vertexRounding(const ExactTriangles& exact);
+
 /// Computes by how much rounding to float changes a field. The coefficients of the field are double. A vertex that
 /// moves by δ changes no distance by more than δ; in `rms`, all exact leaves count with the greatest such δ.
 Rounding floatRounding(const FieldData& field);
@@ -22,10 +25,6 @@ Rounding floatRounding(const FieldData& field);
 /// Computes by how much a field with double coefficients differs from the same field with these nodes and coefficients.
 Rounding quantizedRounding(const FieldData& field, std::span<const std::uint64_t> nodes,
                            const QuantizedCoefficients& coefficients);
-
-/// Returns a step of quantized coefficients that changes a field by about `rms` at most, as RMS, and at no point by
-/// more than `max`. Returns 0 for a field without polynomials.
-double quantizationStep(const FieldData& field, double rms, double max);
 
 /// Convert the coefficients of a field from double to float, or from any type to double. Other coefficients do not
 /// change.

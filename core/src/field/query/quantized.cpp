@@ -17,6 +17,10 @@ std::uint64_t lowBits(std::uint64_t word, int count) { return word & ((std::uint
 /// Returns the number that is added to integers of `width` bits before they are stored.
 std::int64_t biasOf(int width) { return (std::int64_t{1} << width) >> 1; }
 
+int meanBitsOf(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
+  return node::isWide(leaf) ? QuantizedCoefficients::kMostMeanBits : static_cast<int>(coefficients.meanBits);
+}
+
 int widthOf(const LeafBits& leaf, int degree) {
   return static_cast<int>(lowBits(leaf.read(std::uint64_t(degree - 1) * kWidthBits), kWidthBits));
 }
@@ -42,10 +46,11 @@ class BitWriter {
   int count_ = 0;
 };
 
-/// Returns the integer of a coefficient, whose unit is the step times the norm.
+/// Returns the integer of a coefficient, whose unit is the step times the norm; or one that is too large to be stored.
 std::int64_t integerOf(double coefficient, double unit) {
-  constexpr double kLargest = 0x1p40;  // more than any integer that can be stored
-  return std::llround(std::clamp(coefficient / unit, -kLargest, kLargest));
+  constexpr double kTooLarge = 0x1p40;
+  const double integer = coefficient / unit;
+  return std::abs(integer) < kTooLarge ? std::llround(integer) : std::int64_t{1} << 40;
 }
 
 /// Returns the number of bits that an integer takes, or `least` if that is more.
@@ -68,6 +73,9 @@ struct Integers {
     });
   }
 
+  /// Returns the greatest width of the degrees from 1 on.
+  int greatestWidth(int degree) const { return *std::max_element(widths.begin() + 1, widths.begin() + degree + 1); }
+
   void write(int degree, int meanBits, std::vector<std::uint8_t>& bytes) const {
     BitWriter writer(bytes);
     for (int d = 1; d <= degree; ++d) writer.add(std::uint64_t(widths[d]), kWidthBits);
@@ -87,20 +95,36 @@ void forEachPolynomial(Nodes& nodes, const F& f) {
     if (node::isLeaf(node) && !node::isExact(node)) f(node);
 }
 
+/// Returns the least shift that makes a step no greater than another one.
+int shiftOf(double step, double greatest) {
+  int shift = 0;
+  while (shift <= QuantizedCoefficients::kMostShift && std::ldexp(step, -shift) > greatest) ++shift;
+  return shift;
+}
+
+double greatestStep(std::span<const std::uint64_t> nodes, std::span<const double> steps) {
+  double greatest = 0;
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+    if (node::isLeaf(nodes[n]) && !node::isExact(nodes[n])) greatest = std::max(greatest, steps[n]);
+  return greatest;
+}
+
 }  // namespace
 
-void decodeAnyLeaf(const LeafBits& leaf, int degree, std::uint32_t meanBits, double* out) {
+void decodeAnyLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out) {
+  const int degree = node::degree(leaf);
+  const LeafBits bits{coefficients.bytes.data() + node::offset(leaf)};
   // Decode the integers, ordered by total degree.
   std::array<std::int32_t, std::size_t(coefficientCount(kMaxDegree))> integers;
   std::array<const std::int32_t*, kMaxDegree + 1> next;  // integer of each total degree that comes next in `out`
   std::uint64_t position = std::uint64_t(degree) * kWidthBits;
   std::int32_t* end = integers.data();
   for (int d = 0; d <= degree; ++d) {
-    const int width = d == 0 ? static_cast<int>(meanBits) : widthOf(leaf, d);
+    const int width = d == 0 ? meanBitsOf(coefficients, leaf) : widthOf(bits, d);
     const std::int64_t bias = biasOf(width);
     next[d] = end;
     for (int n = 0; n < basis::termsOfDegree(d); ++n, position += std::uint64_t(width))
-      *end++ = static_cast<std::int32_t>(std::int64_t(lowBits(leaf.read(position), width)) - bias);
+      *end++ = static_cast<std::int32_t>(std::int64_t(lowBits(bits.read(position), width)) - bias);
   }
   // Within a total degree, the order of `out` is that of the integers.
   for (int i = 0; i <= degree; ++i)
@@ -114,49 +138,71 @@ std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::u
   const std::size_t offset = node::offset(leaf), end = coefficients.bytes.size() - QuantizedCoefficients::kPadding;
   const int degree = node::degree(leaf);
   const auto bytesOf = [](std::size_t bits) { return (bits + 7) / 8; };
-  std::size_t bits = std::size_t(degree) * kWidthBits + coefficients.meanBits;
+  const int mostBits = node::isWide(leaf) ? QuantizedCoefficients::kMostWideBits : QuantizedCoefficients::kMostBits;
+  std::size_t bits = std::size_t(degree) * kWidthBits + std::size_t(meanBitsOf(coefficients, leaf));
   if (offset + bytesOf(bits) > end) return 0;
   for (int d = 1; d <= degree; ++d) {
     const int width = widthOf({coefficients.bytes.data() + offset}, d);
-    if (width > QuantizedCoefficients::kMostBits) return 0;
+    if (width > mostBits) return 0;
     bits += std::size_t(basis::termsOfDegree(d)) * width;
   }
   return offset + bytesOf(bits) > end ? 0 : bytesOf(bits);
 }
 
-std::optional<Quantized> quantized(const FieldData& field, double step) {
+std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
-  Quantized result{.nodes = field.nodes, .coefficients = {.step = step, .meanBits = 1, .bytes = {}}};
+  Quantized result{.nodes = field.nodes,
+                   .coefficients = {.step = greatestStep(field.nodes, steps), .meanBits = 1, .bytes = {}}};
   QuantizedCoefficients& out = result.coefficients;
-  forEachPolynomial(field.nodes, [&](std::uint64_t node) {
-    const std::int64_t mean = integerOf(coefficients[node::offset(node)], step);
-    out.meanBits = std::uint32_t(widthFor(mean, int(out.meanBits)));
-  });
-  if (out.meanBits > QuantizedCoefficients::kMostMeanBits) return std::nullopt;
+  if (!(out.step >= QuantizedCoefficients::kLeastStep && out.step <= QuantizedCoefficients::kGreatestStep))
+    return std::nullopt;
 
+  // Choose the steps of the leaves, and find the bits of all means.
   bool fits = true;
   forEachPolynomial(result.nodes, [&](std::uint64_t& node) {
-    if (!fits) return;
+    const int shift = shiftOf(out.step, steps[std::size_t(&node - result.nodes.data())]);
+    fits &= shift <= QuantizedCoefficients::kMostShift;
     const int degree = node::degree(node);
-    const Integers integers(&coefficients[node::offset(node)], degree, step);
-    fits = *std::max_element(integers.widths.begin() + 1, integers.widths.end()) <= QuantizedCoefficients::kMostBits;
-    if (!fits) return;
-    node = node::leaf(degree, std::uint32_t(out.bytes.size()));
-    integers.write(degree, int(out.meanBits), out.bytes);
+    const double* c = &coefficients[node::offset(node)];
+    const double step = std::ldexp(out.step, -shift);
+    const Integers integers(c, degree, step);
+    const int width = integers.greatestWidth(degree);
+    fits &= width <= QuantizedCoefficients::kMostWideBits && integers.widths[0] <= QuantizedCoefficients::kMostMeanBits;
+    const bool isWide = width > QuantizedCoefficients::kMostBits;
+    if (!isWide) out.meanBits = std::max(out.meanBits, std::uint32_t(integers.widths[0]));
+    node = node::quantizedLeaf(degree, shift & QuantizedCoefficients::kMostShift, isWide, node::offset(node));
   });
   if (!fits) return std::nullopt;
+
+  // Write the integers.
+  forEachPolynomial(result.nodes, [&](std::uint64_t& node) {
+    const int degree = node::degree(node);
+    const Integers integers(&coefficients[node::offset(node)], degree, out.stepOf(node));
+    node = node::quantizedLeaf(degree, node::shift(node), node::isWide(node), std::uint32_t(out.bytes.size()));
+    integers.write(degree, meanBitsOf(out, node), out.bytes);
+  });
   out.bytes.resize(out.bytes.size() + QuantizedCoefficients::kPadding);
   out.bytes.shrink_to_fit();
   if (out.bytes.size() > 0xffffffff) return std::nullopt;
   return result;
 }
 
-bool quantize(FieldData& field, double step) {
-  std::optional<Quantized> result = quantized(field, step);
-  if (!result) return false;
-  field.nodes = std::move(result->nodes);
-  field.coefficients = std::move(result->coefficients);
-  return true;
+std::vector<double> stepsOf(const QuantizedCoefficients& coefficients, std::span<const std::uint64_t> nodes) {
+  std::vector<double> steps(nodes.size());
+  std::ranges::transform(nodes, steps.begin(), [&](std::uint64_t node) { return coefficients.stepOf(node); });
+  return steps;
+}
+
+std::array<double, kMaxDegree + 1> quantizedBytesByDegree(std::span<const double> coefficients, int degree,
+                                                          double step) {
+  const Integers integers(coefficients.data(), degree, step);
+  std::array<double, kMaxDegree + 1> bytes{};
+  int bits = 0;
+  for (int d = 0; d <= degree; ++d) {
+    bits += basis::termsOfDegree(d) * integers.widths[d] + (d > 0 ? kWidthBits : 0);
+    bytes[d] = std::ceil(bits / 8.0);
+  }
+  return bytes;
 }
 
 }  // namespace hpsdf::query
@@ -164,9 +210,9 @@ bool quantize(FieldData& field, double step) {
 namespace hpsdf {
 
 void decodeLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out) {
-  const int degree = node::degree(leaf);
-  query::decodeAnyLeaf({coefficients.bytes.data() + node::offset(leaf)}, degree, coefficients.meanBits, out);
-  for (int i = 0; i < coefficientCount(degree); ++i) out[i] *= coefficients.step;
+  query::decodeAnyLeaf(coefficients, leaf, out);
+  const double step = coefficients.stepOf(leaf);
+  for (int i = 0; i < coefficientCount(node::degree(leaf)); ++i) out[i] *= step;
 }
 
 }  // namespace hpsdf

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "basis/orthonormal.h"
@@ -28,8 +29,8 @@ struct LeafBits {
   }
 };
 
-/// Decodes the coefficients of a leaf of any degree, in units of the step.
-void decodeAnyLeaf(const LeafBits& leaf, int degree, std::uint32_t meanBits, double* out);
+/// Decodes the coefficients of any leaf, in units of its step. `leaf` is the packed node.
+void decodeAnyLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out);
 
 /// Evaluate a leaf with quantized coefficients, like the overloads for arrays of coefficients in evaluate.h.
 void evaluateLeaf(const QuantizedCoefficients& coefficients, const GridFrame& frame, const LeafPoint& leaf,
@@ -46,12 +47,20 @@ struct Quantized {
   QuantizedCoefficients coefficients;
 };
 
-/// Rounds the coefficients of a field from double to multiples of `step` in the orthonormal basis. Returns std::nullopt
-/// if that takes more bits than `QuantizedCoefficients` has.
-std::optional<Quantized> quantized(const FieldData& field, double step);
+/// Rounds the coefficients of a field from double. `steps` has an element for each node: the greatest step, in the
+/// orthonormal basis, that a leaf may have. The greatest of them becomes the step of the field. Returns std::nullopt if
+/// the coefficients take more bits than `QuantizedCoefficients` has.
+std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps);
 
-/// Quantizes the coefficients of a field. Returns false, and leaves the field as it is, where `quantized` has no
-/// result.
-bool quantize(FieldData& field, double step);
+/// Returns the steps of a field's leaves in the form that `quantized` takes.
+std::vector<double> stepsOf(const QuantizedCoefficients& coefficients, std::span<const std::uint64_t> nodes);
+
+/// Computes the bytes that the coefficients of a leaf take, if its polynomial is cut to each of the degrees from 0 to
+/// `degree`. The mean counts with the bits that it needs in this leaf, so that the result is too small by up to two.
+std::array<double, kMaxDegree + 1> quantizedBytesByDegree(std::span<const double> coefficients, int degree,
+                                                          double step);
+inline double quantizedBytes(std::span<const double> coefficients, int degree, double step) {
+  return quantizedBytesByDegree(coefficients, degree, step)[degree];
+}
 
 }  // namespace hpsdf::query

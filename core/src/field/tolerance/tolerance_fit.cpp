@@ -160,6 +160,7 @@ ToleranceFitter::ToleranceFitter(const DistanceFunction& distance, const Allowed
                                  double blend, bool certified, const Progress& progress)
     : distance_(distance),
       allowed_(allowed),
+      quantizationLimits_(allowed, blend),
       domain_(domain),
       lattice_(1 + 2 * blend),
       certified_(certified),
@@ -331,9 +332,10 @@ ToleranceFit ToleranceFitter::fit(const Box& cell, double ratioAbove) const {
 }
 
 bool ToleranceFitter::isProven(const Fit& fit, const Box& cell) const {
-  double magnitude = 0;  // of the greatest change when all coefficients are rounded to float
+  double magnitude = 0;
   for (const double coefficient : fit.coefficients) magnitude += std::abs(coefficient);
-  const double rounding = magnitude * std::numeric_limits<float>::epsilon();
+  const double byFloat = magnitude * std::numeric_limits<float>::epsilon();
+  const double rounding = std::max(byFloat, quantizationLimits_.greatestChange(fit.coefficients, fit.degree));
   return isProvenWithin({fit.coefficients, fit.degree, cell, domain_, distance_}, allowed_, rounding, evaluations_);
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "field/cells/cell_fit.h"
+#include "field/cells/round_coefficients.h"
 #include "field/cells/surface_points.h"
 #include "field/tolerance/cell_lattice.h"
 #include "hpsdf/build_options.h"
@@ -44,6 +45,7 @@ class ToleranceFitter {
   ToleranceFit fit(const Box& cell, double ratioAbove) const;
 
   const AllowedError& allowed() const { return allowed_; }
+  const QuantizationLimits& quantizationLimits() const { return quantizationLimits_; }
   std::uint64_t evaluations() const { return evaluations_; }
 
  private:
@@ -67,6 +69,7 @@ class ToleranceFitter {
   const DistanceFunction& distance_;
   std::optional<SurfaceInCells> surface_;  ///< empty for a distance without triangles
   AllowedError allowed_;
+  QuantizationLimits quantizationLimits_;
   Box domain_;
   CellLattice lattice_;
   bool certified_;

@@ -1,0 +1,205 @@
+#include "field/cells/round_coefficients.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "basis/legendre.h"
+#include "basis/orthonormal.h"
+#include "basis/projection.h"
+#include "field/query/evaluate.h"
+#include "field/query/float_coefficients.h"
+#include "field/query/quantized.h"
+
+namespace hpsdf::detail {
+namespace {
+
+constexpr double kUnlimitedChange = std::numeric_limits<double>::infinity();
+constexpr double kNegligible = 0.01;        // share of an error that is not counted
+constexpr double kShareOfRms = 0.1;         // of the RMS error: as squares add up, the error grows by half a percent
+constexpr double kShareOfMaximum = 0.01;    // of a maximum error
+constexpr double kShareOfTolerance = 0.05;  // of a tolerance; polynomials make use of at most 93 % of it (`kMostRatio`)
+
+/// Calls f(node, coefficients) for each leaf of a field with double coefficients that has a polynomial.
+template <typename F>
+void forEachPolynomial(const FieldData& field, const F& f) {
+  const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  query::visitNodes(field, [&](const query::OctreeNode& at) {
+    const std::uint64_t bits = field.nodes[at.node];
+    if (node::isLeaf(bits) && !node::isExact(bits))
+      f(at, std::span(&coefficients[node::offset(bits)], std::size_t(coefficientCount(node::degree(bits)))));
+    return true;
+  });
+}
+
+/// Returns the greatest change by quantizing over the change that the field's tolerance allows, times the tolerance.
+double changeOfTolerance(const FieldData& field, const query::Quantized& quantized, const QuantizationLimits& limits) {
+  const AllowedError allowed = allowedError(field.metadata.settings, field.metadata.referenceLength);
+  double greatest = 0;
+  std::vector<double> after(coefficientCount(kMaxDegree));
+  forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
+    decodeLeaf(quantized.coefficients, quantized.nodes[at.node], after.data());
+    double change = 0;
+    for (std::size_t i = 0; i < c.size(); ++i) change += std::abs(c[i] - after[i]);
+    const double least = limits.leastDistance(c, node::degree(field.nodes[at.node]));
+    greatest = std::max(greatest, change / allowed.at(least));
+  });
+  return greatest * allowed.tolerance;
+}
+
+QuantizationLimits limitsOf(const FieldData& field) {
+  BuildOptions settings = field.metadata.settings;
+  settings.blend = field.blend;
+  return {settings, field.metadata.referenceLength, field.exact.offset};
+}
+
+/// Returns the greatest steps of a field's leaves that keep to the limits and to the RMS error.
+std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimits& limits) {
+  QuantizedPart part;
+  forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
+    part.add(query::cellSize(field, at.depth).prod(), double(c.size()));
+  });
+  const double forRms =
+      field.metadata.hasEstimate() ? part.stepForRms(field.metadata.rmsEstimate(field.domain)) : kUnlimitedChange;
+  std::vector<double> steps(field.nodes.size());
+  forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
+    steps[at.node] = std::min(forRms, limits.greatestStep(c, node::degree(field.nodes[at.node])));
+  });
+  return steps;
+}
+
+/// Quantizes with steps that are all made greater until the coefficients take no more than `mostBytes`.
+std::optional<query::Quantized> quantizedWithin(const FieldData& field, std::vector<double> steps, double mostBytes) {
+  constexpr double kFactor = 1.05;
+  std::optional<query::Quantized> result = query::quantized(field, steps);
+  const double greatest = steps.empty() ? 0 : *std::ranges::max_element(steps);
+  const bool isLimited = mostBytes < kUnlimitedChange && greatest > 0 && greatest < kUnlimitedChange;
+  while (isLimited && !(result && double(result->coefficients.bytes.size()) <= mostBytes)) {
+    for (double& step : steps) step *= kFactor;
+    if (!(*std::ranges::max_element(steps) < QuantizedCoefficients::kGreatestStep)) return std::nullopt;
+    result = query::quantized(field, steps);
+  }
+  return result;
+}
+
+/// Returns the least of the errors that the construction aimed at.
+double leastError(const FieldData& field) {
+  const BuildOptions& settings = field.metadata.settings;
+  if (settings.tolerance > 0) return settings.tolerance;
+  const double rms = field.metadata.rmsEstimate(field.domain);
+  return settings.maxError > 0 ? std::min(rms, settings.maxError) : rms;
+}
+
+/// Quantizes the coefficients of a field as `CoefficientType::quantized` says. Returns false, and leaves the field as
+/// it is, if that is not possible.
+bool quantizeCoefficients(FieldData& field, double mostBytes) {
+  FieldMetadata& metadata = field.metadata;
+  const QuantizationLimits limits = limitsOf(field);
+  std::optional<query::Quantized> quantized = quantizedWithin(field, greatestSteps(field, limits), mostBytes);
+  if (!quantized) return false;
+  const query::Rounding rounding = query::quantizedRounding(field, quantized->nodes, quantized->coefficients);
+  metadata.roundingRms = rounding.rms;
+  if (metadata.settings.tolerance > 0) metadata.measuredError += changeOfTolerance(field, *quantized, limits);
+  if (rounding.max > kShareOfMaximum * metadata.settings.maxError && metadata.settings.maxError > 0)
+    metadata.measuredError += rounding.max;
+  field.nodes = std::move(quantized->nodes);
+  field.coefficients = std::move(quantized->coefficients);
+  if (query::vertexRounding(field.exact) < kNegligible * leastError(field)) query::roundVertices(field.exact);
+  return true;
+}
+
+}  // namespace
+
+QuantizationLimits::QuantizationLimits(double blend) {
+  basis::legendreValues<double>(1 + 2 * blend, kMaxDegree, largest_.data());
+  std::array<double, kMaxDegree + 1> byTotal{};  // sums over the terms of the same total degree
+  for (int i = 0; i <= kMaxDegree; ++i)
+    for (int j = 0; i + j <= kMaxDegree; ++j)
+      for (int k = 0; i + j + k <= kMaxDegree; ++k)
+        byTotal[i + j + k] += basis::norm(i, j, k) * largest_[i] * largest_[j] * largest_[k];
+  double sum = 0;
+  for (int degree = 0; degree <= kMaxDegree; ++degree) {
+    sum += byTotal[degree];
+    changeByStep_[degree] = sum / 2;  // an integer is wrong by half at most
+  }
+}
+
+QuantizationLimits::QuantizationLimits(const AllowedError& tolerance, double blend) : QuantizationLimits(blend) {
+  allowed_ = tolerance;
+}
+
+QuantizationLimits::QuantizationLimits(const BuildOptions& settings, double referenceLength, double exactOffset)
+    : QuantizationLimits(allowedError(settings, referenceLength), settings.blend) {
+  if (settings.maxError > 0) max_ = kShareOfMaximum * settings.maxError;
+  if (settings.strategy != Strategy::hpx || settings.tolerance > 0) return;
+  // Beside exact leaves, polynomials have hardly an error, or one within the exact tolerance.
+  constexpr double kFloatRounding = 0x1p-24;
+  exactOffset_ = exactOffset;
+  exactWithin_ = settings.exactWithin * referenceLength;
+  nearlyExact_ = std::max(kFloatRounding, kShareOfTolerance * settings.exactTolerance) * referenceLength;
+}
+
+double QuantizationLimits::leastDistance(std::span<const double> coefficients, int degree) const {
+  double rest = 0;
+  basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
+    if (index > 0) rest += std::abs(coefficients[index]) * largest_[i] * largest_[j] * largest_[k];
+  });
+  return std::max(0.0, std::abs(coefficients[0] + exactOffset_) - rest);
+}
+
+double QuantizationLimits::greatestChange(std::span<const double> coefficients, int degree) const {
+  if (allowed_.tolerance > 0) return kShareOfTolerance * allowed_.at(leastDistance(coefficients, degree));
+  return leastDistance(coefficients, degree) <= exactWithin_ ? std::min(max_, nearlyExact_) : max_;
+}
+
+double QuantizationLimits::greatestStep(std::span<const double> coefficients, int degree) const {
+  const double step = greatestChange(coefficients, degree) / changeByStep_[degree];
+  // A power of two is independent of the other leaves: a construction within a tolerance knows the bytes in advance.
+  return allowed_.tolerance > 0 ? std::ldexp(1.0, std::ilogb(step)) : step;
+}
+
+double QuantizedPart::stepForRms(double rms) const {
+  // An integer is wrong by half at most, with a mean square of 1/12.
+  return volume > 0 ? kShareOfRms * rms * std::sqrt(12 * volume / integers) : kUnlimitedChange;
+}
+
+double quantizedBytes(const BuildTree& tree, const QuantizationLimits& limits, double rms) {
+  QuantizedPart part;
+  const auto forEachLeaf = [&](const auto& f) {
+    for (const BuildNode& node : tree.nodes)
+      if (node.firstChild == 0 && !node.fit.isExact()) f(node);
+  };
+  forEachLeaf(
+      [&](const BuildNode& node) { part.add(tree.boxOf(node).volume(), double(node.fit.coefficients.size())); });
+  const double forRms = part.stepForRms(rms);
+  double bytes = 0;
+  forEachLeaf([&](const BuildNode& node) {
+    const Fit& fit = node.fit;
+    const double step = std::min(forRms, limits.greatestStep(fit.coefficients, fit.degree));
+    bytes += step > 0 ? query::quantizedBytes(fit.coefficients, fit.degree, step) : kUnlimitedChange;
+  });
+  return bytes;
+}
+
+void roundCoefficients(CoefficientType type, FieldData& field, double mostBytes) {
+  if (query::hasFloatVertices(field.exact)) query::roundVertices(field.exact);
+  const bool mayQuantize = type == CoefficientType::quantized || type == CoefficientType::automatic;
+  if (mayQuantize && quantizeCoefficients(field, mostBytes)) return;
+  const query::Rounding rounding = query::floatRounding(field);
+  FieldMetadata& metadata = field.metadata;
+  const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;
+  const double tolerance = metadata.settings.tolerance;
+  const bool isNegligible = tolerance > 0
+                                ? rounding.max < kNegligible * tolerance
+                                : rounding.rms < kNegligible * metadata.rmsEstimate(field.domain) && !spoilsMaximum;
+  if (type == CoefficientType::float64 || (type == CoefficientType::automatic && !isNegligible)) return;
+  query::toFloat(field);
+  query::roundVertices(field.exact);
+  metadata.roundingRms = rounding.rms;
+  const bool spoilsTolerance = tolerance > 0 && rounding.max > kNegligible * tolerance;
+  if (spoilsMaximum || spoilsTolerance) metadata.measuredError += rounding.max;
+}
+
+}  // namespace hpsdf::detail

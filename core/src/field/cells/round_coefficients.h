@@ -1,0 +1,67 @@
+#pragma once
+// The precision in which a finished field keeps its coefficients.
+
+#include <array>
+#include <limits>
+#include <span>
+
+#include "field/cells/build_tree.h"
+#include "hpsdf/detail/field_data.h"
+
+namespace hpsdf::detail {
+
+/// Tells by how much quantizing may change the polynomials of a field, besides its RMS error: by 5 % of a tolerance, by
+/// 1 % of a maximum error, and close to a surface where the field is exact hardly at all.
+class QuantizationLimits {
+ public:
+  QuantizationLimits(const AllowedError& tolerance, double blend);
+  /// `referenceLength` is that of the surface, `exactOffset` the offset of exact leaves (`ExactTriangles::offset`).
+  QuantizationLimits(const BuildOptions& settings, double referenceLength, double exactOffset);
+
+  /// Returns the greatest change of a leaf's polynomial that quantizing may cause; infinity if there is no limit.
+  double greatestChange(std::span<const double> coefficients, int degree) const;
+
+  /// Returns the greatest step, in the orthonormal basis, that keeps to this limit.
+  double greatestStep(std::span<const double> coefficients, int degree) const;
+
+  /// Returns a lower bound of |f| in a leaf.
+  double leastDistance(std::span<const double> coefficients, int degree) const;
+
+ private:
+  explicit QuantizationLimits(double blend);
+
+  AllowedError allowed_;
+  double max_ = std::numeric_limits<double>::infinity();  ///< limit of the change in every leaf
+  double exactOffset_ = 0;   ///< of exact leaves: subtracted from the distance to the surface
+  double exactWithin_ = -1;  ///< distance from the surface up to which the field is exact; negative if it is not
+  double nearlyExact_ = 0;   ///< limit of the change within this distance
+  std::array<double, kMaxDegree + 1> largest_{};       ///< greatest |L_i| in a leaf and its blend zones
+  std::array<double, kMaxDegree + 1> changeByStep_{};  ///< greatest change by a step of 1, by degree
+};
+
+/// Leaves with polynomials that are to be quantized.
+struct QuantizedPart {
+  double volume = 0;
+  double integers = 0;  ///< sum of the volume of a leaf times its number of coefficients
+
+  void add(double leafVolume, double coefficients) {
+    volume += leafVolume;
+    integers += leafVolume * coefficients;
+  }
+
+  /// Returns a step with which quantizing raises the RMS error `rms` of a field by half a percent. Returns infinity if
+  /// there are no polynomials.
+  double stepForRms(double rms) const;
+};
+
+/// Returns the bytes of a field's quantized coefficients, made from the present tree; infinity if they cannot be
+/// quantized. `rms` is the estimated RMS error.
+double quantizedBytes(const BuildTree& tree, const QuantizationLimits& limits, double rms);
+
+/// Rounds the coefficients of a field, and the vertices of its exact leaves, from double to `type`. Vertices that are
+/// floats already are stored as floats in any case. Sets `roundingRms` and `measuredError` in the field's metadata.
+/// Quantized coefficients take no more than `mostBytes`, at the price of a greater change.
+void roundCoefficients(CoefficientType type, FieldData& field,
+                       double mostBytes = std::numeric_limits<double>::infinity());
+
+}  // namespace hpsdf::detail
