@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "basis/coefficient_cube.h"
 #include "basis/projection.h"
 #include "field/cells/cell_fit.h"
 #include "field/cells/exact_bounds.h"
@@ -22,6 +23,10 @@
 
 namespace hpsdf::detail {
 namespace {
+
+using basis::cubeFrom;
+using basis::cubeIndex;
+using basis::partCoefficients;
 
 // Upper bound of the accumulated rounding errors, relative to the magnitude of the numbers involved.
 constexpr double kRounding = 1e-12;
@@ -36,29 +41,6 @@ struct Part {
   double rest = 0;                   ///< bound of the terms of degree 3 and more
   Vector3 restGradient;              ///< bound of the derivatives of the terms of degree 2 and more
 };
-
-/// Index of a coefficient in a cube of (degree + 1)³ numbers.
-std::size_t cubeIndex(int i, int j, int k, int degree) {
-  return (std::size_t(i) * (degree + 1) + j) * (degree + 1) + k;
-}
-
-/// Arranges the coefficients of a polynomial of degree `own` as a cube of (degree + 1)³ numbers. `degree` is at least
-/// `own`.
-template <typename T>
-std::vector<double> cubeFrom(const T* coefficients, int own, int degree) {
-  std::vector<double> cube(cubeIndex(degree, degree, degree, degree) + 1, 0.0);
-  basis::forEachCoefficient(
-      own, [&](int i, int j, int k, int index) { cube[cubeIndex(i, j, k, degree)] = coefficients[index]; });
-  return cube;
-}
-
-/// Transforms the coefficients c of a leaf's polynomial to the coordinates of one part of the leaf, one axis at
-/// a time.
-std::vector<double> partCoefficients(std::vector<double> c, int degree,
-                                     const std::array<const LegendreRows*, 3>& rows) {
-  for (int axis = 0; axis < 3; ++axis) restrictToPart(c, degree, axis, *rows[axis]);
-  return c;
-}
 
 /// Transformations of Legendre coefficients from the local coordinates of a leaf to the lower and the upper half of a
 /// box, along each axis.

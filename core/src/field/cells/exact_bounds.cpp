@@ -64,19 +64,11 @@ ExactBounds::Corners ExactBounds::cornersOf(std::uint32_t triangle) const {
 ///
 /// The leaf is evaluated at a point that differs from the query point by the rounding error of its coordinates.
 ///
-/// The computed normal n of a triangle with the longest side l has an error of about ε·l². Hence the distance to the
-/// plane through a vertex at the distance r has an error of about ε·r·l²/|n|. The distance to a side does not depend on
-/// the normal.
+/// The distance to the plane of a thin triangle has a rounding error (`query::thinness`). The distance to a side does
+/// not depend on the normal.
 double ExactBounds::error(const query::OctreeNode& leaf) const {
   constexpr double kEpsilon = 16 * std::numeric_limits<double>::epsilon();
-  double thinnest = 1;
-  forEachTriangle(field_.exact, field_.nodes[leaf.node], [&](std::uint32_t triangle) {
-    const auto& corners = field_.exact.triangles[triangle];
-    const Vector3 &a = vertices_[corners[0]], &b = vertices_[corners[1]], &c = vertices_[corners[2]];
-    const double normal = (b - a).cross(c - a).norm();
-    const double longest = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
-    if (normal > 0) thinnest = std::max(thinnest, longest / normal);
-  });
+  const double thinnest = query::thinness(field_.exact, field_.nodes[leaf.node]);
   return vertexError_ + coordinateError_ + std::min(kEpsilon * thinnest, 1.0) * reach_;
 }
 

@@ -1,5 +1,6 @@
 #include "field/query/exact_leaf.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -256,6 +257,21 @@ void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, 
 void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
                    ValueAndGradient* out) {
   evaluateAll(exact, leaf, octant, points, out);
+}
+
+double thinness(const ExactTriangles& exact, std::uint64_t leaf) {
+  const auto vertex = [&](std::uint32_t index) {
+    return std::visit([&](const auto& v) { return Vector3(v[index].template cast<double>()); }, exact.vertices);
+  };
+  double thinnest = 1;
+  forEachTriangle(exact, leaf, [&](std::uint32_t triangle) {
+    const auto& corners = exact.triangles[triangle];
+    const Vector3 a = vertex(corners[0]), b = vertex(corners[1]), c = vertex(corners[2]);
+    const double normal = (b - a).cross(c - a).norm();
+    const double longest = std::max({(b - a).squaredNorm(), (c - a).squaredNorm(), (c - b).squaredNorm()});
+    if (normal > 0) thinnest = std::max(thinnest, longest / normal);
+  });
+  return thinnest;
 }
 
 }  // namespace hpsdf::query

@@ -24,4 +24,9 @@ void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, 
 void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
                    ValueAndGradient* out);
 
+/// Returns the greatest ratio of l² to |n| of an exact leaf's triangles with the longest side l and the normal n = (b −
+/// a) × (c − a), and at least 1. Triangles without area do not count. The computed n has an error of about ε·l², so
+/// that the distance to the plane through a vertex at the distance r has an error of about ε·r·l²/|n|.
+double thinness(const ExactTriangles& exact, std::uint64_t leaf);
+
 }  // namespace hpsdf::query
