@@ -8,6 +8,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
+#include "hpsdf/range.h"
 #include "hpsdf/shapes.h"
 #include "support/count_allocations.h"
 
@@ -30,8 +31,10 @@ TEST(Allocations, queriesMakeNone) {
   for (Vector3& x : points) x = {coordinate(random), coordinate(random), coordinate(random)};
   std::vector<double> values(points.size());
   std::vector<ValueAndGradient> both(points.size());
+  const RangeIndex ranges(smooth);
   double sum = 0;
   EXPECT_EQ(allocationsOf([&] {
+              for (const Vector3& x : points) sum += ranges.range(Box(x, x + Vector3::Constant(0.2))).value.min;
               for (const Vector3& x : points) {
                 sum += field.value(x) + field.valueAndGradient(x).gradient.x() + field.cellAt(x).error + distance(x);
               }

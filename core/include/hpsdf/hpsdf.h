@@ -15,6 +15,7 @@
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/mesh_repair.h"
 #include "hpsdf/mesh_report.h"
+#include "hpsdf/range.h"
 #include "hpsdf/safe_distance.h"
 #include "hpsdf/shapes.h"
 #include "hpsdf/triangle_mesh.h"

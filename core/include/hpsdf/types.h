@@ -19,6 +19,15 @@ struct Normalization {
   bool isIdentity() const { return scale == 1 && center.isZero(0); }
 };
 
+/// The numbers from `min` to `max`, both included.
+struct Interval {
+  double min = 0;
+  double max = 0;
+
+  bool contains(double number) const { return number >= min && number <= max; }
+  double width() const { return max - min; }
+};
+
 constexpr int kMaxDegree = 30;  ///< highest total degree of a leaf's polynomial
 /// Stands in place of the degree of an exact leaf, which has no polynomial but a list of triangles.
 constexpr int kExactDegree = kMaxDegree + 1;
