@@ -14,6 +14,7 @@
 #include "cli_fixture.h"
 #include "commands/point_query.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/range.h"
 #include "support/one_leaf_field.h"
 
 namespace hpsdf::app {
@@ -157,6 +158,56 @@ TEST_F(FieldFile, badPointsAreRefusedByLine) {
   for (const std::string name : {"a,b,c", "E,1,2", "e", "123"})
     expectRefused({{"query", field(), name}}, name + ": no such file");
   expectRefused({{"query", field(), folder_.path().string()}}, "is a folder");
+}
+
+TEST_F(FieldFile, queryFindsRangesOverBoxes) {
+  writeFile(at("boxes.txt"), "x0,y0,z0,x1,y1,z1\n0,0,0,0.2,0.2,0.2 # a comment\n\n-0.5 -0.5 -0.5 9 9 9\n");
+  const Outcome outcome = run({{"query", field(), "--boxes", at("boxes.txt")}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  std::istringstream lines(outcome.out);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "x0,y0,z0,x1,y1,z1,min,max");
+  const Field torus = load(field());
+  const RangeIndex index(torus);
+  for (const Box& box :
+       {Box(Vector3::Zero(), Vector3::Constant(0.2)), Box(Vector3::Constant(-0.5), Vector3::Constant(9))}) {
+    ASSERT_TRUE(std::getline(lines, line));
+    std::ranges::replace(line, ',', ' ');
+    std::istringstream numbers(line);
+    std::array<double, 8> row{};
+    for (double& number : row) numbers >> number;
+    const Interval range = index.range(box).value;
+    EXPECT_THAT(row, ElementsAre(box.min().x(), box.min().y(), box.min().z(), box.max().x(), box.max().y(),
+                                 box.max().z(), range.min, range.max));
+  }
+  EXPECT_FALSE(std::getline(lines, line));
+  EXPECT_EQ(run({{"query", field(), "--boxes", "-"}, readFile(at("boxes.txt"))}).out, outcome.out);
+  const Outcome toFile = run({{"query", field(), "--boxes", at("boxes.txt"), "-o", at("out.csv")}});
+  EXPECT_EQ(toFile.err, at("out.csv") + ": 2 boxes\n");
+  EXPECT_EQ(readFile(at("out.csv")), outcome.out);
+}
+
+TEST_F(FieldFile, rangesOfTheExactDistanceNeedBounds) {
+  ASSERT_EQ(run({{"bounds", field(), "-o", at("bounded.hpsdf")}}).status, 0);
+  const Outcome outcome = run({{"query", at("bounded.hpsdf"), "--boxes", "0,0,0,0.2,0.2,0.2", "--json"}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json box = Json::parse(outcome.out).at(0);
+  EXPECT_LT(box.at("exact_min").get<double>(), box.at("min").get<double>());
+  EXPECT_GT(box.at("exact_max").get<double>(), box.at("max").get<double>());
+  EXPECT_EQ(box.at("x1"), 0.2);
+}
+
+TEST_F(FieldFile, badBoxesAreRefusedByLine) {
+  const auto refused = [&](const std::string& bad, const std::string& message) {
+    writeFile(at("boxes.txt"), "0 0 0 1 1 1\n" + bad + "\n");
+    expectRefused({{"query", field(), "--boxes", at("boxes.txt"), "-o", at("out.csv")}}, "boxes.txt:2: " + message);
+  };
+  for (const char* bad : {"1 2 3", "1 2 3 4 5", "1 2 3 4 5 6 7", "0,0,0,,1,1", "0 0 0 1 1 nan", "0 0 0 inf 1 1"})
+    refused(bad, "expected six finite numbers");
+  refused("0 1 0 1 0.5 1", "the box is empty along y: the lower corner comes first, give 0.5 before 1");
+  expectRefused({{"query", field(), "0,0,0", "--boxes", "-"}}, "boxes excludes points: give one of them");
+  expectRefused({{"query", field(), "--boxes", at("none.txt")}}, "none.txt: no such file");
 }
 
 /// A program that sends one point at a time gets each answer before it sends the next point.

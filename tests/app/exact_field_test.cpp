@@ -55,6 +55,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"bounds", "bounds output=$out/f.hpsdf; expect stats.bounds.greatest > 0"},
     {"info", "info; info json=true"},
     {"query", "query points=$points output=$out/distances.csv"},
+    {"query", "query boxes=0,0,0,0.1,0.1,0.1 output=$out/ranges.csv"},
     {"jumps", "jumps output=$out/jumps.csv; jumps by=gradient"},
     {"verify", "verify points=2000 near=0.004 max-near-rms=1e-6 max-mismatches=0"},
     {"slice", "slice size=64x64 cpu=$cpu output=$out/degree.png"},

@@ -78,7 +78,7 @@ TEST(Registry, keepsPublishedNames) {
       {"smooth", {"output", "continuity-weight", "threads", "json"}},
       {"blend", {"output", "width", "json"}},
       {"info", {"json"}},
-      {"query", {"json"}},
+      {"query", {"boxes", "json"}},
       {"slice", {"axis", "offset", "plane", "color", "size", "cpu", "gl"}},
       {"why", {"point", "mesh", "json"}},
       {"probe", {"from", "to", "output", "samples", "mesh", "size"}},

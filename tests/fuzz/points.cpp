@@ -1,4 +1,4 @@
-// Fuzz target: `hpsdf query` answers each point with one line of CSV or with one JSON object.
+// Fuzz target: `hpsdf query` answers each point, or each box, with one line of CSV or with one JSON object.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -18,26 +18,32 @@ struct Answers {
   std::string text;
 };
 
-Answers answer(const Field& field, std::string_view points, app::PointFormat format) {
+using Query = decltype(app::queryPoints);
+
+Answers answer(Query* query, const Field& field, std::string_view points, app::PointFormat format) {
   Answers answers;
   std::istringstream in{std::string(points)};
   answers.all = fuzz::reads([&] {
-    answers.points =
-        app::queryPoints(field, in, "points.csv", format, [&](std::string_view text) { answers.text += text; });
+    answers.points = query(field, in, "points.csv", format, [&](std::string_view text) { answers.text += text; });
   });
   return answers;
+}
+
+void check(Query* query, std::string_view text) {
+  static const Field field = oneLeafField(1, 3);
+  const Answers csv = answer(query, field, text, app::PointFormat::csv),
+                json = answer(query, field, text, app::PointFormat::json);
+  fuzz::require(csv.all == json.all && csv.points == json.points, "both formats take the same points");
+  if (!csv.all) return;
+  fuzz::require(std::size_t(std::ranges::count(csv.text, '\n')) == csv.points + 1, "a line a point, and the names");
+  const auto parsed = nlohmann::json::parse(json.text, nullptr, false);
+  fuzz::require(parsed.is_array() && parsed.size() == json.points, "an object a point");
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Field field = oneLeafField(1, 3);
-  const Answers csv = answer(field, fuzz::textOf(data, size), app::PointFormat::csv),
-                json = answer(field, fuzz::textOf(data, size), app::PointFormat::json);
-  fuzz::require(csv.all == json.all && csv.points == json.points, "both formats take the same points");
-  if (!csv.all) return 0;
-  fuzz::require(std::size_t(std::ranges::count(csv.text, '\n')) == csv.points + 1, "a line a point, and the names");
-  const auto parsed = nlohmann::json::parse(json.text, nullptr, false);
-  fuzz::require(parsed.is_array() && parsed.size() == json.points, "an object a point");
+  check(app::queryPoints, fuzz::textOf(data, size));
+  check(app::queryBoxes, fuzz::textOf(data, size));
   return 0;
 }

@@ -160,17 +160,17 @@ void runInfo(Session& session, const Arguments& arguments) {
   session.console().out << fieldText(session.current());
 }
 
-/// Returns true for a text that is meant as a point X,Y,Z. It may still be none, such as 1,2.
+/// Returns true for a text that is meant as a point X,Y,Z or a box. It may still be none, such as 1,2.
 bool looksLikePoint(const std::string& text) {
   return text.find(',') != std::string::npos && text.front() != 'e' && text.front() != 'E' &&
          text.find_first_not_of("0123456789+-.eE,") == std::string::npos;
 }
 
-/// Opens the points of a query: a single point X,Y,Z, a file, or the given stream if the name is "-". A file whose name
-/// looks like a point is read as a file.
+/// Opens the points or boxes of a query: a single one, such as X,Y,Z, a file, or the given stream if the name is "-". A
+/// file whose name looks like a point is read as a file. `what` tells what the file should hold.
 class PointSource {
  public:
-  PointSource(const std::string& points, std::istream& in) : name_(points) {
+  PointSource(const std::string& points, const char* what, std::istream& in) : name_(points) {
     if (points == "-") {
       name_ = "stdin";
       in_ = &in;
@@ -178,7 +178,7 @@ class PointSource {
       point_.str(points);
       in_ = &point_;
     } else {
-      file_ = openFile(points, "a file of points");
+      file_ = openFile(points, what);
       in_ = &file_;
     }
   }
@@ -194,13 +194,18 @@ class PointSource {
 };
 
 void runQuery(Session& session, const Arguments& arguments) {
+  const bool ofBoxes = arguments.has("boxes");
+  if (ofBoxes && arguments.has("points")) throw Error("boxes excludes points: give one of them");
   useField(session, arguments);
-  const PointSource source(arguments.textOr("points", "-"), session.console().in);
+  const PointSource source =
+      ofBoxes ? PointSource(arguments.text("boxes"), "a file of boxes", session.console().in)
+              : PointSource(arguments.textOr("points", "-"), "a file of points", session.console().in);
   const PointFormat format = session.wantsJson(arguments) ? PointFormat::json : PointFormat::csv;
   const Field& field = session.current().field;
   std::optional<OutputFile> output;
   if (arguments.has("output")) output.emplace(arguments.text("output"));
-  const std::size_t count = queryPoints(field, source.in(), source.name(), format, [&](std::string_view text) {
+  const auto answer = ofBoxes ? queryBoxes : queryPoints;
+  const std::size_t count = answer(field, source.in(), source.name(), format, [&](std::string_view text) {
     if (output) return output->write(text);
     std::ostream& out = session.console().out;
     out << text << std::flush;
@@ -208,7 +213,8 @@ void runQuery(Session& session, const Arguments& arguments) {
   });
   if (!output) return;
   output->commit();
-  session.console().err << fmt::format("{}: {}\n", arguments.text("output"), countOf(count, "point", "points"));
+  session.console().err << fmt::format("{}: {}\n", arguments.text("output"),
+                                       ofBoxes ? countOf(count, "box", "boxes") : countOf(count, "point", "points"));
 }
 
 void runSmooth(Session& session, const Arguments& arguments) {
@@ -402,18 +408,28 @@ void addReadingCommands(Registry& registry) {
   });
   registry.add({
       .name = "query",
-      .summary = "Compute distances and gradients at points.",
+      .summary = "Compute distances and gradients at points, or ranges over boxes.",
       .help = paragraphs(R"(
 Takes one point, or reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments
 and a header line are ignored. In a script that leaves FIELD out, a point is given as points=X,Y,Z. Writes CSV with the
 header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an array of objects.
 
-Distances are negative inside. Outside the domain the field is continued continuously.)"),
+Distances are negative inside. Outside the domain the field is continued continuously.
+
+--boxes asks for ranges instead: the field certainly has no value below min or above max in the box, whatever the
+rounding. Where min is above 0, the whole box is outside; where max is below 0, it is inside. The interval is some 20 %
+wider than necessary for boxes of an eighth of the domain's edge. It takes about a microsecond a box, after preparations
+of a few seconds at most. If the field has bounds ('build --bounds'), exact_min and exact_max contain the exact distance
+too.)"),
       .examples = {"hpsdf query bunny.hpsdf 0.1,0.2,0.3", "echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
-                   "hpsdf query bunny.hpsdf points.csv -o distances.csv"},
+                   "hpsdf query bunny.hpsdf points.csv -o distances.csv",
+                   "hpsdf query bunny.hpsdf --boxes 0,0,0,0.1,0.1,0.2"},
       .parameters = {fieldParameter(),
                      {"points", file("POINTS").positional(),
                       "A point X,Y,Z, or a file of points; - or nothing for standard input."},
+                     {"boxes", file("BOXES"),
+                      "Write certified ranges of the field over boxes: a box X0,Y0,Z0,X1,Y1,Z1, or a file with a box a "
+                      "line, the lower corner first; - for standard input. Excludes POINTS."},
                      {"output", outputFile().as('o'), "File to write; standard output when left out."}},
       .action = runQuery,
   });

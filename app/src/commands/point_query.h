@@ -1,6 +1,6 @@
 #pragma once
-// Evaluates a field at points that are given as text, and writes distances and gradients as text. Points are
-// processed in batches, so that millions of points need little memory.
+// Evaluates a field at points or finds its range over boxes, which are given as text, and writes the answers as text.
+// They are processed in batches, so that millions of them need little memory.
 
 #include <cstdint>
 #include <functional>
@@ -18,5 +18,10 @@ enum class PointFormat : std::uint8_t { csv, json };
 /// If a line is not a point, throws `Error` with the message "name:line: …".
 std::size_t queryPoints(const Field& field, std::istream& in, const std::string& name, PointFormat format,
                         const std::function<void(std::string_view)>& write);
+
+/// Reads boxes, six numbers each, and passes certified ranges of the field to `write`, like `queryPoints`. The ranges
+/// of the exact distance are there too if the field has bounds.
+std::size_t queryBoxes(const Field& field, std::istream& in, const std::string& name, PointFormat format,
+                       const std::function<void(std::string_view)>& write);
 
 }  // namespace hpsdf::app
