@@ -1,7 +1,7 @@
 # Every benchmark that bench/compare names is one of the program's: -D PROGRAM=… -D COMPARE=…
 execute_process(COMMAND ${PROGRAM} --benchmark_list_tests OUTPUT_VARIABLE known COMMAND_ERROR_IS_FATAL ANY)
 file(READ ${COMPARE} text)
-string(REGEX MATCHALL "\"(build|contacts|distance|frame|memory|near|query|winding)/[a-z0-9_/]+\"" names "${text}")
+string(REGEX MATCHALL "\"(build|contacts|distance|frame|memory|near|query|range|winding)/[a-z0-9_/]+\"" names "${text}")
 list(REMOVE_DUPLICATES names)
 list(LENGTH names count)
 if(count LESS 20)
