@@ -242,7 +242,7 @@ TEST(ExactLeafBounds, areRoundingErrors) {
   options.bounds = false;
   const std::uint64_t before = Built(options).field.metadata().exactEvaluations;
   EXPECT_EQ(built.field.metadata().exactEvaluations - before,
-            24 * (statistics(built.field).leaves - static_cast<std::size_t>(leaves)));
+            48 * (statistics(built.field).leaves - static_cast<std::size_t>(leaves)));
 }
 
 TEST(ExactLeafBounds, knowTheRoundingOfVertices) {

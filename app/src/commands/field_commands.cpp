@@ -379,7 +379,7 @@ second. Subtracting the first from |f| gives a distance within which there is ce
 collisions miss nothing. 'build --bounds' does the same; existing bounds are computed again. Coefficients stay the same
 to the bit.
 
-It needs MESH, from which the field was made, and computes 24 exact distances a cell, between which the 1-Lipschitz
+It needs MESH, from which the field was made, and computes 48 exact distances a cell, between which the 1-Lipschitz
 property of Φ bounds it. A mesh from which the field was not made is refused. Bounds hold where Φ is a signed distance:
 not beside the holes of an open mesh, nor where a mesh intersects itself.
 

@@ -21,11 +21,11 @@
 
 namespace hpsdf {
 
-/// Returns a copy of `field` with a proven error bound (`CellBound`) for each leaf. The function evaluates Φ at 24
-/// points per leaf that is a polynomial and, with blending, at 24 points for each exact leaf that touches it. Φ must be
-/// the distance that the field was made from. `exactEvaluations` in the metadata includes these evaluations. The result
-/// does not depend on `threads` (0: all that the machine offers). Throws `Error` if Φ is not finite. Throws `Cancelled`
-/// when `progress` says so.
+/// Returns a copy of `field` with a proven error bound (`CellBound`) for each leaf. The function evaluates Φ at 48
+/// points per leaf that is a polynomial and, with blending, at 24 points for each exact leaf that touches it. If Φ is a
+/// distance to triangles, some of the points lie outside the domain. Φ must be the distance that the field was made
+/// from. `exactEvaluations` in the metadata includes these evaluations. The result does not depend on `threads` (0: all
+/// that the machine offers). Throws `Error` if Φ is not finite. Throws `Cancelled` when `progress` says so.
 Field withBounds(const Field& field, const DistanceFunction& distance, int threads = 0, const Progress& progress = {});
 
 /// Returns the error bound of the leaf that holds x or, for x outside the domain, of the leaf that holds the domain's

@@ -15,6 +15,7 @@
 #include "basis/projection.h"
 #include "field/cells/cell_fit.h"
 #include "field/cells/exact_bounds.h"
+#include "field/cells/part_bounds.h"
 #include "field/query/evaluate.h"
 #include "field/query/leaves.h"
 #include "hpsdf/detail/legendre_part.h"
@@ -31,41 +32,9 @@ using basis::partCoefficients;
 // Upper bound of the accumulated rounding errors, relative to the magnitude of the numbers involved.
 constexpr double kRounding = 1e-12;
 
-/// A leaf's polynomial over one of the eight octants of a box, in local coordinates of the octant.
-struct Part {
-  Vector3 center, half;              ///< in the field's units
-  double value = 0;                  ///< constant coefficient: the linear polynomial's value at the centre
-  Vector3 gradient;                  ///< gradient of the linear polynomial
-  std::array<double, 3> squares{};   ///< coefficients of L_2 along each axis
-  std::array<double, 3> products{};  ///< coefficients of the products yz, xz, xy
-  double rest = 0;                   ///< bound of the terms of degree 3 and more
-  Vector3 restGradient;              ///< bound of the derivatives of the terms of degree 2 and more
-};
-
 /// Transformations of Legendre coefficients from the local coordinates of a leaf to the lower and the upper half of a
 /// box, along each axis.
 using Halves = std::array<std::array<const LegendreRows*, 2>, 3>;
-
-/// Adds the term coefficient · L_i(x) L_j(y) L_k(z) to a part. L_i is the Legendre polynomial of degree i; `order`
-/// holds i, j and k. The bounds use |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2 within [-1, 1].
-void addTerm(Part& part, const std::array<int, 3>& order, double coefficient) {
-  const int total = order[0] + order[1] + order[2];
-  if (total == 0) part.value = coefficient;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double slope = order[axis] * (order[axis] + 1) / 2.0 * coefficient / part.half[axis];
-    if (total == 1)
-      part.gradient[axis] += slope;
-    else
-      part.restGradient[axis] += std::abs(slope);
-  }
-  if (total > 2) part.rest += std::abs(coefficient);
-  if (total != 2) return;
-  const auto two = std::ranges::find(order, 2);
-  if (two != order.end())
-    part.squares[two - order.begin()] = coefficient;
-  else
-    part.products[std::ranges::find(order, 0) - order.begin()] = coefficient;
-}
 
 /// Returns the coefficients of a leaf's polynomial in local coordinates of one octant of a box.
 std::vector<double> octantCoefficients(const std::vector<double>& cube, int degree, int number, const Halves& halves) {
@@ -74,29 +43,20 @@ std::vector<double> octantCoefficients(const std::vector<double>& cube, int degr
   return partCoefficients(cube, degree, rows);
 }
 
-/// Returns a leaf's polynomial over one octant of a box. The octant's number is x + 2y + 4z. `c` holds the coefficients
-/// in local coordinates of the octant.
-Part partOf(const std::vector<double>& c, int degree, const Box& box, int number) {
-  Part part;
-  for (int axis = 0; axis < 3; ++axis) {
-    const bool upper = number >> axis & 1;
-    const double half = box.sizes()[axis] / 2;
-    part.center[axis] = box.center()[axis] + (upper ? 0.5 : -0.5) * half;
-    part.half[axis] = 0.5 * half;
-  }
-  part.gradient.setZero();
-  part.restGradient.setZero();
-  basis::forEachCoefficient(degree, [&](int i, int j, int k, int) {
-    addTerm(part, {i, j, k}, c[cubeIndex(i, j, k, degree)]);
-  });
-  return part;
+/// Returns a leaf's polynomial over one octant of a box. The octant's number is x + 2y + 4z. `cube` holds the
+/// coefficients in local coordinates of the octant.
+Part octantOf(const std::vector<double>& cube, int degree, const Box& box, int number) {
+  const Vector3 half = box.sizes() / 4;
+  Vector3 center = box.center();
+  for (int axis = 0; axis < 3; ++axis) center[axis] += (number >> axis & 1) != 0 ? half[axis] : -half[axis];
+  return partOf(cube, degree, center, half);
 }
 
-/// Number of points at which the exact distance Φ is evaluated for one part of a leaf: the part's centre, and two
-/// points one leaf edge away from the centre, on either side along the polynomial's gradient. Each point y gives the
+/// Number of points at which the exact distance Φ is evaluated for one part of a cell: the part's centre, and two
+/// points one cell edge away from the centre, on either side along the polynomial's gradient. Each point y gives the
 /// bounds Φ(y) ± |x − y| of Φ(x). The farther away y is, the more nearly these bounds are linear in x over the part.
 constexpr std::size_t kPointsPerPart = 3;
-/// Distance of the two outer points from the part's centre, in leaf edges. With 0.7, 1.4 and 2 instead of 1, the median
+/// Distance of the two outer points from the part's centre, in cell edges. With 0.7, 1.4 and 2 instead of 1, the median
 /// error bound for the mesh bunny is 1.03, 1.2 and 2.1 times as great.
 constexpr double kSideDistance = 1;
 
@@ -113,55 +73,15 @@ std::array<Vector3, kPointsPerPart> pointsOf(const Part& part, const Box& domain
   return partPoints;
 }
 
-/// Upper bounds of f(x) + |x − y| and of |x − y| − f(x) over all points x of one part of a leaf, for one point y and
-/// the part's polynomial f.
-struct ConeBounds {
-  double over, under;
-};
-
-/// Computes upper bounds of f(x) + |x − y| and |x − y| − f(x) over the points x of a part with polynomial f. A function
-/// that is linear in each coordinate or convex along each axis is greatest at a corner. If the quadratic terms are more
-/// concave than |x − y| is convex, the maximum may exceed the corner values by the height of a parabola.
-ConeBounds coneBounds(const Part& part, const Vector3& y) {
-  // Find the greatest values of f + |x − y| and |x − y| − f at the corners of the part.
-  double over = -std::numeric_limits<double>::infinity(), under = over, farthest = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    std::array<double, 3> t;
-    for (int axis = 0; axis < 3; ++axis) t[axis] = (corner >> axis & 1) ? 1 : -1;
-    const Vector3 d = Vector3(t[0], t[1], t[2]).cwiseProduct(part.half);
-    double value = part.value + part.gradient.dot(d);
-    for (int axis = 0; axis < 3; ++axis)
-      value += part.squares[axis] + part.products[axis] * t[(axis + 1) % 3] * t[(axis + 2) % 3];
-    const double distance = (part.center + d - y).norm();
-    farthest = std::max(farthest, distance);
-    over = std::max(over, value + distance);
-    under = std::max(under, distance - value);
-  }
-
-  // Add the heights by which parabolas along the axes may exceed the corner values.
-  const Vector3 offset = part.center - y;
-  const double nearest = (offset.cwiseAbs() - part.half).cwiseMax(0.0).norm();
-  for (int axis = 0; axis < 3; ++axis) {
-    const double square = part.half[axis] * part.half[axis];
-    const double along = nearest > 0 ? std::min(1.0, (std::abs(offset[axis]) + part.half[axis]) / nearest) : 1;
-    const double bend = (1 - along * along) / farthest * square;  // least curvature of |x − y| along the axis
-    const double curvature = 3 * part.squares[axis];
-    over += std::max(0.0, -curvature - bend) / 2;
-    under += std::max(0.0, curvature - bend) / 2;
-  }
-  return {over, under};
-}
-
 /// Returns an upper bound of the error |f − Φ| over a part with polynomial f. For every point y, the exact distance
 /// Φ(x) lies between Φ(y) − |x − y| and Φ(y) + |x − y|.
 double errorBound(const Part& part, std::span<const Vector3> partPoints, std::span<const double> distances) {
   double above = std::numeric_limits<double>::infinity(), below = above;  // bounds of f − Φ and of Φ − f
   for (std::size_t p = 0; p < partPoints.size(); ++p) {
-    const ConeBounds bounds = coneBounds(part, partPoints[p]);
-    above = std::min(above, bounds.over - distances[p]);
-    below = std::min(below, bounds.under + distances[p]);
+    above = std::min(above, coneBound(part, 1, partPoints[p]) - distances[p]);
+    below = std::min(below, coneBound(part, -1, partPoints[p]) + distances[p]);
   }
-  return std::max(above, below) + part.rest;
+  return std::max(above, below);
 }
 
 /// Proves that a polynomial is within the allowed error.
@@ -186,7 +106,7 @@ class Proof {
     const int degree = polynomial_.degree;
     for (int number = 0; number < 8; ++number) {
       const std::vector<double> c = octantCoefficients(cube, degree, number, halves_);
-      const Part part = partOf(c, degree, box, number);
+      const Part part = octantOf(c, degree, box, number);
       if (isWithin(part, box.sizes().maxCoeff())) continue;
       const Box octant(part.center - part.half, part.center + part.half);
       if (halvings == 0 || !holdsIn(c, octant, halvings - 1)) return false;
@@ -255,6 +175,17 @@ struct Bounds {
   double error = 0, slope = 0;
 };
 
+/// Evaluations of Φ by which the error of a leaf is bounded in its box, and in a zone that it shares with an exact
+/// leaf.
+constexpr std::uint64_t kEvaluationsOfLeaf = 48, kEvaluationsOfZone = 24;
+
+/// Returns the box in which a distance may be evaluated. A distance to triangles may be evaluated everywhere, and
+/// points beyond the domain bound it well.
+Box whereKnown(const Box& domain, const DistanceFunction& distance) {
+  if (distance.triangleSearch() == nullptr) return domain;
+  return Box(domain.min() - domain.sizes(), domain.max() + domain.sizes());
+}
+
 /// Computes bounds of the fields of single leaves, without regard to blending.
 class BoundFinder {
  public:
@@ -263,14 +194,12 @@ class BoundFinder {
         frame_(query::gridFrame(field)),
         distance_(distance),
         exact_(field, distance),
-        rounding_(kRounding * field.domain.diagonal().norm()) {
-    halves_.fill({&below_, &above_});
-  }
+        known_(whereKnown(field.domain, distance)),
+        rounding_(kRounding * field.domain.diagonal().norm()) {}
 
   /// Returns the bounds of a leaf in its own box.
   CellBound operator()(const query::OctreeNode& leaf) const {
-    const Bounds found = isExact(leaf) ? Bounds{exact_.error(leaf), 1}
-                                       : boundsIn(query::cellBox(frame_, leaf.depth, leaf.cellIndex), leaf, halves_);
+    const Bounds found = isExact(leaf) ? Bounds{exact_.error(leaf), 1} : ofPolynomial(leaf);
     CellBound bound;
     bound.error = roundedUp(found.error + rounding_);
     bound.slope = roundedUp(found.slope * (1 + kRounding));
@@ -290,23 +219,20 @@ class BoundFinder {
   Bounds inZone(const Zone& zone, const query::OctreeNode& leaf, const Vector3& at, double edge,
                 const query::OctreeNode& small) const {
     if (isExact(leaf)) return {exactErrorAround_[leaf.node] + rounding_, 1 + kRounding};
-    std::array<std::array<LegendreRows, 2>, 3> rows;
-    Halves halves;
+    std::array<LegendreRows, 3> rows;
     std::array<double, 3> lower, upper;
     const int degree = node::degree(field_.nodes[leaf.node]);
     for (int axis = 0; axis < 3; ++axis) {
       const double centre = (zone.from[axis] + zone.to[axis] - 2 * at[axis]) / edge - 1;
-      const double quarter = (zone.to[axis] - zone.from[axis]) / edge / 2;
-      for (int side = 0; side < 2; ++side) {
-        rows[axis][side] = legendreOfPart(centre + (side == 0 ? -quarter : quarter), quarter, degree);
-        halves[axis][side] = &rows[axis][side];
-      }
+      rows[axis] = legendreOfPart(centre, (zone.to[axis] - zone.from[axis]) / edge, degree);
       const auto corner = static_cast<double>(small.cellIndex[axis]);
       lower[axis] = std::ldexp(corner + zone.from[axis], -small.depth);
       upper[axis] = std::ldexp(corner + zone.to[axis], -small.depth);
     }
     const Box box(query::worldPoint(frame_, lower), query::worldPoint(frame_, upper));
-    const Bounds found = boundsIn(box, leaf, halves);
+    const Bounds found =
+        boundsIn(box, partCoefficients(cubeOf(field_, leaf.node, degree), degree, {&rows[0], &rows[1], &rows[2]}),
+                 degree, kEvaluationsOfZone);
     return {found.error + rounding_, found.slope * (1 + kRounding)};
   }
 
@@ -315,42 +241,29 @@ class BoundFinder {
   std::uint64_t evaluations() const { return evaluations_; }
 
  private:
-  /// Computes the bounds of a leaf's polynomial in a box.
-  Bounds boundsIn(const Box& box, const query::OctreeNode& leaf, const Halves& halves) const {
+  Bounds ofPolynomial(const query::OctreeNode& leaf) const {
     const int degree = node::degree(field_.nodes[leaf.node]);
-    const std::vector<double> cube = cubeOf(field_, leaf.node, degree);
-    std::array<Part, 8> parts;
-    std::array<std::array<Vector3, kPointsPerPart>, 8> partPoints;
-    std::array<Vector3, 8 * kPointsPerPart> points;  // neighbours are adjacent, which makes exact distances faster
-    for (int number = 0; number < 8; ++number) {
-      parts[number] = partOf(octantCoefficients(cube, degree, number, halves), degree, box, number);
-      partPoints[number] = pointsOf(parts[number], field_.domain, box.sizes().maxCoeff());
-      for (std::size_t p = 0; p < kPointsPerPart; ++p) points[8 * p + number] = partPoints[number][p];
-    }
-    std::array<double, points.size()> distances;
-    distance_(points, distances);
-    evaluations_ += points.size();
-    Bounds bounds;
-    for (int number = 0; number < 8; ++number) {
-      std::array<double, kPointsPerPart> partDistances;
-      for (std::size_t p = 0; p < kPointsPerPart; ++p) partDistances[p] = distances[8 * p + number];
-      for (const double value : partDistances)
-        if (!std::isfinite(value)) throw Error("bounds: the signed distance is not finite within the domain");
-      const Part& part = parts[number];
-      bounds.error = std::max(bounds.error, errorBound(part, partPoints[number], partDistances));
-      bounds.slope = std::max(bounds.slope, (part.gradient.cwiseAbs() + part.restGradient).norm());
-    }
-    return bounds;
+    return boundsIn(query::cellBox(frame_, leaf.depth, leaf.cellIndex), cubeOf(field_, leaf.node, degree), degree,
+                    kEvaluationsOfLeaf);
+  }
+
+  /// Computes the bounds of a polynomial in a box. `cube` holds its coefficients in local coordinates of the box.
+  Bounds boundsIn(const Box& box, std::vector<double> cube, int degree, std::uint64_t mostEvaluations) const {
+    const Part part = partOf(cube, degree, box.center(), box.sizes() / 2);
+    const ErrorBound found =
+        boundError({std::move(cube), part}, {degree, mostEvaluations, distance_, known_, below_, above_});
+    evaluations_ += found.evaluations;
+    return {found.error, found.slope};
   }
 
   const FieldData& field_;
   GridFrame frame_;
   const DistanceFunction& distance_;
   ExactBounds exact_;
+  Box known_;                             ///< where Φ may be evaluated
   std::vector<double> exactErrorAround_;  ///< by node: see `ExactBounds::errorAround`
   double rounding_;                       ///< bound of the rounding errors of values
   LegendreRows below_ = legendreOfPart(-0.5, 0.5, kMaxDegree), above_ = legendreOfPart(0.5, 0.5, kMaxDegree);
-  Halves halves_;
   mutable std::atomic<std::uint64_t> evaluations_ = 0;
 };
 
