@@ -71,7 +71,7 @@ TEST(SafeDistance, boundsHoldAndAreTight) {
   const Field field = build(gear, domainAround(gear.source().box), options);
   const BoundCheck found = checkBounds(field, [&](const Vector3& x) { return gear(x); });
   EXPECT_EQ(found.violations, 0);
-  EXPECT_LT(found.medianBound, 20 * found.medianWorst);
+  EXPECT_LT(found.medianBound, 4 * found.medianWorst);
 }
 
 TEST(SafeDistance, checkFindsBoundsThatAreTooLow) {

@@ -109,9 +109,9 @@ struct Region {
 /// value a cone of slope 1 bounds Φ.
 ///
 /// Along the line through the apex and the centre, the bound is tight if Φ grows by the whole distance. This loss is
-/// small up to the next surface halfway between two faces. Across the line, the cone departs from Φ by about s²/2r, where
-/// s is the half width of the region and r the distance of the apex. So the apex moves out while the loss is small against
-/// s²/2r, and in where it is greater; and regions are halved along axes that run across the gradient.
+/// small up to the next surface halfway between two faces. Across the line, the cone departs from Φ by about s²/2r,
+/// where s is the half width of the region and r the distance of the apex. So the apex moves out while the loss is
+/// small against s²/2r, and in where it is greater; and regions are halved along axes that run across the gradient.
 class ErrorSearch {
  public:
   explicit ErrorSearch(const ErrorQuestion& question) : question_(question) {}
@@ -225,7 +225,8 @@ class ErrorSearch {
     const Part& part = region.at.part;
     const double steepness = part.gradient.norm();
     if (!(steepness > 0)) region.reach = 0;
-    const Vector3 unit = steepness > 0 ? Vector3(region.direction() / steepness * part.gradient) : Vector3(Vector3::Zero());
+    const Vector3 unit =
+        steepness > 0 ? Vector3(region.direction() / steepness * part.gradient) : Vector3(Vector3::Zero());
     for (int axis = 0; axis < 3; ++axis) {
       const double wall = unit[axis] > 0 ? question_.domain.max()[axis] : question_.domain.min()[axis];
       if (unit[axis] != 0) region.reach = std::min(region.reach, std::abs((wall - part.center[axis]) / unit[axis]));
@@ -249,8 +250,6 @@ class ErrorSearch {
 
 }  // namespace
 
-ErrorBound boundError(const PartWithCube& whole, const ErrorQuestion& question) {
-  return ErrorSearch(question)(whole);
-}
+ErrorBound boundError(const PartWithCube& whole, const ErrorQuestion& question) { return ErrorSearch(question)(whole); }
 
 }  // namespace hpsdf::detail

@@ -49,12 +49,12 @@ struct ErrorQuestion {
   int degree;
   std::uint64_t mostEvaluations;  ///< at least 8
   const DistanceFunction& distance;
-  const Box& domain;                 ///< where the distance may be evaluated
+  const Box& domain;                  ///< where the distance may be evaluated
   const LegendreRows &lower, &upper;  ///< `legendreOfPart` for the two halves of a cell
 };
 
-/// Returns upper bounds of the error |f − Φ| and of the slope of a leaf's polynomial f over a box. Throws `Error` if Φ is
-/// not finite.
+/// Returns upper bounds of the error |f − Φ| and of the slope of a leaf's polynomial f over a box. Throws `Error` if Φ
+/// is not finite.
 ErrorBound boundError(const PartWithCube& whole, const ErrorQuestion& question);
 
 }  // namespace hpsdf::detail
