@@ -10,6 +10,7 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "../support/made_meshes.h"
@@ -108,6 +109,15 @@ TEST(Range, containsEveryValueOfPolynomials) {
   options.maxDepth = 12;
   EXPECT_EQ(countOutside(randomField(3, options)), 0) << "far from the origin, with deep leaves";
   for (const int degree : {0, 1, 2, 7, 30}) EXPECT_EQ(countOutside(oneLeafField(4, degree)), 0) << degree;
+}
+
+/// Values may exceed the range of floats, in which bounds are stored.
+TEST(Range, containsHugeValues) {
+  for (const double scale : {1e20, 1e38, 1e60, 1e290}) {
+    FieldData data = dataOf(oneLeafField(21, 3));
+    for (double& c : std::get<std::vector<double>>(data.coefficients)) c *= scale;
+    EXPECT_EQ(countOutside(Field(std::move(data))), 0) << scale;
+  }
 }
 
 TEST(Range, containsEveryValueOfQuantizedAndBuiltFields) {

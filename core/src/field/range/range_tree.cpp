@@ -28,6 +28,14 @@ float roundedDown(double number) {
 }
 float roundedUpward(double number) { return -roundedDown(-number); }
 
+/// Greatest size of an enclosure that is stored with its gradient.
+constexpr double kLargest = 1e30;
+
+/// Returns the greatest magnitude of the two linear functions of an enclosure, at most.
+double sizeOf(const Enclosure& e, double reach) {
+  return std::max(std::abs(e.lower), std::abs(e.upper)) + reach * e.gradient.lpNorm<1>();
+}
+
 constexpr std::uint32_t kNoGroup = Group::kTerminalBit - 1;
 
 }  // namespace
@@ -147,8 +155,14 @@ class TreeBuilder {
   void set(std::uint32_t index, std::size_t number, const std::optional<Linked>& child, double reach) {
     Group& group = tree_.groups_[index];
     Details& details = tree_.details_[index];
-    const Enclosure e = child ? child->enclosure : Enclosure{};
-    const double size = std::max(std::abs(e.lower), std::abs(e.upper)) + reach * e.gradient.lpNorm<1>();
+    Enclosure e = child ? child->enclosure : Enclosure{};
+    double size = sizeOf(e, reach);
+    if (size > kLargest) {  // Sums of such numbers might be no numbers.
+      e.gradient.setZero();
+      e.lower = e.min;
+      e.upper = e.max;
+      size = sizeOf(e, reach);
+    }
     const double slack = kFloatRounding * size + e.noise;
     group.lower[number] = roundedDown(e.lower - slack);
     group.upper[number] = roundedUpward(e.upper + slack);
@@ -351,7 +365,9 @@ class RangeSearch {
     else
       found = polynomialAround(cell, bits, middle, extent);
     const double spread = details.bend[cell.number] * greatest * greatest / 2 + details.noise[cell.number];
-    add(std::max(found.min - spread, double(cell.min)), std::min(found.max + spread, double(cell.max)), cell);
+    // Where numbers are so large that the spread is not finite, the bounds of the cell remain.
+    const double low = found.min - spread, high = found.max + spread;
+    add(low > cell.min ? low : cell.min, high < cell.max ? high : cell.max, cell);
   }
 
   Enclosure exactAround(const Cell& cell, std::uint64_t bits, const std::array<double, 3>& middle,
