@@ -184,6 +184,13 @@ TEST_F(Batches, badMeshDoesNotStopTheOthers) {
 }
 
 /// The cells of the larger sphere may not be divided often enough for the maximum error, which is a length.
+TEST_F(Batches, fieldsAreCompressed) {
+  ASSERT_EQ(run(batch("analytic:sphere\n", coarseAnd({"--compress"}))).status, 0);
+  const fs::path compressed = fieldOf("analytic:sphere"), plain = folder_ / "plain.hpsdf";
+  save(load(compressed), plain);
+  EXPECT_LT(fs::file_size(compressed), fs::file_size(plain));
+}
+
 TEST_F(Batches, fieldsThatMissTheErrorsAskedForAreTold) {
   const std::vector<std::string> options = {"--max-error",  "0.01", "--target-error", "1e-2", "--strategy", "hp",
                                             "--max-degree", "2",    "--max-depth",    "1",    "--grid",     "2"};

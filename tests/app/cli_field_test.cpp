@@ -75,6 +75,49 @@ TEST_F(FieldFile, infoTellsOfExactLeaves) {
   EXPECT_FALSE(Json::parse(run({{"info", field(), "--json"}}).out).contains("exact_leaves"));
 }
 
+/// Expects that a compressed file is smaller than the one without compression, and loads into the same field.
+void expectCompressed(const std::string& compressed, const std::string& plain) {
+  EXPECT_LT(fs::file_size(compressed), fs::file_size(plain)) << compressed;
+  const std::string again = compressed + ".again";
+  save(load(compressed), again);
+  EXPECT_EQ(readFile(again), readFile(plain)) << compressed;
+  fs::remove(again);
+}
+
+TEST_F(FieldFile, commandsThatWriteFieldsCompressThem) {
+  const std::vector<std::vector<std::string>> commands = {{"build", "builtin:torus", "--target-error", "1e-4"},
+                                                          {"smooth", field()},
+                                                          {"blend", field()},
+                                                          {"bounds", field(), "builtin:torus"}};
+  for (const std::vector<std::string>& words : commands) {
+    const auto written = [&](const std::string& name, const std::vector<std::string>& more) {
+      std::vector<std::string> all = words;
+      all.insert(all.end(), {"-o", at(name)});
+      all.insert(all.end(), more.begin(), more.end());
+      const Outcome outcome = run({all});
+      EXPECT_EQ(outcome.status, 0) << outcome.err;
+      return at(name);
+    };
+    expectCompressed(written("c.hpsdf", {"--compress"}), written("p.hpsdf", {}));
+  }
+  writeFile(folder_ / "s.txt", "load " + field() + "\nsave output=" + at("s.hpsdf") + " compress=true\n");
+  ASSERT_EQ(run({{"run", at("s.txt")}}).status, 0);
+  expectCompressed(at("s.hpsdf"), field());
+  const Json info = Json::parse(run({{"info", at("s.hpsdf"), "--json"}}).out);
+  EXPECT_EQ(info.at("file_bytes"), fs::file_size(at("s.hpsdf"))) << "bytes on disk";
+  EXPECT_EQ(info.at("bytes"), load(field()).bytes()) << "bytes in memory";
+}
+
+TEST_F(FieldFile, compressionNeedsAnOutput) {
+  const std::string script = at("s.txt");
+  for (const std::string& line :
+       {std::string("build builtin:torus compress=true"), "blend " + field() + " compress=true"}) {
+    writeFile(script, line + "\n");
+    expectRefused({{"run", script}}, "compress belongs to output: give that too, or leave it out");
+  }
+  expectRefused({{"build", "builtin:torus", "-o", at("t.hpsdf"), "--compress=19"}}, "compress");
+}
+
 TEST_F(FieldFile, damagedFieldsAreRefused) {
   const std::string whole = readFile(field());
   std::mt19937_64 random(5);

@@ -50,6 +50,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"build", "build builtin:box strategy=hpx target-error=1e-3 grid=3 output=$out/f.hpsdf"},
     {"load", "load $field; expect stats.exact_leaves.leaves > 0"},
     {"save", "save output=$out/f.hpsdf"},
+    {"save", "save output=$out/f.hpsdf compress=true; load $out/f.hpsdf; expect stats.exact_leaves.leaves > 0"},
     {"smooth", "smooth output=$out/f.hpsdf"},
     {"blend", "blend output=$out/f.hpsdf; expect stats.blend > 0"},
     {"bounds", "bounds output=$out/f.hpsdf; expect stats.bounds.greatest > 0"},

@@ -75,6 +75,10 @@ void writeFields(const fs::path& folder) {
   save(withMeasurement(load(folder / "exact.hpsdf"), measure(load(folder / "exact.hpsdf"), octahedron)),
        folder / "measured.hpsdf");
   add("wide", [](BuildOptions& o) { o.grid = {5, 4, 3}, o.maxDegree = 1, o.maxDepth = 0; });
+  for (const char* name : {"double", "float", "quantized", "bounds", "exact", "exact-double", "exact-winding"}) {
+    const std::string file = std::string(name) + ".hpsdf";
+    save(load(folder / file), folder / ("compressed-" + file), {.compress = true});
+  }
 }
 
 /// Returns the checkpoint of a construction that ends when it has asked so many times whether to cancel; empty if it

@@ -318,7 +318,7 @@ class Batch {
 
   /// Saves the field, then the record of the mesh and options from which it was built.
   void write(const BatchMesh& mesh, const Field& field, const std::string& content) const {
-    save(field, outputOf(mesh));
+    save(field, outputOf(mesh), {.compress = arguments_.flag("compress")});
     if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
   }
 

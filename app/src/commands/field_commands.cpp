@@ -32,17 +32,19 @@
 namespace hpsdf::app {
 namespace {
 
-void saveCurrent(Session& session, const std::string& file) {
-  save(session.current().field, file);
+void saveCurrent(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  save(session.current().field, file, {.compress = arguments.flag("compress")});
   session.setFileBytes(std::filesystem::file_size(file));
 }
 
 void checkFieldOutput(const Arguments& arguments) {
+  requireOwner(arguments, "compress", "output", arguments.has("output"));
   if (arguments.has("output")) checkWritable(arguments.text("output"));
 }
 
 void saveMade(Session& session, const Arguments& arguments) {
-  if (arguments.has("output")) saveCurrent(session, arguments.text("output"));
+  if (arguments.has("output")) saveCurrent(session, arguments);
 }
 
 /// Returns facts about the current field, and the file to which it was saved, as JSON.
@@ -148,7 +150,7 @@ void runLoad(Session& session, const Arguments& arguments) {
 
 void runSave(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
-  saveCurrent(session, file);
+  saveCurrent(session, arguments);
   const auto bytes = session.current().fileBytes;
   if (session.wantsJson(arguments)) return printJson(session.console().out, {{"output", file}, {"file_bytes", *bytes}});
   session.console().out << fmt::format("{}: {}\n", file, bytesText(double(*bytes)));
@@ -276,6 +278,12 @@ const Parameter kFieldOutput = {"output", outputFile().as('o').requiredOnCommand
                                 "File of the resulting field, usually *.hpsdf. A script may leave it out; the result "
                                 "becomes the current field in any case."};
 
+const Parameter kCompress = {
+    "compress", flag().under(kFiles),
+    "Compress the file without loss. It loads into the same field, to the bit, by the same commands, and takes as many "
+    "bytes of memory. Use it to store or send fields: files take 55 to 80 % of their bytes, quantized ones and those "
+    "with exact leaves the least. Saving takes up to half a second for each megabyte, loading a few milliseconds."};
+
 const std::vector<Parameter> kBuildFiles = {
     {"mesh", text("MESH").positional(), "Mesh file, builtin:SHAPE or analytic:SHAPE."},
     {"output", outputFile().as('o').requiredOnCommandLine().under(kFiles),
@@ -283,7 +291,8 @@ const std::vector<Parameter> kBuildFiles = {
      "not exist."},
     {"batch", file("LIST").under(kFiles),
      "Builds the fields of many meshes instead of MESH. LIST names one mesh file (relative to the current folder) or "
-     "shape a line; empty lines and # comments are ignored, - is standard input."}};
+     "shape a line; empty lines and # comments are ignored, - is standard input."},
+    kCompress};
 
 void addBuildCommand(Registry& registry) {
   registry.add({
@@ -346,7 +355,7 @@ measured errors are removed, and so is the tolerance of a field that was built w
 once.)"),
       .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
                    "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
-      .parameters = {fieldParameter(), kFieldOutput, settingParameter("continuity-weight"),
+      .parameters = {fieldParameter(), kFieldOutput, kCompress, settingParameter("continuity-weight"),
                      threadsParameter("The field is")},
       .action = runSmooth,
   });
@@ -364,6 +373,7 @@ measured errors are removed, and so is the tolerance of a field that was built w
       .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
       .parameters = {fieldParameter(),
                      kFieldOutput,
+                     kCompress,
                      {"width", settingKind("blend-width"), std::string(buildSetting("blend-width").help)}},
       .action = runBlend,
   });
@@ -386,7 +396,7 @@ not beside the holes of an open mesh, nor where a mesh intersects itself.
 'smooth' and 'blend' change the field and remove bounds: compute them last. 'hpsdf verify --max-violations 0' tests them
 at random points.)"),
       .examples = {"hpsdf bounds bunny.hpsdf bunny.obj -o certain.hpsdf", "hpsdf bounds torus.hpsdf -o certain.hpsdf"},
-      .parameters = {fieldParameter(), surfaceParameter(), kFieldOutput, threadsParameter("The field is")},
+      .parameters = {fieldParameter(), surfaceParameter(), kFieldOutput, kCompress, threadsParameter("The field is")},
       .action = runBounds,
   });
 }
@@ -448,7 +458,7 @@ too.)"),
           "The file is written under a temporary name and renamed, so that an interrupted save leaves an older file "
           "intact.",
       .examples = {"save output=bunny.hpsdf"},
-      .parameters = {{"output", outputFile().as('o').required(), "File of the field, usually *.hpsdf."}},
+      .parameters = {{"output", outputFile().as('o').required(), "File of the field, usually *.hpsdf."}, kCompress},
       .action = runSave,
   });
 }

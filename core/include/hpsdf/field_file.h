@@ -6,16 +6,24 @@
 
 namespace hpsdf {
 
+struct SaveOptions {
+  /// Compresses the arrays, without loss. The file is smaller, and loads into the same bytes of memory; saving takes
+  /// longer, because several forms of the arrays are compressed as far as possible. Equal fields give equal bytes with
+  /// the same version of zstd.
+  bool compress = false;
+};
+
 /// Writes a field as a `.hpsdf` file (docs/file-format.md), which is versioned, little-endian and checksummed.
 /// Equal fields give equal bytes. The file is written under a temporary name in the same folder and then
 /// renamed, so that an interrupted save leaves an older file intact. A symbolic link is followed and stays, also if the
 /// file to which it leads does not exist yet. Throws `Error` with a message that names
 /// the file and the reason.
-void save(const Field& field, const std::filesystem::path& file);
+void save(const Field& field, const std::filesystem::path& file, const SaveOptions& options = {});
 
-/// Reads the field from a file that `save` wrote. Sizes are checked against the file's length before memory is
-/// allocated. Throws `Error` if the file is missing, is truncated, is altered, has an unknown version or is not
-/// a `.hpsdf` file.
+/// Reads the field from a file that `save` wrote. Compressed files need no option. Sizes are checked before
+/// memory is allocated: against the file's length or, of compressed arrays, against what so many bytes can hold and
+/// the memory that the process may take. Throws `Error` if the file is missing, is truncated, is altered, has an
+/// unknown version or is not a `.hpsdf` file.
 Field load(const std::filesystem::path& file);
 
 /// Tells whether a file begins as files that `save` wrote do. Returns false for a file that cannot be read.

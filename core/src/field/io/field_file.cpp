@@ -11,11 +11,16 @@
 #include <utility>
 #include <vector>
 
+#include "field/io/compressed_arrays.h"
+#include "field/io/field_sizes.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/error.h"
 #include "util/checked_file.h"
 
 namespace hpsdf {
+
+using namespace io;
+
 namespace {
 
 // First bytes of a field file. As in PNG files, the carriage return, line feed and end-of-file mark reveal that
@@ -27,23 +32,13 @@ constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1
 // wide leaves. Versions 5 to 7 were never released.
 constexpr std::uint32_t kFieldVersion = 10, kQuantizedVersion = 9, kExactLeavesVersion = 8;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
-constexpr std::uint32_t kQuantized = 1;  // stands in place of the bytes of a coefficient
+// Set in the version of a file whose arrays are compressed.
+constexpr std::uint32_t kCompressed = std::uint32_t{1} << 31;
 
 constexpr detail::FileKind kFieldFile{"field file", "a .hpsdf file", "build or copy it again"};
 
-struct Sizes {
-  std::uint64_t nodes = 0;
-  std::uint64_t coefficients = 0;      ///< number of coefficients, or of bytes if they are quantized
-  std::uint32_t coefficientBytes = 8;  ///< bytes of one coefficient, or `kQuantized`
-  double step = 0;                     ///< `QuantizedCoefficients::step`
-  std::uint32_t meanBits = 0;          ///< `QuantizedCoefficients::meanBits`
-  std::uint64_t bounds = 0;
-  std::uint32_t vertexBytes = 8;  ///< bytes of one coordinate of a vertex
-  std::uint64_t vertices = 0, triangles = 0, lists = 0;
-};
-
-Sizes sizesOf(const FieldData& data) {
-  Sizes sizes{.nodes = data.nodes.size(), .bounds = data.bounds.size()};
+FieldSizes sizesOf(const FieldData& data) {
+  FieldSizes sizes{.nodes = data.nodes.size(), .bounds = data.bounds.size()};
   std::visit(
       [&](const auto& c) {
         if constexpr (requires { c.step; }) {
@@ -195,14 +190,8 @@ void arrayOf(detail::CheckedReader& reader, std::uint32_t bytes, std::uint64_t s
     reader.array(out.template emplace<std::vector<Double>>(), size);
 }
 
-}  // namespace
-
-void save(const Field& field, const std::filesystem::path& file) {
-  const FieldData& data = field.data();
-  detail::CheckedWriter writer(file);
-  writer.begin(kFieldMagic, kFieldVersion);
-  const Sizes sizes = sizesOf(data);
-  header(writer, data, sizes, kFieldVersion);
+/// Writes the arrays as they are.
+void writePlain(detail::CheckedWriter& writer, const FieldData& data) {
   const auto write = [&](const auto& array) { writer.array(array, array.size()); };
   write(data.nodes);
   std::visit(
@@ -217,38 +206,12 @@ void save(const Field& field, const std::filesystem::path& file) {
   std::visit(write, data.exact.vertices);
   write(data.exact.triangles);
   write(data.exact.lists);
-  writer.finish();
 }
 
-bool isFieldFile(const std::filesystem::path& file) {
-  std::array<char, kFieldMagic.size()> first{};
-  std::ifstream stream(file, std::ios::binary);
-  return stream.read(first.data(), first.size()) && std::ranges::equal(first, kFieldMagic);
-}
-
-Field load(const std::filesystem::path& file) {
-  detail::CheckedReader reader(file, kFieldFile);
-  const bool isTooShort = reader.remaining() < kFieldMagic.size();
-  const std::optional<std::uint32_t> version = reader.begin(kFieldMagic);
-  if (!version)
-    reader.refuse(std::string("is not a .hpsdf file") + (isTooShort ? " (too short)" : "") +
-                  "; build one with `hpsdf build`");
-  constexpr std::uint32_t kLastBefore = 4;
-  if (*version == 0 || (*version > kLastBefore && *version < kExactLeavesVersion) || *version > kFieldVersion)
-    reader.refuse("has file format version " + std::to_string(*version) + ", this program reads 1 to 4 and " +
-                  std::to_string(kExactLeavesVersion) + " to " + std::to_string(kFieldVersion) + "; build it again");
-  FieldData data;
-  Sizes sizes;
-  header(reader, data, sizes, *version);
-  const bool isQuantized = sizes.coefficientBytes == kQuantized && *version >= kQuantizedVersion;
-  reader.require(isQuantized || sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8,
-                 "its coefficients have an unknown type");
-  reader.require(sizes.vertexBytes == 4 || sizes.vertexBytes == 8, "its vertices have an unknown type");
-  Source& source = data.metadata.source;
-  reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
-  if (*version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
+/// Reads the arrays that `writePlain` wrote.
+void readPlain(detail::CheckedReader& reader, const FieldSizes& sizes, FieldData& data) {
   reader.array(data.nodes, sizes.nodes);
-  if (isQuantized) {
+  if (sizes.coefficientBytes == kQuantized) {
     auto& coefficients = data.coefficients.emplace<QuantizedCoefficients>();
     coefficients.step = sizes.step;
     coefficients.meanBits = sizes.meanBits;
@@ -260,6 +223,68 @@ Field load(const std::filesystem::path& file) {
   arrayOf<Eigen::Vector3f, Eigen::Vector3d>(reader, sizes.vertexBytes, sizes.vertices, data.exact.vertices);
   reader.array(data.exact.triangles, sizes.triangles);
   reader.array(data.exact.lists, sizes.lists);
+}
+
+/// The first items of a file.
+struct Start {
+  std::uint32_t version = 0;
+  bool isCompressed = false;
+};
+
+/// Reads the first items of a file. Throws `Error` unless it is a field file of a version that can be read.
+Start readStart(detail::CheckedReader& reader) {
+  const bool isTooShort = reader.remaining() < kFieldMagic.size();
+  const std::optional<std::uint32_t> stored = reader.begin(kFieldMagic);
+  if (!stored)
+    reader.refuse(std::string("is not a .hpsdf file") + (isTooShort ? " (too short)" : "") +
+                  "; build one with `hpsdf build`");
+  const Start start{.version = *stored & ~kCompressed, .isCompressed = (*stored & kCompressed) != 0};
+  constexpr std::uint32_t kLastBefore = 4;
+  if (start.version == 0 || (start.version > kLastBefore && start.version < kExactLeavesVersion) ||
+      start.version > kFieldVersion)
+    reader.refuse("has file format version " + std::to_string(start.version) + ", this program reads 1 to 4 and " +
+                  std::to_string(kExactLeavesVersion) + " to " + std::to_string(kFieldVersion) + "; build it again");
+  return start;
+}
+
+}  // namespace
+
+void save(const Field& field, const std::filesystem::path& file, const SaveOptions& options) {
+  const FieldData& data = field.data();
+  detail::CheckedWriter writer(file);
+  writer.begin(kFieldMagic, options.compress ? kFieldVersion | kCompressed : kFieldVersion);
+  const FieldSizes sizes = sizesOf(data);
+  header(writer, data, sizes, kFieldVersion);
+  if (options.compress)
+    writeCompressed(writer, data);
+  else
+    writePlain(writer, data);
+  writer.finish();
+}
+
+bool isFieldFile(const std::filesystem::path& file) {
+  std::array<char, kFieldMagic.size()> first{};
+  std::ifstream stream(file, std::ios::binary);
+  return stream.read(first.data(), first.size()) && std::ranges::equal(first, kFieldMagic);
+}
+
+Field load(const std::filesystem::path& file) {
+  detail::CheckedReader reader(file, kFieldFile);
+  const auto [version, isCompressed] = readStart(reader);
+  FieldData data;
+  FieldSizes sizes;
+  header(reader, data, sizes, version);
+  const bool isQuantized = sizes.coefficientBytes == kQuantized && version >= kQuantizedVersion;
+  reader.require(isQuantized || sizes.coefficientBytes == 4 || sizes.coefficientBytes == 8,
+                 "its coefficients have an unknown type");
+  reader.require(sizes.vertexBytes == 4 || sizes.vertexBytes == 8, "its vertices have an unknown type");
+  Source& source = data.metadata.source;
+  reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
+  if (version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
+  if (isCompressed)
+    readCompressed(reader, sizes, data);
+  else
+    readPlain(reader, sizes, data);
   reader.finish();
   try {
     return Field(std::move(data));

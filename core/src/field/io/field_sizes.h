@@ -1,0 +1,21 @@
+#pragma once
+// The sizes of a field's arrays, which the header of a field file holds.
+
+#include <cstdint>
+
+namespace hpsdf::io {
+
+constexpr std::uint32_t kQuantized = 1;  ///< stands in place of the bytes of a coefficient
+
+struct FieldSizes {
+  std::uint64_t nodes = 0;
+  std::uint64_t coefficients = 0;      ///< number of coefficients, or of bytes if they are quantized
+  std::uint32_t coefficientBytes = 8;  ///< bytes of one coefficient, or `kQuantized`
+  double step = 0;                     ///< `QuantizedCoefficients::step`
+  std::uint32_t meanBits = 0;          ///< `QuantizedCoefficients::meanBits`
+  std::uint64_t bounds = 0;
+  std::uint32_t vertexBytes = 8;  ///< bytes of one coordinate of a vertex
+  std::uint64_t vertices = 0, triangles = 0, lists = 0;
+};
+
+}  // namespace hpsdf::io
