@@ -281,7 +281,7 @@ const Parameter kFieldOutput = {"output", outputFile().as('o').requiredOnCommand
 const Parameter kCompress = {
     "compress", flag().under(kFiles),
     "Compress the file without loss. It loads into the same field, to the bit, by the same commands, and takes as many "
-    "bytes of memory. Use it to store or send fields: files take 55 to 80 % of their bytes, quantized ones and those "
+    "bytes of memory. Use it to store or send fields: files take 45 to 80 % of their bytes, quantized ones and those "
     "with exact leaves the least. Saving takes up to half a second for each megabyte, loading a few milliseconds."};
 
 const std::vector<Parameter> kBuildFiles = {
