@@ -330,6 +330,7 @@ class Batch {
                      {"content", content},
                      {"options", linesJson(decidingArguments(arguments_))},
                      {"given", givenNames(arguments_)},
+                     {"compress", arguments_.flag("compress")},
                      {"field", checksumOf(outputOf(mesh))}});
   }
 

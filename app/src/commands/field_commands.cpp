@@ -282,7 +282,8 @@ const Parameter kCompress = {
     "compress", flag().under(kFiles),
     "Compress the file without loss. It loads into the same field, to the bit, by the same commands, and takes as many "
     "bytes of memory. Use it to store or send fields: files take 45 to 80 % of their bytes, quantized ones and those "
-    "with exact leaves the least. Saving takes up to half a second for each megabyte, loading a few milliseconds."};
+    "with exact leaves the least; one of less than 2 kB does not shrink. Saving takes up to half a second for each "
+    "megabyte, loading a few milliseconds."};
 
 const std::vector<Parameter> kBuildFiles = {
     {"mesh", text("MESH").positional(), "Mesh file, builtin:SHAPE or analytic:SHAPE."},

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <variant>
@@ -80,7 +81,7 @@ struct ListParts {
 
 std::uint32_t endOf(std::uint32_t run) { return triangle_run::first(run) + triangle_run::length(run); }
 
-/// Sorts the words of a list into its parts. Returns the words behind it, and updates the end of the last run.
+/// Sorts the words of a list into the parts. `end` is the end of the last run, before and after the call.
 void splitList(std::span<const std::uint32_t> words, std::uint32_t& end, ListParts& parts) {
   const TriangleListView list(words.data());
   parts.counts.push_back(words[0]);
@@ -94,6 +95,19 @@ void splitList(std::span<const std::uint32_t> words, std::uint32_t& end, ListPar
   if (!list.hasReference()) return;
   ListParts::Reference& reference = parts.references.emplace_back();
   std::copy_n(list.referenceWords(), reference.size(), reference.begin());
+}
+
+/// Sorts the words of lists that stand one after the other. Returns std::nullopt if a list is not whole.
+std::optional<ListParts> sortedLists(const std::vector<std::uint32_t>& lists) {
+  ListParts parts;
+  std::uint32_t end = 0;
+  for (std::size_t at = 0; at < lists.size();) {
+    const std::size_t words = listWords(lists, at);
+    if (words == 0) return std::nullopt;
+    splitList(std::span(lists).subspan(at, words), end, parts);
+    at += words;
+  }
+  return parts;
 }
 
 /// Puts lists together from their parts.
@@ -229,16 +243,15 @@ std::vector<std::array<std::uint32_t, 3>> readTriangles(StreamsReader& reader, s
 
 void addLists(StreamsWriter& writer, const std::vector<std::uint32_t>& lists) {
   if (lists.empty()) return;
-  ListParts parts;
-  std::uint32_t end = 0;
-  for (std::size_t at = 0; at < lists.size();) {
-    const std::size_t words = listWords(lists, at);  // not 0, because a field has checked its lists
-    splitList(std::span(lists).subspan(at, words), end, parts);
-    at += words;
+  const Bytes bytes = bytesOf(lists);
+  const std::optional<ListParts> parts = sortedLists(lists);
+  if (!parts) {
+    writer.addNumber(std::uint8_t(Form::bytes));
+    return writer.add(bytes);
   }
   StreamsWriter split;
-  addParts(split, parts);
-  addSmaller(writer, bytesOf(lists), split);
+  addParts(split, *parts);
+  addSmaller(writer, bytes, split);
 }
 
 std::vector<std::uint32_t> readLists(StreamsReader& reader, std::uint64_t words) {
