@@ -9,12 +9,14 @@
 #include <iterator>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../support/made_meshes.h"
 #include "../support/random_field.h"
 #include "../support/temporary_directory.h"
 #include "../support/test_mesh.h"
+#include "field/io/quantized_streams.h"
 #include "field/query/quantized.h"
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
@@ -98,6 +100,25 @@ TEST(CompressedField, everyKindOfCoefficientsIsKept) {
     expectRoundTrip(field);
     EXPECT_LT(saved(field, kCompressed).size(), 0.85 * double(saved(field).size())) << int(type);
   }
+}
+
+/// Leaves with steps of their own, some of them wide, are taken apart into integers like all others.
+TEST(CompressedField, wideLeavesAreKept) {
+  const Field field = randomField(5, {.maxDepth = 2, .minDegree = 0, .maxDegree = 6});
+  std::mt19937_64 random(3);
+  std::vector<double> steps(field.data().nodes.size());
+  for (double& step : steps) step = std::exp2(-std::uniform_real_distribution<double>(6, 28)(random));
+  query::Quantized quantized = query::quantized(field.data(), steps).value();
+  EXPECT_TRUE(std::ranges::any_of(quantized.nodes, node::isWide));
+  FieldData data = field.data();
+  data.nodes = std::move(quantized.nodes);
+  data.coefficients = std::move(quantized.coefficients);
+  io::StreamsWriter streams;
+  std::vector<std::uint64_t> leaves;
+  for (const std::uint64_t node : data.nodes)
+    if (node::isLeaf(node)) leaves.push_back(node & ~std::uint64_t{0xffffffff});
+  EXPECT_TRUE(io::addQuantized(streams, std::get<QuantizedCoefficients>(data.coefficients), leaves));
+  expectRoundTrip(Field(std::move(data)));
 }
 
 TEST(CompressedField, everyKindOfFieldIsKept) {

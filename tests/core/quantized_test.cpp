@@ -14,7 +14,7 @@
 
 #include "basis/orthonormal.h"
 #include "basis/projection.h"
-#include "field/cells/round_coefficients.h"
+#include "field/precision/round_coefficients.h"
 #include "field/query/float_coefficients.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"

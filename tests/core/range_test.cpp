@@ -91,7 +91,9 @@ FieldData dataOf(Field field) { return std::move(field).data(); }
 
 Field quantizedField(const Field& field) {
   FieldData data = field.data();
-  EXPECT_TRUE(query::quantize(data, 1e-5));
+  query::Quantized quantized = query::quantized(data, std::vector<double>(data.nodes.size(), 1e-5)).value();
+  data.nodes = std::move(quantized.nodes);
+  data.coefficients = std::move(quantized.coefficients);
   return Field(std::move(data));
 }
 

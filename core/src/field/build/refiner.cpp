@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "basis/projection.h"
 #include "field/cells/probes.h"
-#include "field/cells/round_coefficients.h"
+#include "field/precision/round_coefficients.h"
+#include "field/query/quantized.h"
 #include "hpsdf/detail/triangle_search.h"
 #include "hpsdf/error.h"
 
@@ -170,6 +172,27 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
     for (std::uint32_t child = first; child < first + 8; ++child) state.totals.add(tree.nodes[child].fit.error);
   }
   countStep();
+}
+
+/// Returns the bytes of the quantized coefficients of a field that is made from the present tree; infinity if they
+/// cannot be quantized. `rms` is the estimated RMS error.
+static double quantizedBytes(const BuildTree& tree, const QuantizationLimits& limits, double rms) {
+  QuantizedPart part;
+  const auto forEachLeaf = [&](const auto& f) {
+    for (const BuildNode& node : tree.nodes)
+      if (node.firstChild == 0 && !node.fit.isExact()) f(node);
+  };
+  forEachLeaf(
+      [&](const BuildNode& node) { part.add(tree.boxOf(node).volume(), double(node.fit.coefficients.size())); });
+  const double forRms = part.stepForRms(rms);
+  double bytes = 0;
+  forEachLeaf([&](const BuildNode& node) {
+    const Fit& fit = node.fit;
+    const double step = std::min(forRms, limits.greatestStep(fit.coefficients, fit.degree));
+    bytes +=
+        step > 0 ? query::quantizedBytes(fit.coefficients, fit.degree, step) : std::numeric_limits<double>::infinity();
+  });
+  return bytes;
 }
 
 void Refiner::countCoefficientBytes() {

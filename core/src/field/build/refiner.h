@@ -9,7 +9,7 @@
 #include "field/build/limits.h"
 #include "field/cells/build_tree.h"
 #include "field/cells/exact_leaves.h"
-#include "field/cells/round_coefficients.h"
+#include "field/precision/round_coefficients.h"
 
 namespace hpsdf::detail {
 

@@ -15,7 +15,7 @@
 #include "field/build/least_bytes.h"
 #include "field/build/limits.h"
 #include "field/cells/cell_bounds.h"
-#include "field/cells/round_coefficients.h"
+#include "field/precision/round_coefficients.h"
 #include "hpsdf/detail/build_settings.h"
 
 namespace hpsdf::detail {

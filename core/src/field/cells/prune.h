@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "field/cells/build_tree.h"
-#include "field/cells/round_coefficients.h"
 #include "field/nearness.h"
+#include "field/precision/round_coefficients.h"
 
 namespace hpsdf::detail {
 

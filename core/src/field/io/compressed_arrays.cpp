@@ -83,7 +83,7 @@ bool isPolynomial(std::uint64_t node) { return node::isLeaf(node) && !node::isEx
 struct NodeOrder {
   std::vector<std::uint32_t> depthFirst;   ///< all nodes
   std::vector<std::uint32_t> polynomials;  ///< leaves with a polynomial
-  std::vector<std::uint8_t> degrees;       ///< degrees of the polynomials
+  std::vector<std::uint64_t> leaves;       ///< the nodes of the polynomials, with offsets of 0
 
   /// Adds the polynomials of the finished depth-first order. Quantized ones are laid out by the index of their nodes.
   void addPolynomials(const std::vector<std::uint64_t>& nodes, bool areQuantized) {
@@ -91,7 +91,7 @@ struct NodeOrder {
       const std::uint32_t n = areQuantized ? i : depthFirst[i];
       if (!isPolynomial(nodes[n])) continue;
       polynomials.push_back(n);
-      degrees.push_back(std::uint8_t(node::degree(nodes[n])));
+      leaves.push_back(nodes[n] & ~kLowHalf);
     }
   }
 };
@@ -162,7 +162,7 @@ enum class QuantizedForm : std::uint8_t { bytes, integers };
 
 void addCoefficients(StreamsWriter& streams, const QuantizedCoefficients& coefficients, const NodeOrder& order) {
   StreamsWriter integers;
-  const bool areIntegers = addQuantized(integers, coefficients, order.degrees);
+  const bool areIntegers = addQuantized(integers, coefficients, order.leaves);
   streams.addNumber(std::uint8_t(areIntegers ? QuantizedForm::integers : QuantizedForm::bytes));
   if (areIntegers)
     streams.append(integers);
@@ -186,10 +186,11 @@ void readCoefficients(StreamsReader& reader, const FieldSizes& sizes, const Node
   std::uint8_t form = 0;
   reader.readNumber(form);
   reader.require(form <= std::uint8_t(QuantizedForm::integers), "its coefficients have an unknown form");
-  const bool haveDegrees = std::ranges::all_of(order.degrees, [](std::uint8_t p) { return p <= kMaxDegree; });
+  const bool haveDegrees =
+      std::ranges::all_of(order.leaves, [](std::uint64_t leaf) { return node::degree(leaf) <= kMaxDegree; });
   reader.require(haveDegrees, "a cell has an unknown degree");
   coefficients.bytes = QuantizedForm(form) == QuantizedForm::integers
-                           ? readQuantized(reader, sizes.coefficients, sizes.meanBits, order.degrees)
+                           ? readQuantized(reader, sizes.coefficients, sizes.meanBits, order.leaves)
                            : reader.read(sizes.coefficients);
 }
 

@@ -9,7 +9,7 @@ namespace hpsdf::io {
 namespace {
 
 constexpr int kWidthBits = QuantizedCoefficients::kWidthBits;
-constexpr int kMostBits = QuantizedCoefficients::kMostBits;
+constexpr int kMostBits = QuantizedCoefficients::kMostWideBits;
 constexpr std::size_t kPadding = QuantizedCoefficients::kPadding;
 
 std::size_t integersOfDegree(int d) { return std::size_t((d + 1) * (d + 2) / 2); }
@@ -50,12 +50,12 @@ class IntegerPlanes {
 /// The parts of quantized coefficients that are compressed one by one.
 struct Parts {
   std::array<Bytes, kMaxDegree + 1> widths;          ///< for each total degree from 1, those of all leaves
-  IntegerPlanes means;                               ///< the difference of each from the one before
+  std::array<IntegerPlanes, 2> means;                ///< of leaves that are not wide, and of wide ones
   std::array<IntegerPlanes, kMostBits + 1> ofWidth;  ///< the integers of each width from 1
-  std::uint32_t meanBits;
+  std::array<std::uint32_t, 2> meanBits;
 
-  explicit Parts(std::uint32_t bits) : meanBits(bits) {
-    means.setWidth(bits);
+  explicit Parts(std::uint32_t bits) : meanBits{bits, QuantizedCoefficients::kMostMeanBits} {
+    for (std::size_t kind = 0; kind < means.size(); ++kind) means[kind].setWidth(meanBits[kind]);
     for (std::uint32_t width = 1; width < ofWidth.size(); ++width) ofWidth[width].setWidth(width);
   }
 };
@@ -85,13 +85,20 @@ std::uint32_t lowestBits(std::uint64_t bits, std::uint32_t width) {
   return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << width) - 1));
 }
 
-/// Takes a leaf apart.
-void splitLeaf(const query::LeafBits& leaf, int degree, std::uint32_t& mean, Parts& parts) {
+/// The means of the last leaf that was not wide, and of the last wide one. Each mean is stored as the difference from
+/// the one before.
+using LastMeans = std::array<std::uint32_t, 2>;
+
+/// Takes a leaf apart. `node` is the packed node.
+void splitLeaf(const query::LeafBits& leaf, std::uint64_t node, LastMeans& means, Parts& parts) {
+  const int degree = node::degree(node);
+  const std::size_t kind = node::isWide(node) ? 1 : 0;
+  const std::uint32_t meanBits = parts.meanBits[kind];
   std::uint64_t position = std::uint64_t(degree) * kWidthBits;
-  const std::uint32_t meanBefore = mean;
-  mean = lowestBits(leaf.read(position), parts.meanBits);
-  parts.means.push(lowestBits(mean - meanBefore, parts.meanBits));
-  position += parts.meanBits;
+  const std::uint32_t meanBefore = means[kind];
+  means[kind] = lowestBits(leaf.read(position), meanBits);
+  parts.means[kind].push(lowestBits(means[kind] - meanBefore, meanBits));
+  position += meanBits;
   for (int d = 1; d <= degree; ++d) {
     const std::uint32_t width = lowestBits(leaf.read(std::uint64_t(d - 1) * kWidthBits), kWidthBits);
     parts.widths[d].push_back(std::uint8_t(width));
@@ -101,12 +108,14 @@ void splitLeaf(const query::LeafBits& leaf, int degree, std::uint32_t& mean, Par
   }
 }
 
-/// Puts together the next leaf, whose mean follows `mean`. `next` counts the leaves of each degree or a higher one.
-void joinLeaf(Parts& parts, int degree, std::uint32_t& mean, std::array<std::size_t, kMaxDegree + 1>& next,
+/// Puts together the next leaf. `next` counts the leaves of each degree or a higher one.
+void joinLeaf(Parts& parts, std::uint64_t node, LastMeans& means, std::array<std::size_t, kMaxDegree + 1>& next,
               BitString& out) {
+  const int degree = node::degree(node);
+  const std::size_t kind = node::isWide(node) ? 1 : 0;
   for (int d = 1; d <= degree; ++d) out.push(parts.widths[d][next[d]], kWidthBits);
-  mean = lowestBits(std::uint64_t{mean} + parts.means.next(), parts.meanBits);
-  out.push(mean, parts.meanBits);
+  means[kind] = lowestBits(std::uint64_t{means[kind]} + parts.means[kind].next(), parts.meanBits[kind]);
+  out.push(means[kind], parts.meanBits[kind]);
   for (int d = 1; d <= degree; ++d) {
     const std::uint32_t width = parts.widths[d][next[d]++];
     if (width == 0) continue;
@@ -115,14 +124,14 @@ void joinLeaf(Parts& parts, int degree, std::uint32_t& mean, std::array<std::siz
   out.fillByte();
 }
 
-/// Returns the bytes of leaves of the given degrees and the padding. `size` is their number as far as it is known.
-Bytes joined(Parts& parts, std::span<const std::uint8_t> degrees, std::size_t size) {
+/// Returns the bytes of leaves and the padding. `size` is their number as far as it is known.
+Bytes joined(Parts& parts, std::span<const std::uint64_t> leaves, std::size_t size) {
   Bytes bytes;
   bytes.reserve(size);
   BitString out(bytes);
-  std::uint32_t mean = 0;
+  LastMeans means{};
   std::array<std::size_t, kMaxDegree + 1> next{};
-  for (const std::uint8_t degree : degrees) joinLeaf(parts, degree, mean, next, out);
+  for (const std::uint64_t leaf : leaves) joinLeaf(parts, leaf, means, next, out);
   bytes.resize(bytes.size() + kPadding);
   return bytes;
 }
@@ -136,8 +145,8 @@ std::array<std::uint64_t, kMostBits + 1> countWidths(const Parts& parts) {
 }
 
 /// Returns the number of bits of all leaves.
-std::uint64_t countBits(const Parts& parts, std::size_t leaves) {
-  std::uint64_t bits = std::uint64_t{leaves} * parts.meanBits;
+std::uint64_t countBits(const Parts& parts, const std::array<std::uint64_t, 2>& leaves) {
+  std::uint64_t bits = leaves[0] * parts.meanBits[0] + leaves[1] * parts.meanBits[1];
   for (const Bytes& widths : parts.widths) bits += std::uint64_t{widths.size()} * kWidthBits;
   const auto counts = countWidths(parts);
   for (std::size_t width = 1; width < counts.size(); ++width) bits += counts[width] * width;
@@ -145,12 +154,12 @@ std::uint64_t countBits(const Parts& parts, std::size_t leaves) {
 }
 
 /// Reads the widths. Their numbers follow from the degrees of the leaves.
-void readWidths(StreamsReader& reader, std::span<const std::uint8_t> degrees, Parts& parts) {
+void readWidths(StreamsReader& reader, std::span<const std::uint64_t> leaves, Parts& parts) {
   std::array<std::size_t, kMaxDegree + 1> counts{};
   std::size_t all = 0;
-  for (const std::uint8_t degree : degrees) {
-    for (int d = 1; d <= degree; ++d) ++counts[d];
-    all += degree;
+  for (const std::uint64_t leaf : leaves) {
+    for (int d = 1; d <= node::degree(leaf); ++d) ++counts[d];
+    all += std::size_t(node::degree(leaf));
   }
   const Bytes widths = reader.read(all);
   reader.require(std::ranges::all_of(widths, [](std::uint8_t width) { return width <= kMostBits; }),
@@ -163,37 +172,40 @@ void readWidths(StreamsReader& reader, std::span<const std::uint8_t> degrees, Pa
 }  // namespace
 
 bool addQuantized(StreamsWriter& writer, const QuantizedCoefficients& coefficients,
-                  std::span<const std::uint8_t> degrees) {
+                  std::span<const std::uint64_t> leaves) {
   Parts parts(coefficients.meanBits);
-  std::uint32_t mean = 0, offset = 0;
-  for (const std::uint8_t degree : degrees) {
-    const std::size_t size = query::quantizedLeafBytes(coefficients, node::leaf(degree, offset));
+  LastMeans means{};
+  std::uint32_t offset = 0;
+  for (const std::uint64_t leaf : leaves) {
+    const std::size_t size = query::quantizedLeafBytes(coefficients, leaf | offset);
     if (size == 0) return false;
-    splitLeaf({coefficients.bytes.data() + offset}, degree, mean, parts);
+    splitLeaf({coefficients.bytes.data() + offset}, leaf, means, parts);
     offset += std::uint32_t(size);
   }
-  if (joined(parts, degrees, coefficients.bytes.size()) != coefficients.bytes) return false;
+  if (joined(parts, leaves, coefficients.bytes.size()) != coefficients.bytes) return false;
   Bytes widths;
   for (const Bytes& ofDegree : parts.widths) widths.insert(widths.end(), ofDegree.begin(), ofDegree.end());
   writer.add(widths);
-  parts.means.add(writer);
+  for (const IntegerPlanes& ofKind : parts.means) ofKind.add(writer);
   for (const IntegerPlanes& integers : parts.ofWidth) integers.add(writer);
   return true;
 }
 
 Bytes readQuantized(StreamsReader& reader, std::uint64_t size, std::uint32_t meanBits,
-                    std::span<const std::uint8_t> degrees) {
+                    std::span<const std::uint64_t> leaves) {
   reader.require(meanBits >= 1 && meanBits <= QuantizedCoefficients::kMostMeanBits,
                  "the width of its coefficients is out of range");
   Parts parts(meanBits);
-  readWidths(reader, degrees, parts);
+  readWidths(reader, leaves, parts);
+  const auto wide = std::uint64_t(std::ranges::count_if(leaves, node::isWide));
+  const std::array<std::uint64_t, 2> counts = {leaves.size() - wide, wide};
   // Every leaf ends with a whole byte, so that the bits bound the size before memory is taken.
-  const std::uint64_t least = countBits(parts, degrees.size()) / 8 + kPadding;
-  reader.require(least <= size && size <= least + 1 + degrees.size(), "its coefficients have another size");
-  parts.means.read(reader, degrees.size());
-  const auto counts = countWidths(parts);
-  for (std::size_t width = 1; width < counts.size(); ++width) parts.ofWidth[width].read(reader, counts[width]);
-  Bytes bytes = joined(parts, degrees, size);
+  const std::uint64_t least = countBits(parts, counts) / 8 + kPadding;
+  reader.require(least <= size && size <= least + 1 + leaves.size(), "its coefficients have another size");
+  for (std::size_t kind = 0; kind < counts.size(); ++kind) parts.means[kind].read(reader, counts[kind]);
+  const auto ofWidth = countWidths(parts);
+  for (std::size_t width = 1; width < ofWidth.size(); ++width) parts.ofWidth[width].read(reader, ofWidth[width]);
+  Bytes bytes = joined(parts, leaves, size);
   reader.require(bytes.size() == size, "its coefficients have another size");
   return bytes;
 }

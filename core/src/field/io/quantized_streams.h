@@ -9,14 +9,14 @@
 
 namespace hpsdf::io {
 
-/// Adds the coefficients as streams of widths and of integers, if they are leaves of the given degrees one after the
-/// other. Integers of the same width stand together, because they have the same distribution. Returns false, and adds
-/// nothing, if `joinedQuantized` would not return the same bytes.
+/// Adds the coefficients as streams of widths and of integers, if they are those of the given leaves one after the
+/// other. `leaves` are packed nodes whose offsets are 0. Integers of the same width stand together, because they have
+/// the same distribution. Returns false, and adds nothing, if `readQuantized` would not return the same bytes.
 bool addQuantized(StreamsWriter& writer, const QuantizedCoefficients& coefficients,
-                  std::span<const std::uint8_t> degrees);
+                  std::span<const std::uint64_t> leaves);
 
 /// Reads the streams of `addQuantized`, and returns the `size` bytes of the coefficients.
 Bytes readQuantized(StreamsReader& reader, std::uint64_t size, std::uint32_t meanBits,
-                    std::span<const std::uint8_t> degrees);
+                    std::span<const std::uint64_t> leaves);
 
 }  // namespace hpsdf::io

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "field/cells/cell_fit.h"
-#include "field/cells/round_coefficients.h"
 #include "field/cells/surface_points.h"
+#include "field/precision/round_coefficients.h"
 #include "field/tolerance/cell_lattice.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/distance_function.h"

@@ -5,7 +5,6 @@
 #include <limits>
 #include <span>
 
-#include "field/cells/build_tree.h"
 #include "hpsdf/detail/field_data.h"
 
 namespace hpsdf::detail {
@@ -53,10 +52,6 @@ struct QuantizedPart {
   /// there are no polynomials.
   double stepForRms(double rms) const;
 };
-
-/// Returns the bytes of a field's quantized coefficients, made from the present tree; infinity if they cannot be
-/// quantized. `rms` is the estimated RMS error.
-double quantizedBytes(const BuildTree& tree, const QuantizationLimits& limits, double rms);
 
 /// Rounds the coefficients of a field, and the vertices of its exact leaves, from double to `type`. Vertices that are
 /// floats already are stored as floats in any case. Sets `roundingRms` and `measuredError` in the field's metadata.

@@ -1,4 +1,4 @@
-#include "field/cells/round_coefficients.h"
+#include "field/precision/round_coefficients.h"
 
 #include <algorithm>
 #include <cmath>
@@ -163,24 +163,6 @@ double QuantizationLimits::greatestStep(std::span<const double> coefficients, in
 double QuantizedPart::stepForRms(double rms) const {
   // An integer is wrong by half at most, with a mean square of 1/12.
   return volume > 0 ? kShareOfRms * rms * std::sqrt(12 * volume / integers) : kUnlimitedChange;
-}
-
-double quantizedBytes(const BuildTree& tree, const QuantizationLimits& limits, double rms) {
-  QuantizedPart part;
-  const auto forEachLeaf = [&](const auto& f) {
-    for (const BuildNode& node : tree.nodes)
-      if (node.firstChild == 0 && !node.fit.isExact()) f(node);
-  };
-  forEachLeaf(
-      [&](const BuildNode& node) { part.add(tree.boxOf(node).volume(), double(node.fit.coefficients.size())); });
-  const double forRms = part.stepForRms(rms);
-  double bytes = 0;
-  forEachLeaf([&](const BuildNode& node) {
-    const Fit& fit = node.fit;
-    const double step = std::min(forRms, limits.greatestStep(fit.coefficients, fit.degree));
-    bytes += step > 0 ? query::quantizedBytes(fit.coefficients, fit.degree, step) : kUnlimitedChange;
-  });
-  return bytes;
 }
 
 void roundCoefficients(CoefficientType type, FieldData& field, double mostBytes) {
