@@ -51,6 +51,7 @@ void writeFields(const fs::path& folder) {
   add("double", [](BuildOptions& o) { o.targetError = 1e-4, o.coefficients = CoefficientType::float64; });
   add("float", [](BuildOptions& o) { o.coefficients = CoefficientType::float32; });
   add("quantized", [](BuildOptions& o) { o.targetError = 1e-4, o.coefficients = CoefficientType::quantized; });
+  add("shifted", [](BuildOptions& o) { o.targetError = 1e-3, o.maxError = 0.01, o.maxDegree = 3; });
   add("band", [](BuildOptions& o) { o.targetError = 1e-4, o.band = 0.2; });
   add("bounds", [](BuildOptions& o) { o.bounds = true; });
   add("blended", [](BuildOptions& o) { o.targetError = 1e-4, o.blend = 0.1, o.bounds = true; });
