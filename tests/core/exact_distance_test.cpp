@@ -484,6 +484,53 @@ TEST(ExactDistance, reportsFeatureAndLowestTriangle) {
   EXPECT_EQ(center.signedDistance, -1);
 }
 
+TEST(ExactDistance, gradientsAreThoseOfTheDistance) {
+  const TriangleMesh mesh = box(Vector3(1, 0.7, 0.4));
+  for (const InsideTest test : {InsideTest::pseudonormal, InsideTest::winding, InsideTest::shell}) {
+    const ExactDistance distance(mesh, {.insideTest = test, .thickness = test == InsideTest::shell ? 0.1 : 0});
+    ASSERT_TRUE(distance.hasGradients());
+    Random random(23);
+    std::vector<Vector3> points(1000), gradients(points.size());
+    std::vector<double> values(points.size());
+    for (Vector3& x : points) x = random.inCube(1.5);
+    distance.withGradients(points, values, gradients);
+    int compared = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(values[i], distance(points[i]));
+      EXPECT_NEAR(gradients[i].norm(), 1, 1e-12);
+      constexpr double kStep = 1e-5;
+      Vector3 expected;
+      for (int axis = 0; axis < 3; ++axis) {
+        const Vector3 step = kStep * Vector3::Unit(axis);
+        expected[axis] = (distance(points[i] + step) - distance(points[i] - step)) / (2 * kStep);
+      }
+      if (std::abs(expected.norm() - 1) > 1e-6) continue;  // a kink lies within the step
+      EXPECT_LT((gradients[i] - expected).norm(), 1e-4) << points[i].transpose();
+      ++compared;
+    }
+    EXPECT_GT(compared, 990);
+  }
+}
+
+TEST(ExactDistance, gradientOnTheSurfaceIsItsNormal) {
+  const ExactDistance distance(box(Vector3(1, 1, 1)));
+  const std::vector<Vector3> points = {{0.5, -0.25, 1}, {-1, 0.125, 0.5}, {1, 0.25, 1}};
+  std::vector<Vector3> gradients(points.size());
+  std::vector<double> values(points.size());
+  distance.withGradients(points, values, gradients);
+  EXPECT_EQ(values, std::vector<double>(points.size(), 0.0));
+  EXPECT_EQ(gradients[0], Vector3(0, 0, 1));
+  EXPECT_EQ(gradients[1], Vector3(-1, 0, 0));
+  EXPECT_EQ(gradients[2].cwiseAbs().sum(), 1);  // on an edge, the normal of one of its triangles
+}
+
+TEST(ExactDistance, hasNoGradientsWhereOtherThingsThanTrianglesAreNearest) {
+  TriangleMesh open = box(Vector3(1, 1, 1));
+  open.triangles.pop_back();
+  EXPECT_FALSE(ExactDistance(open, {.insideTest = InsideTest::winding}).hasGradients());
+  EXPECT_FALSE(ExactDistance(box(Vector3(1, 1, 1)), {.insideTest = InsideTest::outerHull}).hasGradients());
+}
+
 TEST(ExactDistance, hasTheRightSignForRandomTetrahedra) {
   Random random(22);
   for (int i = 0; i < 200; ++i) {

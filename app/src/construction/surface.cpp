@@ -48,6 +48,10 @@ struct SharedDistance {
   std::shared_ptr<const ExactDistance> exact;
 
   void operator()(std::span<const Vector3> points, std::span<double> out) const { (*exact)(points, out); }
+  bool hasGradients() const { return exact->hasGradients(); }
+  void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const {
+    exact->withGradients(points, out, gradients);
+  }
   std::size_t bytes() const { return exact->bytes(); }
   const TriangleSearch& triangleSearch() const { return exact->triangleSearch(); }
 };

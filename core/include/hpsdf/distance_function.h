@@ -54,6 +54,10 @@ struct Source {
 /// batch lie close to each other, in a deterministic order. If the callable has a member function `Source
 /// source() const`, this function provides the source, unless the constructor gets another source.
 ///
+/// A callable that knows ∇Φ has two more member functions: `void withGradients(std::span<const Vector3> points,
+/// std::span<double> out, std::span<Vector3> gradients) const`, which evaluates both Φ and ∇Φ, and `bool hasGradients()
+/// const`, which tells whether this is possible. The construction of a field then evaluates Φ at far fewer points.
+///
 /// A callable that is passed as an lvalue is not copied, because it may be large. This object refers to the callable,
 /// which must outlive this object. A temporary callable is moved into this object.
 class DistanceFunction {
@@ -68,10 +72,12 @@ class DistanceFunction {
     using Callable = std::remove_cvref_t<F>;
     if constexpr (std::is_lvalue_reference_v<F>) {
       evaluate_ = adapt<Callable>([&f]() -> const Callable& { return f; });
+      gradients_ = gradientsOf<Callable>([&f]() -> const Callable& { return f; });
       triangleSearch_ = triangleSearchOf(f);
     } else {
       auto owned = std::make_shared<const Callable>(std::forward<F>(f));
       triangleSearch_ = triangleSearchOf(*owned);
+      gradients_ = gradientsOf<Callable>([owned]() -> const Callable& { return *owned; });
       evaluate_ = adapt<Callable>([owned = std::move(owned)]() -> const Callable& { return *owned; });
     }
   }
@@ -80,6 +86,16 @@ class DistanceFunction {
   void operator()(std::span<const Vector3> points, std::span<double> out) const {
     assert(points.size() == out.size());
     evaluate_(points, out);
+  }
+
+  /// Returns true if the callable offers the gradient of Φ.
+  bool hasGradients() const { return gradients_ != nullptr; }
+
+  /// Evaluates out[i] = Φ(points[i]) and gradients[i] = ∇Φ(points[i]) for all i. All spans must have the same length,
+  /// and `hasGradients` must be true. The values are those of `operator()`.
+  void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const {
+    assert(points.size() == out.size() && points.size() == gradients.size());
+    gradients_(points, out, gradients);
   }
 
   const Source& source() const { return source_; }
@@ -125,6 +141,23 @@ class DistanceFunction {
 
   using Batch = std::function<void(std::span<const Vector3>, std::span<double>)>;
 
+  using GradientBatch = std::function<void(std::span<const Vector3>, std::span<double>, std::span<Vector3>)>;
+
+  template <typename Callable, typename Get>
+  static GradientBatch gradientsOf(Get get) {
+    if constexpr (requires(const Callable& f, std::span<const Vector3> points, std::span<double> out,
+                           std::span<Vector3> gradients) {
+                    { f.hasGradients() } -> std::convertible_to<bool>;
+                    f.withGradients(points, out, gradients);
+                  }) {
+      if (get().hasGradients())
+        return [get](std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) {
+          get().withGradients(points, out, gradients);
+        };
+    }
+    return nullptr;
+  }
+
   template <typename Callable, typename Get>
   static Batch adapt(Get get) {
     if constexpr (std::invocable<const Callable&, std::span<const Vector3>, std::span<double>>) {
@@ -139,6 +172,7 @@ class DistanceFunction {
   }
 
   Batch evaluate_;
+  GradientBatch gradients_;
   Source source_;
   std::size_t bytes_;
   const TriangleSearch* triangleSearch_ = nullptr;

@@ -78,6 +78,17 @@ class ExactDistance {
   /// spans must have the same length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
 
+  /// Returns true if `withGradients` can be called: unless the signed distance is, at some points, the distance to
+  /// something other than the nearest triangle. That is the case for an outer hull, and near a hole that the winding
+  /// number closes.
+  bool hasGradients() const;
+
+  /// Evaluates the signed distance as `operator()` does, together with its gradient: a unit vector from the nearest
+  /// point of the surface to the query point, or the opposite one inside. Where rounding hides this direction, the
+  /// gradient is the normal of the nearest triangle. All spans must have the same length, and `hasGradients` must be
+  /// true.
+  void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const;
+
   /// Returns the point of the triangles that is nearest to x, together with the signed distance that `operator()`
   /// returns. For `InsideTest::outerHull` the triangles are those of the outer hull. For a shell, and near a hole that
   /// the winding number closes, the signed distance is not the distance to the returned point.

@@ -228,8 +228,22 @@ struct ExactDistance::Data {
     return signedAt(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
   }
 
-  /// Computes the distances of points to the nearest triangles of a hierarchy. `resolve` determines the signs.
-  void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out) const {
+  /// Returns the unit vector from the closest point on the nearest triangle to x. If x is so close to the triangle that
+  /// rounding decides about this direction, returns the triangle's normal, on the side of x.
+  static Vector3 directionFrom(const ClosestPoint& closest, const Hierarchy& triangles, const Vector3& x,
+                               const bvh::Nearest& nearest) {
+    constexpr double kRounding = 1e-8;  // far more than the relative rounding error of a closest point
+    const Vector3 difference = x - closest.point;
+    const double length = difference.norm();
+    if (closest.feature != Feature::face && length > kRounding * x.cwiseAbs().maxCoeff()) return difference / length;
+    const Vector3& normal = triangles.frames()[triangles.slotAt(nearest.triangleRef)].normal;
+    return nearest.point.height < 0 ? Vector3(-normal) : normal;
+  }
+
+  /// Computes the distances of points to the nearest triangles of a hierarchy. `resolve` determines the signs. If
+  /// `directions` is not empty, also computes the unit vectors from the nearest points of the triangles.
+  void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out,
+                   std::span<Vector3> directions = {}) const {
     using bvh::kPacket;
     std::array<bvh::Nearest, kPacket> nearest{};  // nearest triangles of the previous points; they bound the search
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
@@ -237,7 +251,11 @@ struct ExactDistance::Data {
       std::array<Vector3, kPacket> packet;
       for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
       nearestTriangles(triangles, packet, nearest);
-      for (std::size_t i = 0; i < count; ++i) out[first + i] = resolve(triangles, packet[i], nearest[i]).signedDistance;
+      for (std::size_t i = 0; i < count; ++i) {
+        const ClosestPoint closest = resolve(triangles, packet[i], nearest[i]);
+        out[first + i] = closest.signedDistance;
+        if (!directions.empty()) directions[first + i] = directionFrom(closest, triangles, packet[i], nearest[i]);
+      }
     }
   }
 
@@ -303,6 +321,28 @@ void ExactDistance::operator()(std::span<const Vector3> points, std::span<double
   assert(points.size() == out.size());
   data_->toTriangles(data_->hierarchy, points, out);
   data_->applyInsideTest(points, out);
+}
+
+bool ExactDistance::hasGradients() const {
+  switch (data_->inside.choice.insideTest) {
+    case InsideTest::pseudonormal:
+    case InsideTest::shell:
+      return true;
+    case InsideTest::winding:
+      return data_->inside.winding.isClosed();
+    default:
+      return false;
+  }
+}
+
+void ExactDistance::withGradients(std::span<const Vector3> points, std::span<double> out,
+                                  std::span<Vector3> gradients) const {
+  assert(points.size() == out.size() && points.size() == gradients.size() && hasGradients());
+  data_->toTriangles(data_->hierarchy, points, out, gradients);
+  data_->applyInsideTest(points, out);
+  if (data_->inside.choice.insideTest == InsideTest::shell) return;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (out[i] < 0) gradients[i] = -gradients[i];
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
