@@ -202,7 +202,8 @@ TEST(CellHistory, tellsThatTheDistanceIsAnother) {
 TEST(CellHistory, comparesWhatTheConstructionCompared) {
   const TriangleMesh mesh = loadMesh("builtin:torus,major=0.7,minor=0.25,segments=24,sides=12");
   const ExactDistance distance(mesh);
-  const Field field = build(distance, domainAround(mesh), {.targetError = 1e-7, .grid = {3, 3, 3}});
+  const BuildOptions options{.targetError = 1e-7, .grid = {3, 3, 3}, .cubature = CubatureKind::compact};
+  const Field field = build(distance, domainAround(mesh), options);
   std::size_t raised = 0, divided = 0;
   for (const Vector3& x : kPlaces)
     for (const CellStep& step : cellHistory(field, distance, x).steps) {
@@ -213,6 +214,24 @@ TEST(CellHistory, comparesWhatTheConstructionCompared) {
     }
   EXPECT_GT(raised, 0U);
   EXPECT_GT(divided, 0U);
+}
+
+/// A cell that is raised because of its own samples has no trial of its children to be compared with.
+TEST(CellHistory, tellsOfCellsThatAreRaisedAtOnce) {
+  const TriangleMesh mesh = loadMesh("builtin:torus,major=0.7,minor=0.25,segments=24,sides=12");
+  const ExactDistance distance(mesh);
+  const Field field = build(distance, domainAround(mesh), {.targetError = 1e-7, .grid = {3, 3, 3}});
+  std::size_t raised = 0;
+  for (const Vector3& x : kPlaces) {
+    const CellHistory history = cellHistory(field, distance, x);
+    EXPECT_TRUE(history.agrees);
+    for (const CellStep& step : history.steps)
+      if (step.choice == CellChoice::raise && step.degreeTrial && !step.octreeTrial) {
+        EXPECT_EQ(step.degree, 2);
+        ++raised;
+      }
+  }
+  EXPECT_GT(raised, 0U);
 }
 
 TEST(CellHistory, refusesFieldsThatWereChanged) {

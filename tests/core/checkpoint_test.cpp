@@ -97,7 +97,7 @@ std::vector<BuildOptions> everyWay() {
 std::vector<BuildOptions> everyWayToExactLeaves() {
   std::vector<BuildOptions> ways = {
       {.targetError = 1e-5, .grid = {3, 3, 3}},
-      {.targetError = 1e-3, .grid = {3, 3, 3}, .criterion = Criterion::optimal},
+      {.targetError = 1e-4, .grid = {3, 3, 3}, .criterion = Criterion::optimal},
       {.targetError = 0, .grid = {3, 3, 3}, .maxError = 0.1},
       {.targetError = 0, .grid = {3, 3, 3}, .maxBytes = 100000, .criterion = Criterion::optimal},
       {.targetError = 1e-3, .grid = {3, 3, 3}, .continuityWeight = 0.1, .blend = 0.1, .bounds = true},

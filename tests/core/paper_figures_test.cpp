@@ -79,6 +79,18 @@ TEST(PaperFigures, bunny) {
   EXPECT_NEAR(measure(single, distance, options.nearness).rms, error.rms, 1e-3 * error.rms);
 }
 
+TEST(PaperFigures, bunnyByDefault) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  const ExactDistance distance(paperMesh("bunny_69k.obj"));
+  const BuildOptions options{.targetError = 1e-6};
+  const Field field = build(distance, paperDomain(), options);
+  EXPECT_LE(field.metadata().exactEvaluations, 2'150'000u);  // by values alone 4.43 million
+  EXPECT_LE(field.bytes(), 4.25e6);
+  const TrueError error = measure(field, distance, options.nearness);
+  EXPECT_LE(error.rms, 3.8e-4);
+  EXPECT_LE(error.largest, 3e-2);
+}
+
 TEST(PaperFigures, bunnyByProductsOfGaussRules) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const ExactDistance distance(paperMesh("bunny_69k.obj"));

@@ -72,7 +72,7 @@ TEST(Projection, meanSquareSatisfiesParsevalsIdentity) {
       4, [&](int i, int j, int k, int index) { parseval += c[index] * c[index] * basis::squaredNorm(i, j, k); });
   for (const auto& project :
        {basis::productProjection(basis::gaussLegendre(5), 4), basis::matrixProjection(*basis::compactCubature(8), 4)})
-    EXPECT_NEAR(project->meanSquare(sampled(c, 4, project->points())), parseval, 1e-13);
+    EXPECT_NEAR(project->meanSquare(sampled(c, 4, project->points()), c), parseval, 1e-13);
 }
 
 TEST(Projection, joinedChildrenAreTheParent) {

@@ -77,10 +77,15 @@ enum class TrialSamples : std::uint8_t {
   own,
 };
 
-/// The kind of quadrature rule that selects the sample points in a cell.
+/// The kind of rule that selects the sample points in a cell.
 enum class CubatureKind : std::uint8_t {
   compact,  ///< symmetric rules with about half as many points as `product`; above order 13, `product`
   product,  ///< the tensor product of Gauss rules (the paper)
+  /// For degrees 2 to 5, and if Φ offers its gradient (`DistanceFunction::hasGradients`): 14 to 58 points at which Φ
+  /// and its gradient are evaluated, whatever `BuildOptions::quadrature` says. Else `compact`, and also for
+  /// `Estimator::embedded`, which would believe these fits too easily. A cell of degree 2 whose samples show that
+  /// degree 3 leaves little of its error is raised without a trial of its children, except with `TrialSamples::own`.
+  gradients,
 };
 
 /// Greatest allowed weight λ of weak continuity, a post-process that reduces the jumps of a field between leaves. With
@@ -197,7 +202,7 @@ struct BuildOptions {
   /// together where dividing would hardly shorten the list. A leaf of the greatest depth may have more.
   int exactTriangles = 64;
   int quadrature = 3;  ///< order of the quadrature as a multiple of the degree p, 2 to 8; the paper uses 4
-  CubatureKind cubature = CubatureKind::compact;
+  CubatureKind cubature = CubatureKind::gradients;
   TrialSamples trialSamples = TrialSamples::children;
   /// Width of the narrow band around the surface, in the field's own units; 0: no band. Cells that lie wholly
   /// outside the band are not refined and do not count towards the estimated error ε.

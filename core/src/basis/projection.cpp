@@ -155,7 +155,7 @@ std::vector<double> joinedAlong(int axis, const std::vector<double>& below, cons
 
 }  // namespace
 
-double Projection::meanSquare(std::span<const double> samples) const {
+double Projection::meanSquare(std::span<const double> samples, std::span<const double> /*coefficients*/) const {
   double total = 0;
   for (std::size_t s = 0; s < samples.size(); ++s) total += cubature_.weights[s] * samples[s] * samples[s];
   return total / 8;

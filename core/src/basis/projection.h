@@ -56,11 +56,17 @@ class Projection {
   const std::vector<Vector3>& points() const { return cubature_.points; }
   int degree() const { return degree_; }
 
+  /// Returns true if a sample consists of four numbers: the function's value and its derivatives along the three axes
+  /// of [-1, 1]³. Else it is the value alone.
+  virtual bool takesGradients() const { return false; }
+  std::size_t numbersPerPoint() const { return takesGradients() ? 4 : 1; }
+
   /// Returns the n(p) coefficients of the projection, given one sample at each point.
   virtual std::vector<double> operator()(std::span<const double> samples) const = 0;
 
-  /// Returns the mean square of a function over the cell, computed from samples of the function by the cubature.
-  double meanSquare(std::span<const double> samples) const;
+  /// Returns the mean square of a function over the cell, computed from its samples. `coefficients` are those of the
+  /// projection of these samples.
+  virtual double meanSquare(std::span<const double> samples, std::span<const double> coefficients) const;
 
  protected:
   Projection(Cubature cubature, int degree) : cubature_(std::move(cubature)), degree_(degree) {}

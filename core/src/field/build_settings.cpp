@@ -278,9 +278,13 @@ const std::vector<Row> kRows = {
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,
      "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of the distances "
      "for the same error."},
-    {"cubature", kMethod, choice({"compact", "product"}).stored(20).advanced(), member<&BuildOptions::cubature>,
-     "Rule by which cells are sampled: compact needs half the points for the same order where such rules are known "
-     "(orders up to 13); product takes Gauss points along each axis, as the paper does."},
+    {"cubature", kMethod, choice({"compact", "product", "gradients"}).stored(20).advanced(),
+     member<&BuildOptions::cubature>,
+     "Rule by which cells are sampled: product takes Gauss points along each axis, as the paper does; compact needs "
+     "half "
+     "the points for the same order where such rules are known (orders up to 13); gradients takes the distance and its "
+     "gradient at still fewer points, for degrees 2 to 5, and is compact for other degrees, for analytic:SHAPE, for "
+     "meshes with holes and for the estimator embedded."},
     {"trial-samples", kMethod, choice({"children", "own"}).stored(21).hidden(), member<&BuildOptions::trialSamples>,
      ""},
     {"band", kResult, number().atLeast(0).in("world units").stored(7).advanced(), member<&BuildOptions::band>,

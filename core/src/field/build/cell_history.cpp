@@ -34,7 +34,7 @@ class CellMeasure {
     constexpr std::uint64_t kSeed = 31;
     for (std::size_t i = 0; i < kPoints; ++i)
       local_.push_back(Random(kSeed, i).inBox(Box(-Vector3::Ones(), Vector3::Ones())));
-    exact_ = sampleCells(distance, {&cell, 1}, local_, {}, progress);
+    exact_ = sampleCell(distance, cell, local_, progress);
   }
 
   void rate(const Fit& fit, CellStep& step) const {

@@ -86,6 +86,7 @@ std::uint64_t digestOf(const DistanceFunction& distance, const Box& domain) {
     distance(points, values);
     for (const double value : values) digest.add(value);
   }
+  digest.add(distance.hasGradients());
   return digest.value();
 }
 
@@ -107,8 +108,17 @@ void checkTimes(const Checkpoint& checkpoint) {
 
 /// Bits that describe a cell in the checkpoint file: kFitted and kCached tell whether its polynomial and its
 /// cached projection follow; kOutsideBand and kNear tell where the cell lies; kFinal and kExact tell that the cell is
-/// without error, and that its triangles follow.
-enum : std::uint8_t { kFitted = 1, kOutsideBand = 2, kNear = 4, kCached = 8, kFinal = 16, kExact = 32, kAllBits = 63 };
+/// without error, and that its triangles follow; kRaisesAtOnce tells that the cell needs no trial of its children.
+enum : std::uint8_t {
+  kFitted = 1,
+  kOutsideBand = 2,
+  kNear = 4,
+  kCached = 8,
+  kFinal = 16,
+  kExact = 32,
+  kRaisesAtOnce = 64,
+  kAllBits = 127
+};
 
 // The functions named …Item and …Items work in both directions. With a `CheckedWriter` they write the state and
 // do not change it; with a `CheckedReader` they read and check it.
@@ -159,7 +169,8 @@ void fitItems(Stream& stream, Fit& fit, const FitLimits& limits) {
   const auto bit = [](bool set, std::uint8_t value) { return set ? value : std::uint8_t{0}; };
   auto parts = static_cast<std::uint8_t>(bit(!fit.coefficients.empty(), kFitted) | bit(fit.outsideBand, kOutsideBand) |
                                          bit(fit.error.near, kNear) | bit(!fit.cached.coefficients.empty(), kCached) |
-                                         bit(fit.isFinal, kFinal) | bit(fit.isExact(), kExact));
+                                         bit(fit.isFinal, kFinal) | bit(fit.isExact(), kExact) |
+                                         bit(fit.raisesAtOnce, kRaisesAtOnce));
   stream.item(parts);
   stream.require(parts <= kAllBits, "a cell's bits are unknown");
   stream.require((parts & kExact) == 0 || (parts & (kFitted | kCached | kFinal)) == kFinal,
@@ -167,6 +178,7 @@ void fitItems(Stream& stream, Fit& fit, const FitLimits& limits) {
   fit.outsideBand = (parts & kOutsideBand) != 0;
   fit.error.near = (parts & kNear) != 0;
   fit.isFinal = (parts & kFinal) != 0;
+  fit.raisesAtOnce = (parts & kRaisesAtOnce) != 0;
   if ((parts & kExact) != 0) exactItems(stream, fit, limits.triangles);
   if ((parts & kFitted) != 0) {
     finiteItem(stream, fit.error.weighted);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "basis/gradient_projection.h"
 #include "field/nearness.h"
 #include "field/query/evaluate.h"
 #include "hpsdf/detail/random_points.h"
@@ -18,9 +19,11 @@ constexpr std::size_t kBatch = 512;
 
 /// Returns the projection for cells of degree p = `degree`. It projects samples of a cell onto polynomials of degree
 /// p+1; the number of samples suffices for this.
-std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildOptions& options) {
+std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildOptions& options, bool hasGradients) {
+  if (options.cubature == CubatureKind::gradients && options.estimator != Estimator::embedded && hasGradients)
+    if (auto projection = basis::gradientProjection(degree + 1)) return projection;
   const int order = std::max(options.quadrature * degree, 2 * (degree + 1));
-  if (options.cubature == CubatureKind::compact)
+  if (options.cubature != CubatureKind::product)
     if (const auto cubature = basis::compactCubature(order)) return basis::matrixProjection(*cubature, degree + 1);
   return basis::productProjection(basis::gaussLegendre(order / 2 + 1), degree + 1);
 }
@@ -54,6 +57,25 @@ std::vector<std::uint32_t> groupedOrder(const std::vector<Vector3>& points) {
   return order;
 }
 
+Vector3 pointIn(const Box& cell, const Vector3& local) {
+  return cell.center() + (cell.sizes() / 2).cwiseProduct(local);
+}
+
+/// Calls f(points, placeOf) for batches of `total` points, where pointAt(place) is a point and `placeOf(i)` the place
+/// of point number i of the batch. The points are taken in the order `order` or, if `order` is empty, as listed.
+template <typename PointAt, typename F>
+void inBatches(std::size_t total, const PointAt& pointAt, std::span<const std::uint32_t> order,
+               const Progress& progress, const F& f) {
+  std::array<Vector3, kBatch> points;
+  for (std::size_t first = 0; first < total; first += kBatch) {
+    progress.throwIfCancelled();
+    const std::size_t count = std::min(kBatch, total - first);
+    const auto placeOf = [&](std::size_t i) { return order.empty() ? first + i : order[first + i]; };
+    for (std::size_t i = 0; i < count; ++i) points[i] = pointAt(placeOf(i));
+    f(std::span<const Vector3>(points).first(count), placeOf);
+  }
+}
+
 /// The box of child number x + 2y + 4z.
 Box childBox(const Box& cell, int child) {
   const Vector3 centre = cell.center();
@@ -69,6 +91,15 @@ Box childBox(const Box& cell, int child) {
 
 /// Number of check points of a cell along an axis. They include the corners of the cell's eight children.
 constexpr int kCheckAxis = 3;
+
+/// Returns the check points of a cell in its local coordinates.
+std::vector<Vector3> checkLattice() {
+  std::vector<Vector3> lattice;
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y)
+      for (int x = -1; x <= 1; ++x) lattice.emplace_back(x, y, z);
+  return lattice;
+}
 
 /// Returns the part of the check points of a cell that are corners of one of its children.
 CheckPoints cornersOfChild(const CheckPoints& parent, int child) {
@@ -124,6 +155,11 @@ double squaredErrorAt(const Fit& fit, const Vector3& local, double exact) {
   return error * error;
 }
 
+void requireFinite(const Vector3& point, const Vector3& gradient) {
+  if (!gradient.allFinite())
+    refuse("the gradient of the signed distance is not finite at (", point.x(), ", ", point.y(), ", ", point.z(), ")");
+}
+
 double volumeOf(const Box& box) { return (box.max() - box.min()).prod(); }
 
 }  // namespace
@@ -142,61 +178,90 @@ void requireFinite(std::span<const Vector3> points, std::span<const double> dist
 CellFitter::CellFitter(const DistanceFunction& distance, const BuildOptions& options, const Nearness& nearness,
                        double nearDistance, const Progress& progress)
     : distance_(distance), options_(options), nearness_(nearness), nearDistance_(nearDistance), progress_(progress) {
-  if (options.estimator == Estimator::checked && distance.triangleSearch() != nullptr)
-    surface_.emplace(*distance.triangleSearch());
+  if (options.estimator != Estimator::checked) return;
+  checkLattice_ = checkLattice();
+  if (distance.triangleSearch() != nullptr) surface_.emplace(*distance.triangleSearch());
 }
 
 const CellFitter::Rules& CellFitter::rules(int degree) const {
   std::call_once(rulesMade_[degree], [&] {
-    auto projection = makeProjection(degree, options_);
-    std::vector<Vector3> childPoints;
-    childPoints.reserve(8 * projection->points().size());
+    auto projection = makeProjection(degree, options_, distance_.hasGradients());
+    std::vector<Vector3> ofOne = projection->points(), ofEight;
     for (int child = 0; child < 8; ++child) {
       const Box box = childBox(Box(-Vector3::Ones(), Vector3::Ones()), child);
-      for (const Vector3& point : projection->points()) childPoints.push_back(box.center() + point / 2);
+      for (const Vector3& point : projection->points()) ofEight.push_back(box.center() + point / 2);
     }
-    auto orderOfOne = groupedOrder(projection->points());
-    rules_[degree] =
-        std::make_unique<Rules>(Rules{std::move(projection), std::move(orderOfOne), groupedOrder(childPoints)});
+    for (std::vector<Vector3>* points : {&ofOne, &ofEight})
+      points->insert(points->end(), checkLattice_.begin(), checkLattice_.end());
+    rules_[degree] = std::make_unique<Rules>(Rules{std::move(projection), groupedOrder(ofOne), groupedOrder(ofEight)});
   });
   return *rules_[degree];
 }
 
-std::vector<double> sampleCells(const DistanceFunction& distance, std::span<const Box> cells,
-                                std::span<const Vector3> local, std::span<const std::uint32_t> order,
-                                const Progress& progress) {
-  std::vector<double> samples(cells.size() * local.size());
-  std::array<Vector3, kBatch> points;
-  std::array<double, kBatch> values;
-  for (std::size_t first = 0; first < samples.size(); first += kBatch) {
-    progress.throwIfCancelled();
-    const std::size_t count = std::min(kBatch, samples.size() - first);
-    const auto sampleAt = [&](std::size_t i) { return order.empty() ? first + i : order[first + i]; };
-    for (std::size_t i = 0; i < count; ++i) {
-      const Box& cell = cells[sampleAt(i) / local.size()];
-      points[i] = cell.center() + (cell.sizes() / 2).cwiseProduct(local[sampleAt(i) % local.size()]);
-    }
-    distance(std::span(points).first(count), std::span(values).first(count));
-    requireFinite(std::span(points).first(count), std::span(values).first(count));
-    for (std::size_t i = 0; i < count; ++i) samples[sampleAt(i)] = values[i];
-  }
+std::vector<double> sampleCell(const DistanceFunction& distance, const Box& cell, std::span<const Vector3> local,
+                               const Progress& progress) {
+  std::vector<double> samples(local.size());
+  const auto pointAt = [&](std::size_t place) { return pointIn(cell, local[place]); };
+  inBatches(local.size(), pointAt, {}, progress, [&](std::span<const Vector3> points, const auto& placeOf) {
+    const std::span<double> values = std::span(samples).subspan(placeOf(0), points.size());
+    distance(points, values);
+    requireFinite(points, values);
+  });
   return samples;
 }
 
-std::vector<double> CellFitter::sample(std::span<const Box> cells, std::span<const Vector3> local,
-                                       std::span<const std::uint32_t> order) const {
-  evaluations_ += cells.size() * local.size();
-  return sampleCells(distance_, cells, local, order, progress_);
+std::vector<double> CellFitter::distances(const Box& cell, std::span<const Vector3> local) const {
+  evaluations_ += local.size();
+  return sampleCell(distance_, cell, local, progress_);
+}
+
+CellFitter::Samples CellFitter::sample(const basis::Projection& projection, std::span<const Box> cells,
+                                       const Box& whole, std::span<const std::uint32_t> order) const {
+  const std::vector<Vector3>& local = projection.points();
+  const std::size_t count = cells.size() * local.size(), total = count + checkLattice_.size();
+  const auto pointAt = [&](std::size_t place) {
+    if (place >= count) return pointIn(whole, checkLattice_[place - count]);
+    return pointIn(cells[place / local.size()], local[place % local.size()]);
+  };
+  Samples samples;
+  samples.numbers.resize(count * projection.numbersPerPoint());
+  samples.check.local = checkLattice_;
+  samples.check.distances.resize(checkLattice_.size());
+  std::array<double, kBatch> values;
+  std::array<Vector3, kBatch> gradients;
+  inBatches(total, pointAt, order, progress_, [&](std::span<const Vector3> points, const auto& placeOf) {
+    const std::span<double> found = std::span(values).first(points.size());
+    if (projection.takesGradients())
+      distance_.withGradients(points, found, std::span(gradients).first(points.size()));
+    else
+      distance_(points, found);
+    requireFinite(points, found);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::size_t place = placeOf(i);
+      if (place >= count) {
+        samples.check.distances[place - count] = found[i];
+        continue;
+      }
+      double* const to = &samples.numbers[place * projection.numbersPerPoint()];
+      *to = found[i];
+      if (!projection.takesGradients()) continue;
+      requireFinite(points[i], gradients[i]);
+      const Vector3 derivatives = gradients[i].cwiseProduct(cells[place / local.size()].sizes() / 2);
+      std::copy(derivatives.begin(), derivatives.end(), to + 1);
+    }
+  });
+  evaluations_ += total;
+  return samples;
 }
 
 bool CellFitter::outsideBand(const Box& cell, const basis::Projection& projection,
                              std::span<const double> samples) const {
   if (!(options_.band > 0)) return false;
   double clearance = 0;  // lower bound of the cell's distance from the surface, since Φ is 1-Lipschitz
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  for (std::size_t i = 0; i < projection.points().size(); ++i) {
     const Vector3 fromCentre = (cell.sizes() / 2).cwiseProduct(projection.points()[i]);
     const double farthestCorner = (fromCentre.cwiseAbs() + cell.sizes() / 2).norm();
-    clearance = std::max(clearance, std::abs(samples[i]) - farthestCorner);
+    clearance = std::max(clearance, std::abs(samples[i * projection.numbersPerPoint()]) - farthestCorner);
   }
   return clearance > options_.band;
 }
@@ -223,16 +288,6 @@ void CellFitter::rate(Fit& fit, double squared, const Box& cell) const {
   fit.error.near = std::abs(mean) - cell.sizes().norm() / 2 <= nearDistance_;
   fit.error.squared = squared * fit.error.volume;
   fit.error.weighted = nearness_.weight(mean) * fit.error.squared;
-}
-
-CheckPoints CellFitter::checkPoints(const Box& cell) const {
-  CheckPoints check;
-  if (options_.estimator != Estimator::checked) return check;
-  for (int z = -1; z <= 1; ++z)
-    for (int y = -1; y <= 1; ++y)
-      for (int x = -1; x <= 1; ++x) check.local.emplace_back(x, y, z);
-  check.distances = distances(cell, check.local);
-  return check;
 }
 
 double CellFitter::checkedError(const Fit& fit, const Box& cell, const CheckPoints& check) const {
@@ -282,15 +337,30 @@ Fit CellFitter::makeFit(CachedProjection projected, int degree, const Box& cell,
     if (squared > residual) projected.meanSquare = std::max(projected.meanSquare, meanSquareOf(fit) + squared);
   }
   rate(fit, squared, cell);
+  fit.raisesAtOnce = promisesRaise(projected, degree);
   if (keepsProjections()) fit.cached = std::move(projected);
   return fit;
 }
 
+bool CellFitter::promisesRaise(const CachedProjection& projected, int degree) const {
+  // By the paper's criterion (eq. 8), a higher degree gains something if it leaves less than an eighth of the error.
+  constexpr double kMostLeft = 1.0 / 8;
+  constexpr int kDegree = 2;  // the samples of a cell of a higher degree are too few to tell
+  if (degree != kDegree || projected.degree != degree + 1 || !rules(degree).projection->takesGradients() ||
+      options_.trialSamples == TrialSamples::own)
+    return false;
+  const std::vector<double> lower = basis::truncated(projected.coefficients, projected.degree, degree);
+  return basis::topDegreeError(projected.coefficients.data(), degree + 1, 1.0) <
+         kMostLeft * basis::topDegreeError(lower.data(), degree, 1.0);
+}
+
 Fit CellFitter::fit(const Box& cell, int degree) const {
   const basis::Projection& projection = *rules(degree).projection;
-  const std::vector<double> samples = sample({&cell, 1}, projection.points(), rules(degree).orderOfOne);
-  return makeFit({projection(samples), degree + 1, projection.meanSquare(samples)}, degree, cell,
-                 outsideBand(cell, projection, samples), checkPoints(cell));
+  const Samples samples = sample(projection, {&cell, 1}, cell, rules(degree).orderOfOne);
+  std::vector<double> coefficients = projection(samples.numbers);
+  const double meanSquare = projection.meanSquare(samples.numbers, coefficients);
+  return makeFit({std::move(coefficients), degree + 1, meanSquare}, degree, cell,
+                 outsideBand(cell, projection, samples.numbers), samples.check);
 }
 
 Fit CellFitter::raisedByOwnSamples(const Box& cell, const Fit& current) const {
@@ -305,7 +375,7 @@ Fit CellFitter::raisedByOwnSamples(const Box& cell, const Fit& current) const {
 Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowed) const {
   Trial trial;
   const bool wantsRaised = allowed != Refinement::octree || keepsProjections();
-  if (allowed == Refinement::degree) {
+  if (allowed == Refinement::degree || (allowed == Refinement::either && current.raisesAtOnce)) {
     trial.raised = raisedByOwnSamples(cell, current);
     return trial;
   }
@@ -313,28 +383,27 @@ Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowe
   const basis::Projection& projection = *rules(degree).projection;
   std::array<Box, 8> boxes;
   for (int child = 0; child < 8; ++child) boxes[child] = childBox(cell, child);
-  const std::vector<double> samples = sample(boxes, projection.points(), rules(degree).orderOfEight);
-  const CheckPoints check = checkPoints(cell);
+  const Samples samples = sample(projection, boxes, cell, rules(degree).orderOfEight);
   std::array<std::vector<double>, 8> raised;  // projections of the children, one degree higher
   trial.children.emplace();
   bool allOutside = true;
   double meanSquare = 0;
   for (int child = 0; child < 8; ++child) {
-    const std::size_t count = projection.points().size();
-    const auto own = std::span(samples).subspan(child * count, count);
+    const std::size_t count = projection.points().size() * projection.numbersPerPoint();
+    const auto own = std::span(samples.numbers).subspan(child * count, count);
     const bool outside = outsideBand(boxes[child], projection, own);
-    const double ownMeanSquare = projection.meanSquare(own);
     raised[child] = projection(own);
+    const double ownMeanSquare = projection.meanSquare(own, raised[child]);
     (*trial.children)[child] = makeFit({raised[child], degree + 1, ownMeanSquare}, degree, boxes[child], outside,
-                                       cornersOfChild(check, child));
+                                       cornersOfChild(samples.check, child));
     allOutside = allOutside && outside;
     meanSquare += ownMeanSquare / 8;
   }
   if (wantsRaised) {
-    trial.raised =
-        options_.trialSamples == TrialSamples::own
-            ? raisedByOwnSamples(cell, current)
-            : makeFit({basis::joined(raised, degree + 1), degree + 1, meanSquare}, degree + 1, cell, allOutside, check);
+    trial.raised = options_.trialSamples == TrialSamples::own
+                       ? raisedByOwnSamples(cell, current)
+                       : makeFit({basis::joined(raised, degree + 1), degree + 1, meanSquare}, degree + 1, cell,
+                                 allOutside, samples.check);
   }
   return trial;
 }

@@ -23,12 +23,10 @@ namespace hpsdf::detail {
 /// Throws `Error` if a distance is not finite. The message names the first such point.
 void requireFinite(std::span<const Vector3> points, std::span<const double> distances);
 
-/// Returns the exact distances at the same local points of several cells, one cell after another. They are evaluated in
-/// the order `order` or, if `order` is empty, in the order of the points. Throws `Error` if a distance is not finite,
-/// and `Cancelled` when `progress` says so.
-std::vector<double> sampleCells(const DistanceFunction& distance, std::span<const Box> cells,
-                                std::span<const Vector3> local, std::span<const std::uint32_t> order,
-                                const Progress& progress);
+/// Returns the exact distances at points that are given by local coordinates of a cell. Throws `Error` if a distance is
+/// not finite, and `Cancelled` when `progress` says so.
+std::vector<double> sampleCell(const DistanceFunction& distance, const Box& cell, std::span<const Vector3> local,
+                               const Progress& progress);
 
 /// The projection of a cell's samples onto the highest polynomial degree for which the samples suffice.
 struct CachedProjection {
@@ -43,6 +41,9 @@ struct Fit {
   int degree = 0;
   CellError error;
   bool outsideBand = false;
+  /// True if the fit's samples show that a polynomial of one degree more would leave little of its error. Such a cell
+  /// is raised without a trial of its children.
+  bool raisesAtOnce = false;
   bool isFinal = false;     ///< without error: an exact leaf, or a polynomial that equals Φ; never refined or pruned
   CachedProjection cached;  ///< projection of at least the fit's degree; kept for pruning
   /// For an exact leaf, whose degree is `kExactDegree`: its triangles, as `TriangleSearch::nearestTo` returns them, and
@@ -86,9 +87,7 @@ class CellFitter {
   Trial attempt(const Box& cell, const Fit& current, Refinement allowed) const;
 
   /// Returns the exact distances at points that are given by local coordinates of a cell.
-  std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const {
-    return sample({&cell, 1}, local, {});
-  }
+  std::vector<double> distances(const Box& cell, std::span<const Vector3> local) const;
 
   /// Number of evaluations of the exact distance so far.
   std::uint64_t evaluations() const { return evaluations_; }
@@ -99,21 +98,27 @@ class CellFitter {
   /// The projection and the sampling orders for all cells of one degree p.
   struct Rules {
     std::unique_ptr<const basis::Projection>
-        projection;                           ///< onto degree p+1, which contains the projection onto degree p
-    std::vector<std::uint32_t> orderOfOne;    ///< order in which the points of a cell are sampled; empty: as listed
-    std::vector<std::uint32_t> orderOfEight;  ///< order for eight children; an entry is child · points per cell + point
+        projection;  ///< onto degree p+1, which contains the projection onto degree p
+    /// Order in which the points of a cell, followed by its check points, are sampled; empty: as listed.
+    std::vector<std::uint32_t> orderOfOne;
+    std::vector<std::uint32_t> orderOfEight;  ///< the same for the points of eight children, one after another
+  };
+
+  /// What the exact distance tells about a cell or its eight children.
+  struct Samples {
+    std::vector<double> numbers;  ///< the samples that a projection takes, one cell after another
+    CheckPoints check;            ///< check points of the whole cell; none unless the estimator is `checked`
   };
 
   const Rules& rules(int degree) const;
-  /// Calls `sampleCells` and counts the evaluations.
-  std::vector<double> sample(std::span<const Box> cells, std::span<const Vector3> local,
-                             std::span<const std::uint32_t> order) const;
+  /// Samples the cell `whole`, or its eight children, for a projection. The check points are evaluated together with
+  /// the samples, because points that lie close to each other share their search.
+  Samples sample(const basis::Projection& projection, std::span<const Box> cells, const Box& whole,
+                 std::span<const std::uint32_t> order) const;
   bool outsideBand(const Box& cell, const basis::Projection& projection, std::span<const double> samples) const;
   /// Makes a fit of the given degree by cutting off the higher degrees of a projection of samples.
   Fit makeFit(CachedProjection projected, int degree, const Box& cell, bool outsideBand,
               const CheckPoints& check) const;
-  /// Evaluates the exact distance at the check points of a cell; none unless the estimator is `checked`.
-  CheckPoints checkPoints(const Box& cell) const;
   /// Returns the mean squared error of a fit that its errors at the check points, and at the centroids of triangles in
   /// the cell, suggest.
   double checkedError(const Fit& fit, const Box& cell, const CheckPoints& check) const;
@@ -123,10 +128,14 @@ class CellFitter {
   double squaredError(const Fit& fit, double meanSquare) const;
   void rate(Fit& fit, double squared, const Box& cell) const;
   bool keepsProjections() const { return options_.criterion == Criterion::optimal; }
+  /// Returns true if a projection of samples with gradients onto one degree more than a fit's promises to leave little
+  /// of the fit's error.
+  bool promisesRaise(const CachedProjection& projected, int degree) const;
   Fit raisedByOwnSamples(const Box& cell, const Fit& current) const;
 
   const DistanceFunction& distance_;
   const BuildOptions& options_;
+  std::vector<Vector3> checkLattice_ = {};     ///< check points in local coordinates; only for `Estimator::checked`
   std::optional<SurfacePoints> surface_ = {};  ///< only for `Estimator::checked` and distances to triangles
   const Nearness& nearness_;
   double nearDistance_;

@@ -170,7 +170,7 @@ ToleranceFitter::ToleranceFitter(const DistanceFunction& distance, const Allowed
 
 std::vector<double> ToleranceFitter::distances(const Box& cell, std::span<const Vector3> local) const {
   evaluations_ += local.size();
-  return sampleCells(distance_, {&cell, 1}, local, {}, progress_);
+  return sampleCell(distance_, cell, local, progress_);
 }
 
 /// Returns the greatest error at the lattice, in multiples of the allowed error. A part of the difference between
