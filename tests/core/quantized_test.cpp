@@ -21,6 +21,7 @@
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/safe_distance.h"
 #include "hpsdf/shapes.h"
 #include "support/one_leaf_field.h"

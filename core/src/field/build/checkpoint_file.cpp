@@ -20,7 +20,7 @@ namespace {
 constexpr Magic kCheckpointMagic = {'h', 'p', 's', 'd', 'f', '.', 'c', 'p'};
 // Version of the checkpoint file. It must be increased whenever the file's layout changes or a construction
 // would continue differently from the same state.
-constexpr std::uint32_t kCheckpointVersion = 6;
+constexpr std::uint32_t kCheckpointVersion = 7;
 constexpr FileKind kCheckpointKind{"checkpoint", "another output", "delete it to build from the start"};
 
 class Digest {
