@@ -297,6 +297,14 @@ TEST(Quantized, aLimitOfBytesIsKept) {
     }
 }
 
+/// Vertices whose rounding is not negligible stay double only if bytes are not limited.
+TEST(Quantized, verticesKeepToALimitOfBytes) {
+  const ExactDistance distance(shapes::mesh("torus,segments=96,sides=48"));
+  BuildOptions options{.maxError = 1e-6, .maxBytes = 333'437, .strategy = Strategy::hpx, .exactWithin = 0};
+  options.exactTriangles = 255;
+  EXPECT_LE(build(distance, domainAround(distance.source().box), options).bytes(), 333'437u);
+}
+
 TEST(Quantized, boundsHoldAfterRounding) {
   const Field field =
       torusOf(CoefficientType::quantized, {.targetError = 1e-4, .grid = {3, 3, 3}, .maxDepth = 3, .bounds = true});

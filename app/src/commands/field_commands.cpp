@@ -281,9 +281,10 @@ const Parameter kFieldOutput = {"output", outputFile().as('o').requiredOnCommand
 const Parameter kCompress = {
     "compress", flag().under(kFiles),
     "Compress the file without loss. It loads into the same field, to the bit, by the same commands, and takes as many "
-    "bytes of memory. Use it to store or send fields: files take 45 to 80 % of their bytes, quantized ones and those "
-    "with exact leaves the least; one of less than 2 kB does not shrink. Saving takes up to half a second for each "
-    "megabyte, loading a few milliseconds."};
+    "bytes of memory. Use it to store or send fields: files take a third to four fifths of their bytes, quantized "
+    "ones and those with exact leaves the least; one of less than 2 kB does not shrink. For each megabyte, saving "
+    "takes "
+    "up to half a second, and loading a few milliseconds."};
 
 const std::vector<Parameter> kBuildFiles = {
     {"mesh", text("MESH").positional(), "Mesh file, builtin:SHAPE or analytic:SHAPE."},
@@ -427,10 +428,10 @@ header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an 
 
 Distances are negative inside. Outside the domain the field is continued continuously.
 
---boxes asks for ranges instead: the field certainly has no value below min or above max in the box, whatever the
-rounding. Where min is above 0, the whole box is outside; where max is below 0, it is inside. The interval is some 20 %
-wider than necessary for boxes of an eighth of the domain's edge. It takes about a microsecond a box, after preparations
-of a few seconds at most. If the field has bounds ('build --bounds'), exact_min and exact_max contain the exact distance
+--boxes asks for ranges instead: the interval from min to max contains every value of the field in the box, rounding
+included. Where min is above 0, the whole box is outside; where max is below 0, it is inside. For boxes of an eighth of
+the domain's edge, the interval is typically 20 % wider than necessary, and up to twice as wide where cells are exact or
+blended. A box takes about a microsecond; the preparations before grow with the field. If the field has bounds ('build --bounds'), exact_min and exact_max contain the exact distance
 too.)"),
       .examples = {"hpsdf query bunny.hpsdf 0.1,0.2,0.3", "echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
                    "hpsdf query bunny.hpsdf points.csv -o distances.csv",

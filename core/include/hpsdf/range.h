@@ -23,10 +23,12 @@ struct FieldRange {
 
 /// Bounds of a field's values in each node of the octree, from which ranges over boxes follow within microseconds.
 ///
-/// The index is made once from a field, and takes about as many bytes, and up to 2 MB more. Ranges are certified: they
-/// allow for all rounding errors, of the field's own queries too. They are not the tightest ones: over boxes of an
-/// eighth of the domain's edge, they are some 20 % wider than the values. Over small boxes in a leaf with a polynomial
-/// they tend to the tightest range of the linear function that touches the polynomial in the middle of the box.
+/// The index is made once from a field. It takes about 100 bytes for each leaf, and up to 2 MB more: several times the
+/// bytes of a quantized field. Ranges are certified: they allow for all rounding errors, of the field's own queries
+/// too. They are not the tightest ones: over boxes of an eighth of the domain's edge, they are typically 20 % wider
+/// than the values, and up to twice as wide where leaves are exact or blended. Over small boxes in a leaf with a
+/// polynomial they tend to the tightest range of the linear function that touches the polynomial in the middle of the
+/// box.
 ///
 /// In an exact leaf, a distance keeps its sign as long as it is not 0. Where the field itself breaks this rule, values
 /// with the other sign may be missing: beside the holes of a mesh whose signs were forced to come from its normals, for

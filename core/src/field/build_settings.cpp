@@ -272,19 +272,19 @@ const std::vector<Row> kRows = {
      member<&BuildOptions::coefficients>,
      "Precision of the coefficients. quantized, which auto takes, stores integers of few bits: a quarter to a half of "
      "the bytes of float. That raises the RMS error over the domain by about 0.5 %, changes the field nowhere by more "
-     "than 1 % of max-error or 5 % of the tolerance, and keeps a field of strategy hpx exact near the surface. Where "
-     "integers would be too long, it gives float. Take float or double for fields whose coefficients other programs "
-     "read."},
+     "than 1 % of max-error or 5 % of the tolerance, and keeps a field of strategy hpx exact within exact-within; a "
+     "limit of bytes may demand more. Where integers would be too long, auto takes float or double, and quantized "
+     "float. Take float or double for fields whose coefficients other programs read."},
     {"quadrature", kMethod, wholeNumber().within(2, 8).stored(5).advanced(), member<&BuildOptions::quadrature>,
      "Order of the quadrature as a multiple of the degree. The paper takes 4; 3 needs less than half of the distances "
      "for the same error."},
     {"cubature", kMethod, choice({"compact", "product", "gradients"}).stored(20).advanced(),
      member<&BuildOptions::cubature>,
      "Rule by which cells are sampled: product takes Gauss points along each axis, as the paper does; compact needs "
-     "half "
-     "the points for the same order where such rules are known (orders up to 13); gradients takes the distance and its "
-     "gradient at still fewer points, for degrees 2 to 5, and is compact for other degrees, for analytic:SHAPE, for "
-     "meshes with holes and for the estimator embedded."},
+     "half the points for the same order where such rules are known (orders up to 13); gradients takes the distance "
+     "and its gradient at still fewer points, for degrees 2 to 5, and is compact for other degrees, for "
+     "analytic:SHAPE, "
+     "for outer hulls, for holes that winding numbers close and for the estimator embedded."},
     {"trial-samples", kMethod, choice({"children", "own"}).stored(21).hidden(), member<&BuildOptions::trialSamples>,
      ""},
     {"band", kResult, number().atLeast(0).in("world units").stored(7).advanced(), member<&BuildOptions::band>,

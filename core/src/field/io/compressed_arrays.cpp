@@ -213,7 +213,7 @@ void requireFit(const detail::CheckedReader& reader, const FieldSizes& sizes, co
     reader.require(n > 0 && cells <= sizes.nodes / n, "its base grid does not fit its nodes");
     cells *= n;
   }
-  reader.require(sizes.nodes <= kLowHalf, "it has more than 2^32 nodes");
+  reader.require(sizes.nodes <= kLowHalf, "it has 2^32 nodes or more");
   reader.require(sizes.bounds == 0 || sizes.bounds == sizes.nodes, "its bounds do not fit its nodes");
 }
 

@@ -34,19 +34,21 @@ void forEachPolynomial(const FieldData& field, const F& f) {
   });
 }
 
-/// Returns the greatest change by quantizing over the change that the field's tolerance allows, times the tolerance.
-double changeOfTolerance(const FieldData& field, const query::Quantized& quantized, const QuantizationLimits& limits) {
+/// Returns a bound of the change by quantizing. With a tolerance, it is the greatest change over the error that is
+/// allowed there, times the tolerance.
+double greatestChange(const FieldData& field, const query::Quantized& quantized, const QuantizationLimits& limits) {
   const AllowedError allowed = allowedError(field.metadata.settings, field.metadata.referenceLength);
   double greatest = 0;
   std::vector<double> after(coefficientCount(kMaxDegree));
   forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
     decodeLeaf(quantized.coefficients, quantized.nodes[at.node], after.data());
-    double change = 0;
-    for (std::size_t i = 0; i < c.size(); ++i) change += std::abs(c[i] - after[i]);
-    const double least = limits.leastDistance(c, node::degree(field.nodes[at.node]));
-    greatest = std::max(greatest, change / allowed.at(least));
+    for (std::size_t i = 0; i < c.size(); ++i) after[i] -= c[i];
+    const int degree = node::degree(field.nodes[at.node]);
+    const double change = std::abs(after[0]) + limits.greatestDeviation(after, degree);
+    const double share = allowed.tolerance > 0 ? allowed.tolerance / allowed.at(limits.leastDistance(c, degree)) : 1;
+    greatest = std::max(greatest, change * share);
   });
-  return greatest * allowed.tolerance;
+  return greatest;
 }
 
 QuantizationLimits limitsOf(const FieldData& field) {
@@ -70,15 +72,20 @@ std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimi
   return steps;
 }
 
-/// Quantizes with steps that are all made greater until the coefficients take no more than `mostBytes`.
+/// Quantizes with steps that are all made greater until the coefficients take no more than `mostBytes`. Without such a
+/// limit the steps are as given.
 std::optional<query::Quantized> quantizedWithin(const FieldData& field, std::vector<double> steps, double mostBytes) {
   constexpr double kFactor = 1.05;
+  constexpr int kMostTries = 500;  // The last step is 4e10 times the first, and all integers are 0.
   std::optional<query::Quantized> result = query::quantized(field, steps);
-  const double greatest = steps.empty() ? 0 : *std::ranges::max_element(steps);
-  const bool isLimited = mostBytes < kUnlimitedChange && greatest > 0 && greatest < kUnlimitedChange;
-  while (isLimited && !(result && double(result->coefficients.bytes.size()) <= mostBytes)) {
+  if (mostBytes < kUnlimitedChange && !steps.empty()) {
+    // With steps that differ more, no factor would help.
+    const double least = std::ldexp(*std::ranges::max_element(steps), -QuantizedCoefficients::kMostShift);
+    for (double& step : steps) step = std::max(step, least);
+  }
+  const auto fits = [&] { return result && double(result->coefficients.bytes.size()) <= mostBytes; };
+  for (int tries = 0; mostBytes < kUnlimitedChange && !fits() && tries < kMostTries; ++tries) {
     for (double& step : steps) step *= kFactor;
-    if (!(*std::ranges::max_element(steps) < QuantizedCoefficients::kGreatestStep)) return std::nullopt;
     result = query::quantized(field, steps);
   }
   return result;
@@ -99,14 +106,17 @@ bool quantizeCoefficients(FieldData& field, double mostBytes) {
   const QuantizationLimits limits = limitsOf(field);
   std::optional<query::Quantized> quantized = quantizedWithin(field, greatestSteps(field, limits), mostBytes);
   if (!quantized) return false;
-  const query::Rounding rounding = query::quantizedRounding(field, quantized->nodes, quantized->coefficients);
-  metadata.roundingRms = rounding.rms;
-  if (metadata.settings.tolerance > 0) metadata.measuredError += changeOfTolerance(field, *quantized, limits);
-  if (rounding.max > kShareOfMaximum * metadata.settings.maxError && metadata.settings.maxError > 0)
-    metadata.measuredError += rounding.max;
+  metadata.roundingRms = query::quantizedRounding(field, quantized->nodes, quantized->coefficients).rms;
+  const double change = greatestChange(field, *quantized, limits), maxError = metadata.settings.maxError;
+  // Less than a hundredth of a maximum error is left out. Rounding errors of the sums may exceed it slightly.
+  constexpr double kRounding = 1.001;
+  if (metadata.settings.tolerance > 0 || (maxError > 0 && change > kRounding * kShareOfMaximum * maxError))
+    metadata.measuredError += change;
   field.nodes = std::move(quantized->nodes);
   field.coefficients = std::move(quantized->coefficients);
-  if (query::vertexRounding(field.exact) < kNegligible * leastError(field)) query::roundVertices(field.exact);
+  const bool mustBeShort = mostBytes < kUnlimitedChange;
+  if (mustBeShort || query::vertexRounding(field.exact) < kNegligible * leastError(field))
+    query::roundVertices(field.exact);
   return true;
 }
 
@@ -141,12 +151,16 @@ QuantizationLimits::QuantizationLimits(const BuildOptions& settings, double refe
   nearlyExact_ = std::max(kFloatRounding, kShareOfTolerance * settings.exactTolerance) * referenceLength;
 }
 
-double QuantizationLimits::leastDistance(std::span<const double> coefficients, int degree) const {
-  double rest = 0;
+double QuantizationLimits::greatestDeviation(std::span<const double> coefficients, int degree) const {
+  double sum = 0;
   basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
-    if (index > 0) rest += std::abs(coefficients[index]) * largest_[i] * largest_[j] * largest_[k];
+    if (index > 0) sum += std::abs(coefficients[index]) * largest_[i] * largest_[j] * largest_[k];
   });
-  return std::max(0.0, std::abs(coefficients[0] + exactOffset_) - rest);
+  return sum;
+}
+
+double QuantizationLimits::leastDistance(std::span<const double> coefficients, int degree) const {
+  return std::max(0.0, std::abs(coefficients[0] + exactOffset_) - greatestDeviation(coefficients, degree));
 }
 
 double QuantizationLimits::greatestChange(std::span<const double> coefficients, int degree) const {

@@ -23,7 +23,11 @@ class QuantizationLimits {
   /// Returns the greatest step, in the orthonormal basis, that keeps to this limit.
   double greatestStep(std::span<const double> coefficients, int degree) const;
 
-  /// Returns a lower bound of |f| in a leaf.
+  /// Returns an upper bound of the difference between a leaf's polynomial and its mean, in the leaf and its blend
+  /// zones.
+  double greatestDeviation(std::span<const double> coefficients, int degree) const;
+
+  /// Returns a lower bound of the distance from the surface there, as the polynomial gives it.
   double leastDistance(std::span<const double> coefficients, int degree) const;
 
  private:
