@@ -178,7 +178,7 @@ TEST_F(Continuity, continuityIsStudied) {
     for (std::size_t row = first + 1; row < first + 4; ++row) {  // each row has a smaller weight than the previous row
       EXPECT_LT(figure(row, "jump_rms"), figure(row - 1, "jump_rms")) << row;
       EXPECT_GT(figure(row, "rms"), figure(row - 1, "rms")) << row;
-      EXPECT_NEAR(figure(row, "bytes") / figure(first, "bytes"), 1, 0.01) << row;
+      EXPECT_LT(figure(row, "bytes"), 1.3 * figure(first, "bytes")) << row;
     }
   EXPECT_TRUE(rows[0].at("weight").is_null());
   EXPECT_EQ(figure(0, "jump_rms_ratio"), 1);
@@ -190,7 +190,7 @@ TEST_F(Continuity, continuityIsStudied) {
   EXPECT_EQ(figure(7, "weight"), 0.4);
   EXPECT_LT(figure(7, "jump_rms_ratio"), 0.12);
   EXPECT_LT(figure(7, "rms_ratio"), 1.02);
-  EXPECT_LT(figure(7, "bytes_ratio"), 1.9);
+  EXPECT_LT(figure(7, "bytes_ratio"), 2.1);
   const std::string table = readFile(at("study/continuity.csv"));
   EXPECT_EQ(lineCount(table), 17u);
   EXPECT_THAT(table, StartsWith("mesh,enriched,weight,jump_rms,"));

@@ -57,7 +57,7 @@ TEST(ContinuityFigures, bunny) {
   const Figures after = meter(smoothed.field);
   EXPECT_LT(after.jump, 0.5 * before.jump);
   EXPECT_LT(after.rms, 1.3 * before.rms);
-  EXPECT_EQ(after.bytes, before.bytes);
+  EXPECT_LT(after.bytes, 1.4 * before.bytes) << "the coefficients take two or three bits more";
   EXPECT_NEAR(after.rms, std::hypot(before.rms, smoothed.change), 0.02 * after.rms) << "f₀ is a projection";
 
   options.enrich = true;
@@ -65,7 +65,7 @@ TEST(ContinuityFigures, bunny) {
   const Figures enriched = meter(build(distance, domain, options));
   EXPECT_LT(enriched.jump, 0.12 * before.jump);
   EXPECT_LT(enriched.rms, 1.02 * before.rms);
-  EXPECT_LT(enriched.bytes, 1.9 * before.bytes);
+  EXPECT_LT(enriched.bytes, 2.1 * before.bytes);
 }
 
 }  // namespace continuity_figures_test

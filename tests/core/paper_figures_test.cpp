@@ -73,10 +73,11 @@ TEST(PaperFigures, bunny) {
   EXPECT_LE(error.largest, 3e-2);  // a wrong sign would cause an error as large as the domain
 
   options.coefficients = CoefficientType::automatic;
-  const Field single = build(distance, paperDomain(), options);
-  EXPECT_TRUE(single.singlePrecision());
-  EXPECT_EQ(single.data().nodes, field.data().nodes);
-  EXPECT_NEAR(measure(single, distance, options.nearness).rms, error.rms, 1e-3 * error.rms);
+  const Field quantized = build(distance, paperDomain(), options);
+  EXPECT_EQ(precisionName(quantized), "quantized");
+  EXPECT_EQ(statistics(quantized).leaves, s.leaves);
+  EXPECT_LE(quantized.bytes(), 1.6e6);
+  EXPECT_NEAR(measure(quantized, distance, options.nearness).rms, error.rms, 0.01 * error.rms);
 }
 
 TEST(PaperFigures, bunnyByDefault) {

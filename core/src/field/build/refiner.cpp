@@ -184,7 +184,7 @@ static double quantizedBytes(const BuildTree& tree, const QuantizationLimits& li
   };
   forEachLeaf(
       [&](const BuildNode& node) { part.add(tree.boxOf(node).volume(), double(node.fit.coefficients.size())); });
-  const double forRms = part.stepForRms(rms);
+  const double forRms = limits.stepForRms(part, rms);
   double bytes = 0;
   forEachLeaf([&](const BuildNode& node) {
     const Fit& fit = node.fit;

@@ -82,7 +82,7 @@ class Pruning {
     double forRms = 0;
     if (limits_.quantization) {
       const Totals sum = totals();
-      forRms = sum.part.stepForRms(std::sqrt(sum.errors.weighted / tree_.domain.volume()));
+      forRms = limits_.quantization->stepForRms(sum.part, std::sqrt(sum.errors.weighted / tree_.domain.volume()));
     }
     tbb::parallel_for(std::size_t{0}, tree_.nodes.size(), [&](std::size_t n) { bytes_[n] = leafBytes(n, forRms); });
   }

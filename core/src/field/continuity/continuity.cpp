@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,6 +10,7 @@
 
 #include "field/continuity/face_coupling.h"
 #include "field/nearness.h"
+#include "field/precision/round_coefficients.h"
 #include "field/query/evaluate.h"
 #include "field/query/float_coefficients.h"
 #include "field/query/quantized.h"
@@ -203,11 +203,15 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
       withThreads(threads, [&] { return continuity::makeWeaklyContinuous(data, options, progress); });
   const auto* quantized = std::get_if<QuantizedCoefficients>(&field.data().coefficients);
   std::optional<query::Quantized> again;
-  if (quantized != nullptr) again = query::quantized(data, query::stepsOf(*quantized, field.data().nodes));
+  if (quantized != nullptr) {
+    std::vector<double> steps = query::stepsOf(*quantized, field.data().nodes);
+    for (double& step : steps) step *= detail::kWeaklyContinuousStep;
+    again = query::quantized(data, steps);
+  }
   if (again) {
     data.nodes = std::move(again->nodes);
     data.coefficients = std::move(again->coefficients);
-    data.metadata.roundingRms *= std::numbers::sqrt2;  // The field was rounded twice, to the same steps.
+    data.metadata.roundingRms = std::hypot(1, detail::kWeaklyContinuousStep) * data.metadata.roundingRms;
   } else if (quantized != nullptr || field.singlePrecision()) {
     data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, query::floatRounding(data).rms);
     query::toFloat(data);

@@ -63,8 +63,8 @@ std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimi
   forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
     part.add(query::cellSize(field, at.depth).prod(), double(c.size()));
   });
-  const double forRms =
-      field.metadata.hasEstimate() ? part.stepForRms(field.metadata.rmsEstimate(field.domain)) : kUnlimitedChange;
+  const double forRms = field.metadata.hasEstimate() ? limits.stepForRms(part, field.metadata.rmsEstimate(field.domain))
+                                                     : kUnlimitedChange;
   std::vector<double> steps(field.nodes.size());
   forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
     steps[at.node] = std::min(forRms, limits.greatestStep(c, node::degree(field.nodes[at.node])));
@@ -122,7 +122,7 @@ bool quantizeCoefficients(FieldData& field, double mostBytes) {
 
 }  // namespace
 
-QuantizationLimits::QuantizationLimits(double blend) {
+QuantizationLimits::QuantizationLimits(double blend) : shareOfRms_(kShareOfRms) {
   basis::legendreValues<double>(1 + 2 * blend, kMaxDegree, largest_.data());
   std::array<double, kMaxDegree + 1> byTotal{};  // sums over the terms of the same total degree
   for (int i = 0; i <= kMaxDegree; ++i)
@@ -142,6 +142,7 @@ QuantizationLimits::QuantizationLimits(const AllowedError& tolerance, double ble
 
 QuantizationLimits::QuantizationLimits(const BuildOptions& settings, double referenceLength, double exactOffset)
     : QuantizationLimits(allowedError(settings, referenceLength), settings.blend) {
+  if (settings.continuityWeight) shareOfRms_ *= kWeaklyContinuousStep;
   if (settings.maxError > 0) max_ = kShareOfMaximum * settings.maxError;
   if (settings.strategy != Strategy::hpx || settings.tolerance > 0) return;
   // Beside exact leaves, polynomials have hardly an error, or one within the exact tolerance.
@@ -174,9 +175,13 @@ double QuantizationLimits::greatestStep(std::span<const double> coefficients, in
   return allowed_.tolerance > 0 ? std::ldexp(1.0, std::ilogb(step)) : step;
 }
 
-double QuantizedPart::stepForRms(double rms) const {
+double QuantizationLimits::stepForRms(const QuantizedPart& part, double rms) const {
+  return part.stepForChange(shareOfRms_ * rms);
+}
+
+double QuantizedPart::stepForChange(double rms) const {
   // An integer is wrong by half at most, with a mean square of 1/12.
-  return volume > 0 ? kShareOfRms * rms * std::sqrt(12 * volume / integers) : kUnlimitedChange;
+  return volume > 0 ? rms * std::sqrt(12 * volume / integers) : kUnlimitedChange;
 }
 
 void roundCoefficients(CoefficientType type, FieldData& field, double mostBytes) {
