@@ -111,8 +111,7 @@ TEST(CompressedField, wideLeavesAreKept) {
   query::Quantized quantized = query::quantized(field.data(), steps).value();
   EXPECT_TRUE(std::ranges::any_of(quantized.nodes, node::isWide));
   FieldData data = field.data();
-  data.nodes = std::move(quantized.nodes);
-  data.coefficients = std::move(quantized.coefficients);
+  query::take(std::move(quantized), data);
   io::StreamsWriter streams;
   std::vector<std::uint64_t> leaves;
   for (const std::uint64_t node : data.nodes)

@@ -254,8 +254,7 @@ Field mixedField() {
 Field mixedQuantizedField() {
   FieldData data = mixedField<double>().data();
   query::Quantized quantized = query::quantized(data, std::vector<double>(data.nodes.size(), 1e-3)).value();
-  data.nodes = std::move(quantized.nodes);
-  data.coefficients = std::move(quantized.coefficients);
+  query::take(std::move(quantized), data);
   return Field(std::move(data));
 }
 

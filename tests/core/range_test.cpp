@@ -92,8 +92,7 @@ FieldData dataOf(Field field) { return std::move(field).data(); }
 Field quantizedField(const Field& field) {
   FieldData data = field.data();
   query::Quantized quantized = query::quantized(data, std::vector<double>(data.nodes.size(), 1e-5)).value();
-  data.nodes = std::move(quantized.nodes);
-  data.coefficients = std::move(quantized.coefficients);
+  query::take(std::move(quantized), data);
   return Field(std::move(data));
 }
 

@@ -14,7 +14,7 @@ namespace range {
 class RangeTree;
 }
 
-/// What a field can be in a box.
+/// The range of a field over a box.
 struct FieldRange {
   Interval value;  ///< contains every value that the field returns at points of the box
   /// Contains the exact distance Φ at every point of the box, if the field has bounds (`withBounds`).

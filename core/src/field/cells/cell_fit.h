@@ -104,7 +104,7 @@ class CellFitter {
     std::vector<std::uint32_t> orderOfEight;  ///< the same for the points of eight children, one after another
   };
 
-  /// What the exact distance tells about a cell or its eight children.
+  /// The samples of the exact distance in a cell or its eight children.
   struct Samples {
     std::vector<double> numbers;  ///< the samples that a projection takes, one cell after another
     CheckPoints check;            ///< check points of the whole cell; none unless the estimator is `checked`

@@ -44,7 +44,7 @@ struct ErrorBound {
   std::uint64_t evaluations = 0;
 };
 
-/// What a bound of an error needs to know.
+/// The parameters with which the error of a polynomial is bounded.
 struct ErrorQuestion {
   int degree;
   std::uint64_t mostEvaluations;  ///< at least 8

@@ -209,8 +209,7 @@ WeaklyContinuous weaklyContinuous(const Field& field, const WeakContinuity& opti
     again = query::quantized(data, steps);
   }
   if (again) {
-    data.nodes = std::move(again->nodes);
-    data.coefficients = std::move(again->coefficients);
+    query::take(std::move(*again), data);
     data.metadata.roundingRms = std::hypot(1, detail::kWeaklyContinuousStep) * data.metadata.roundingRms;
   } else if (quantized != nullptr || field.singlePrecision()) {
     data.metadata.roundingRms = std::hypot(data.metadata.roundingRms, query::floatRounding(data).rms);

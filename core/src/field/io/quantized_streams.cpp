@@ -12,8 +12,6 @@ constexpr int kWidthBits = QuantizedCoefficients::kWidthBits;
 constexpr int kMostBits = QuantizedCoefficients::kMostWideBits;
 constexpr std::size_t kPadding = QuantizedCoefficients::kPadding;
 
-std::size_t integersOfDegree(int d) { return std::size_t((d + 1) * (d + 2) / 2); }
-
 /// Integers of one width, from 1 to 32 bits. The first plane holds the highest eight bits of each, the next one the
 /// eight bits below, and so on. The last plane is filled up with zeros.
 class IntegerPlanes {
@@ -60,29 +58,9 @@ struct Parts {
   }
 };
 
-/// Appends integers of few bits to bytes, the lowest bit first.
-class BitString {
- public:
-  explicit BitString(Bytes& bytes) : bytes_(bytes) {}
-
-  void push(std::uint64_t integer, std::uint32_t width) {
-    pending_ |= integer << count_;
-    for (count_ += width; count_ >= 8; count_ -= 8, pending_ >>= 8) bytes_.push_back(std::uint8_t(pending_));
-  }
-
-  void fillByte() {
-    if (count_ > 0) push(0, 8 - count_);
-  }
-
- private:
-  Bytes& bytes_;
-  std::uint64_t pending_ = 0;
-  std::uint32_t count_ = 0;
-};
-
 /// Returns the lowest `width` bits of a number.
 std::uint32_t lowestBits(std::uint64_t bits, std::uint32_t width) {
-  return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << width) - 1));
+  return static_cast<std::uint32_t>(query::lowBits(bits, int(width)));
 }
 
 /// The means of the last leaf that was not wide, and of the last wide one. Each mean is stored as the difference from
@@ -103,32 +81,32 @@ void splitLeaf(const query::LeafBits& leaf, std::uint64_t node, LastMeans& means
     const std::uint32_t width = lowestBits(leaf.read(std::uint64_t(d - 1) * kWidthBits), kWidthBits);
     parts.widths[d].push_back(std::uint8_t(width));
     if (width == 0) continue;
-    for (std::size_t n = 0; n < integersOfDegree(d); ++n, position += width)
+    for (int n = 0; n < basis::termsOfDegree(d); ++n, position += width)
       parts.ofWidth[width].push(lowestBits(leaf.read(position), width));
   }
 }
 
 /// Puts together the next leaf. `next` counts the leaves of each degree or a higher one.
 void joinLeaf(Parts& parts, std::uint64_t node, LastMeans& means, std::array<std::size_t, kMaxDegree + 1>& next,
-              BitString& out) {
+              query::BitWriter& out) {
   const int degree = node::degree(node);
   const std::size_t kind = node::isWide(node) ? 1 : 0;
-  for (int d = 1; d <= degree; ++d) out.push(parts.widths[d][next[d]], kWidthBits);
+  for (int d = 1; d <= degree; ++d) out.add(parts.widths[d][next[d]], kWidthBits);
   means[kind] = lowestBits(std::uint64_t{means[kind]} + parts.means[kind].next(), parts.meanBits[kind]);
-  out.push(means[kind], parts.meanBits[kind]);
+  out.add(means[kind], int(parts.meanBits[kind]));
   for (int d = 1; d <= degree; ++d) {
     const std::uint32_t width = parts.widths[d][next[d]++];
     if (width == 0) continue;
-    for (std::size_t n = 0; n < integersOfDegree(d); ++n) out.push(parts.ofWidth[width].next(), width);
+    for (int n = 0; n < basis::termsOfDegree(d); ++n) out.add(parts.ofWidth[width].next(), int(width));
   }
-  out.fillByte();
+  out.finishByte();
 }
 
 /// Returns the bytes of leaves and the padding. `size` is their number as far as it is known.
 Bytes joined(Parts& parts, std::span<const std::uint64_t> leaves, std::size_t size) {
   Bytes bytes;
   bytes.reserve(size);
-  BitString out(bytes);
+  query::BitWriter out(bytes);
   LastMeans means{};
   std::array<std::size_t, kMaxDegree + 1> next{};
   for (const std::uint64_t leaf : leaves) joinLeaf(parts, leaf, means, next, out);
@@ -140,7 +118,7 @@ Bytes joined(Parts& parts, std::span<const std::uint64_t> leaves, std::size_t si
 std::array<std::uint64_t, kMostBits + 1> countWidths(const Parts& parts) {
   std::array<std::uint64_t, kMostBits + 1> counts{};
   for (int d = 1; d <= kMaxDegree; ++d)
-    for (const std::uint8_t width : parts.widths[d]) counts[width] += integersOfDegree(d);
+    for (const std::uint8_t width : parts.widths[d]) counts[width] += std::uint64_t(basis::termsOfDegree(d));
   return counts;
 }
 

@@ -112,8 +112,7 @@ bool quantizeCoefficients(FieldData& field, double mostBytes) {
   constexpr double kRounding = 1.001;
   if (metadata.settings.tolerance > 0 || (maxError > 0 && change > kRounding * kShareOfMaximum * maxError))
     metadata.measuredError += change;
-  field.nodes = std::move(quantized->nodes);
-  field.coefficients = std::move(quantized->coefficients);
+  query::take(std::move(*quantized), field);
   const bool mustBeShort = mostBytes < kUnlimitedChange;
   if (mustBeShort || query::vertexRounding(field.exact) < kNegligible * leastError(field))
     query::roundVertices(field.exact);

@@ -12,8 +12,6 @@ namespace {
 
 constexpr int kWidthBits = QuantizedCoefficients::kWidthBits;
 
-std::uint64_t lowBits(std::uint64_t word, int count) { return word & ((std::uint64_t{1} << count) - 1); }
-
 /// Returns the number that is added to integers of `width` bits before they are stored.
 std::int64_t biasOf(int width) { return (std::int64_t{1} << width) >> 1; }
 
@@ -24,27 +22,6 @@ int meanBitsOf(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
 int widthOf(const LeafBits& leaf, int degree) {
   return static_cast<int>(lowBits(leaf.read(std::uint64_t(degree - 1) * kWidthBits), kWidthBits));
 }
-
-/// Appends numbers of few bits to an array of bytes.
-class BitWriter {
- public:
-  explicit BitWriter(std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
-
-  void add(std::uint64_t number, int width) {
-    pending_ |= number << count_;
-    for (count_ += width; count_ >= 8; count_ -= 8, pending_ >>= 8) bytes_.push_back(std::uint8_t(pending_));
-  }
-
-  /// Fills the last byte with zeros.
-  void finishByte() {
-    if (count_ > 0) add(0, 8 - count_);
-  }
-
- private:
-  std::vector<std::uint8_t>& bytes_;
-  std::uint64_t pending_ = 0;
-  int count_ = 0;
-};
 
 /// Returns the integer of a coefficient, whose unit is the step times the norm; or one that is too large to be stored.
 std::int64_t integerOf(double coefficient, double unit) {
@@ -185,6 +162,11 @@ std::optional<Quantized> quantized(const FieldData& field, std::span<const doubl
   out.bytes.shrink_to_fit();
   if (out.bytes.size() > 0xffffffff) return std::nullopt;
   return result;
+}
+
+void take(Quantized&& quantized, FieldData& field) {
+  field.nodes = std::move(quantized.nodes);
+  field.coefficients = std::move(quantized.coefficients);
 }
 
 std::vector<double> stepsOf(const QuantizedCoefficients& coefficients, std::span<const std::uint64_t> nodes) {

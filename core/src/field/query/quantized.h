@@ -15,6 +15,30 @@
 
 namespace hpsdf::query {
 
+/// Returns the lowest bits of a word. `count` is below 64.
+constexpr std::uint64_t lowBits(std::uint64_t word, int count) { return word & ((std::uint64_t{1} << count) - 1); }
+
+/// Appends numbers of few bits to an array of bytes.
+class BitWriter {
+ public:
+  explicit BitWriter(std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
+
+  void add(std::uint64_t number, int width) {
+    pending_ |= number << count_;
+    for (count_ += width; count_ >= 8; count_ -= 8, pending_ >>= 8) bytes_.push_back(std::uint8_t(pending_));
+  }
+
+  /// Fills the last byte with zeros.
+  void finishByte() {
+    if (count_ > 0) add(0, 8 - count_);
+  }
+
+ private:
+  std::vector<std::uint8_t>& bytes_;
+  std::uint64_t pending_ = 0;
+  int count_ = 0;
+};
+
 /// The bits of one leaf.
 struct LeafBits {
   const std::uint8_t* bytes;
@@ -51,6 +75,9 @@ struct Quantized {
 /// orthonormal basis, that a leaf may have. The greatest of them becomes the step of the field. Returns std::nullopt if
 /// the coefficients take more bits than `QuantizedCoefficients` has.
 std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps);
+
+/// Gives a field these nodes and coefficients in place of its own.
+void take(Quantized&& quantized, FieldData& field);
 
 /// Returns the steps of a field's leaves in the form that `quantized` takes.
 std::vector<double> stepsOf(const QuantizedCoefficients& coefficients, std::span<const std::uint64_t> nodes);

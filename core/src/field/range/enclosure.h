@@ -30,8 +30,8 @@ struct Enclosure {
 /// numbers.
 Enclosure enclosureOf(const std::vector<double>& cube, int degree);
 
-/// How the parts of a cell lie in it: part number x + 2y + 4z has its centre at `offset` from that of the cell along
-/// each axis, and its local unit is `unit`, both in local units of the cell. Its enclosure is known over [−reach,
+/// The places of the parts of a cell in it: part number x + 2y + 4z has its centre at `offset` from that of the cell
+/// along each axis, and its local unit is `unit`, both in local units of the cell. Its enclosure is known over [−reach,
 /// reach]³ of its own coordinates.
 struct PartLayout {
   double offset, unit, reach;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-/// How often a leaf is halved at most.
+/// A leaf is halved at most so many times.
 constexpr int kMostLevels = 2;
 /// The greatest width of an enclosure, over its range, with which a polynomial is not halved. Boxes are often as small
 /// as a part whose edge is more than `kLargePart` of the domain's, so that its own width matters.
