@@ -8,15 +8,35 @@
 namespace hpsdf::bench {
 namespace {
 
+/// The exact distance to the bunny, which keeps the points at which it is asked for by one thread.
+class RecordingDistance {
+ public:
+  explicit RecordingDistance(ConstructionPoints& all) : all_(&all) {}
+
+  void operator()(std::span<const Vector3> points, std::span<double> out) const {
+    keep(points, false);
+    bunnyDistance()(points, out);
+  }
+  void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const {
+    keep(points, true);
+    bunnyDistance().withGradients(points, out, gradients);
+  }
+  bool hasGradients() const { return bunnyDistance().hasGradients(); }
+  Source source() const { return bunnyDistance().source(); }
+
+ private:
+  void keep(std::span<const Vector3> points, bool withGradients) const {
+    all_->points.insert(all_->points.end(), points.begin(), points.end());
+    all_->batches.push_back({points.size(), withGradients});
+  }
+
+  ConstructionPoints* all_;
+};
+
 /// Returns all points at which the construction of the bunny's field asks for the distance.
 ConstructionPoints record() {
   ConstructionPoints all;
-  const auto recording = [&all](std::span<const Vector3> points, std::span<double> out) {
-    all.points.insert(all.points.end(), points.begin(), points.end());
-    all.batches.push_back(points.size());
-    bunnyDistance()(points, out);
-  };
-  build(recording, paperDomain(), {.targetError = 1e-5, .threads = 1});
+  build(RecordingDistance(all), paperDomain(), {.targetError = 1e-5, .threads = 1});
   return all;
 }
 
@@ -26,7 +46,7 @@ ConstructionPoints thinned(const ConstructionPoints& all, std::size_t count) {
   ConstructionPoints result;
   auto first = all.points.begin();
   for (std::size_t i = 0; i < all.batches.size(); ++i) {
-    const auto last = first + std::ptrdiff_t(all.batches[i]);
+    const auto last = first + std::ptrdiff_t(all.batches[i].size);
     if (i % every == 0) {
       result.points.insert(result.points.end(), first, last);
       result.batches.push_back(all.batches[i]);
@@ -40,10 +60,16 @@ void construction(benchmark::State& state) {
   const auto& [points, batches] = constructionPoints();
   const ExactDistance& distance = bunnyDistance();
   std::vector<double> out(points.size());
+  std::vector<Vector3> gradients(points.size());
   timeEach(state, points.size(), [&, &points = points, &batches = batches] {
     std::size_t first = 0;
-    for (const std::size_t size : batches) {
-      distance(std::span(points).subspan(first, size), std::span(out).subspan(first, size));
+    for (const auto& [size, withGradients] : batches) {
+      const std::span at = std::span(points).subspan(first, size);
+      const std::span values = std::span(out).subspan(first, size);
+      if (withGradients)
+        distance.withGradients(at, values, std::span(gradients).subspan(first, size));
+      else
+        distance(at, values);
       first += size;
     }
   });

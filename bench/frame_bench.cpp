@@ -19,8 +19,7 @@ std::unique_ptr<render::Renderer> rendererOf(const Field& field, render::GlChoic
   }
 }
 
-void frame(benchmark::State& state, render::GlChoice choice, int width, int height) {
-  const Field& field = bunnyField();
+void frame(benchmark::State& state, const Field& field, render::GlChoice choice, int width, int height) {
   const auto renderer = rendererOf(field, choice, state);
   if (!renderer) return;
   const render::SurfaceView view{.camera = render::cameraOf({}, field.domain(), width, height)};
@@ -29,12 +28,14 @@ void frame(benchmark::State& state, render::GlChoice choice, int width, int heig
   state.SetLabel(renderer->description());
 }
 
-void bunnyFrame(benchmark::State& state) { frame(state, render::GlChoice::software, 1280, 720); }
+void bunnyFrame(benchmark::State& state) { frame(state, bunnyField(), render::GlChoice::software, 1280, 720); }
+void floatFrame(benchmark::State& state) { frame(state, floatBunnyField(), render::GlChoice::software, 1280, 720); }
 void bunnyFrameByHardware(benchmark::State& state) {
-  frame(state, render::GlChoice::hardware, int(state.range(0)), int(state.range(1)));
+  frame(state, bunnyField(), render::GlChoice::hardware, int(state.range(0)), int(state.range(1)));
 }
 
 BENCHMARK(bunnyFrame)->Name("frame/bunny")->UseRealTime()->Unit(benchmark::kSecond);
+BENCHMARK(floatFrame)->Name("frame/float")->UseRealTime()->Unit(benchmark::kSecond);
 BENCHMARK(bunnyFrameByHardware)
     ->Name("frame_by_hardware/bunny")
     ->Args({1280, 720})

@@ -1,4 +1,4 @@
-// Time and accuracy of a field that is accurate near the surface: high nearness exponent, float coefficients.
+// Time and accuracy of a field that is accurate near the surface: high nearness exponent.
 
 #include <optional>
 
@@ -11,12 +11,8 @@ void nearSurface(benchmark::State& state) {
   const TriangleMesh& mesh = bunny();
   // These values were found by trials. With so high a nearness exponent, cells far from the surface are not refined;
   // hence the fine grid. Cells at the surface become small and of low degree anyway; low limits save trials.
-  const BuildOptions options{.targetError = 1.4e-8,
-                             .grid = {16, 16, 16},
-                             .nearness = 256,
-                             .maxDegree = 3,
-                             .quadrature = 2,
-                             .coefficients = CoefficientType::float32};
+  const BuildOptions options{
+      .targetError = 1.4e-8, .grid = {16, 16, 16}, .nearness = 256, .maxDegree = 3, .quadrature = 2};
   std::optional<Field> field;
   for ([[maybe_unused]] auto _ : state) field = build(ExactDistance(mesh), paperDomain(), options);
   const std::vector<Vector3> points = nearPoints(200'000, 0.02);

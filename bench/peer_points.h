@@ -5,10 +5,16 @@
 
 namespace hpsdf::bench {
 
+/// The points of one call of the distance function.
+struct Batch {
+  std::size_t size;
+  bool withGradients;
+};
+
 /// About 300,000 points at which the bunny's construction at τ = 1e-5 asks for distances: whole batches, in order.
 struct ConstructionPoints {
   std::vector<Vector3> points;
-  std::vector<std::size_t> batches;  ///< number of points in each batch, i.e. in one call of the distance function
+  std::vector<Batch> batches;
 };
 const ConstructionPoints& constructionPoints();
 

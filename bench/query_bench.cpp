@@ -130,10 +130,11 @@ void bunnyGradient(benchmark::State& state) { gradients(state, bunnyField()); }
 void bunnyBatched(benchmark::State& state) { batched(state, bunnyField()); }
 void bunnyBatchedGradient(benchmark::State& state) { batchedGradients(state, bunnyField()); }
 void bunnyReads(benchmark::State& state) { reads(state, bunnyField()); }
-void quantizedValue(benchmark::State& state) { values(state, quantizedBunnyField()); }
-void quantizedGradient(benchmark::State& state) { gradients(state, quantizedBunnyField()); }
-void quantizedBatched(benchmark::State& state) { batched(state, quantizedBunnyField()); }
-void quantizedReads(benchmark::State& state) { reads(state, quantizedBunnyField()); }
+void floatValue(benchmark::State& state) { values(state, floatBunnyField()); }
+void floatGradient(benchmark::State& state) { gradients(state, floatBunnyField()); }
+void floatBatched(benchmark::State& state) { batched(state, floatBunnyField()); }
+void floatBatchedGradient(benchmark::State& state) { batchedGradients(state, floatBunnyField()); }
+void floatReads(benchmark::State& state) { reads(state, floatBunnyField()); }
 void blendedValue(benchmark::State& state) { values(state, blendedBunny()); }
 void blendedGradient(benchmark::State& state) { gradients(state, blendedBunny()); }
 void blendedBatched(benchmark::State& state) { batched(state, blendedBunny()); }
@@ -146,10 +147,11 @@ BENCHMARK(bunnyGradient)->Name("query/bunny/gradient");
 BENCHMARK(bunnyBatched)->Name("query/bunny/batched");
 BENCHMARK(bunnyBatchedGradient)->Name("query/bunny/batched_gradient");
 BENCHMARK(bunnyReads)->Name("query/bunny/reads");
-BENCHMARK(quantizedValue)->Name("query/quantized/value");
-BENCHMARK(quantizedGradient)->Name("query/quantized/gradient");
-BENCHMARK(quantizedBatched)->Name("query/quantized/batched");
-BENCHMARK(quantizedReads)->Name("query/quantized/reads");
+BENCHMARK(floatValue)->Name("query/float/value");
+BENCHMARK(floatGradient)->Name("query/float/gradient");
+BENCHMARK(floatBatched)->Name("query/float/batched");
+BENCHMARK(floatBatchedGradient)->Name("query/float/batched_gradient");
+BENCHMARK(floatReads)->Name("query/float/reads");
 BENCHMARK(blendedValue)->Name("query/blended/value");
 BENCHMARK(blendedGradient)->Name("query/blended/gradient");
 BENCHMARK(blendedBatched)->Name("query/blended/batched");

@@ -30,9 +30,9 @@ const Field& bunnyField() {
   return field;
 }
 
-const Field& quantizedBunnyField() {
+const Field& floatBunnyField() {
   static const Field field =
-      build(bunnyDistance(), paperDomain(), {.targetError = 1e-6, .coefficients = CoefficientType::quantized});
+      build(bunnyDistance(), paperDomain(), {.targetError = 1e-6, .coefficients = CoefficientType::float32});
   return field;
 }
 

@@ -24,8 +24,8 @@ const ExactDistance& bunnyDistance();
 const Field& bunnyField();
 const Field& armadilloField();
 
-/// Returns the bunny's field with quantized coefficients.
-const Field& quantizedBunnyField();
+/// Returns the same with float coefficients instead of quantized ones.
+const Field& floatBunnyField();
 
 Box paperDomain();  ///< [-1.1, 1.1]³
 
