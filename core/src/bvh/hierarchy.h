@@ -24,7 +24,8 @@ struct Nearest {
   FramePoint point;               ///< the query point's position relative to the triangle
 };
 
-constexpr int kPacket = 8;  ///< number of query points that search the hierarchy together, in SIMD lanes
+constexpr int kPacket = 16;      ///< greatest number of query points that search the hierarchy together, in SIMD lanes
+constexpr int kSmallPacket = 8;  ///< the number of lanes for packets that are not larger
 
 /// A node of the hierarchy: the oriented boxes of four children in single precision, 256 bytes. The boxes are in
 /// local coordinates, in which the mesh lies in [-1, 1]³.

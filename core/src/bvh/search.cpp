@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bvh/search.cpp"
@@ -148,6 +150,7 @@ HWY_INLINE void settle(Search<Lanes>& s) {
     const auto triangle = hn::Set(d, static_cast<double>(frame.triangle));
     const auto triangleRef = hn::Set(d, static_cast<double>(s.candidates[c]));
     for (std::size_t at = 0; at < Lanes; at += kStep) {
+      if (!anyInReach<kStep>(s.lower[c] + at, s.limit + at)) continue;
       const auto found =
           locateLanes(d, frame,
                       Point<hn::Vec<decltype(d)>>{hn::Load(d, s.exact[0] + at), hn::Load(d, s.exact[1] + at),
@@ -300,27 +303,69 @@ void runOne(Search<1>& s) {
   traverse(s, stack, visitNode, visitBlock, [&](const Pending& next) HWY_ATTR { return next.lower <= s.limit[0]; });
 }
 
-using PacketTag = hn::CappedTag<float, kPacket>;
-constexpr std::size_t kLanes = hn::MaxLanes(PacketTag());
+template <int Lanes>
+using PacketTag = hn::CappedTag<float, Lanes>;
 
 /// A node or block on the stack. `lower` holds lower bounds of the squared distances from a packet's points to the box
 /// of the node or block.
+template <int Lanes>
 struct PendingOfPacket {
-  alignas(32) float lower[kPacket];
+  alignas(64) float lower[Lanes];
   std::uint32_t child;
 };
 
-/// Returns the least of the values `lower[i]` that are at most `limit[i]`, or -1 if there is none.
-HWY_INLINE float leastInReach(PacketTag d, const float* lower, const float* limit) {
+/// Returns the least of the values `lower[i]` that are at most `limit[i]`, for all the vectors of a packet: lane j
+/// holds the least of the lanes j of these vectors, or kOutOfReach.
+template <int Lanes>
+HWY_INLINE hn::Vec<PacketTag<Lanes>> leastInReach(const float* lower, const float* limit) {
+  const PacketTag<Lanes> d;
   const auto none = hn::Set(d, kOutOfReach);
-  auto all = none;
-  for (std::size_t at = 0; at < kPacket; at += kLanes) {
+  auto least = none;
+  for (std::size_t at = 0; at < Lanes; at += hn::MaxLanes(d)) {
     const auto bound = hn::Load(d, lower + at);
-    all = hn::Min(all, hn::IfThenElse(bound <= hn::Load(d, limit + at), bound, none));
+    least = hn::Min(least, hn::IfThenElse(bound <= hn::Load(d, limit + at), bound, none));
   }
-  all = hn::MinOfLanes(d, all);
-  return hn::GetLane(hn::IfThenElse(all < none, all, hn::Set(d, -1.0f)));
+  return least;
 }
+
+#if HWY_TARGET == HWY_SCALAR
+
+/// Sets key[i] to the least lane of least[i].
+template <class D>
+HWY_INLINE void leastLanes(D, const hn::Vec<D>* least, float* key) {
+  for (int i = 0; i < kWidth; ++i) key[i] = hn::GetLane(least[i]);
+}
+
+#else
+
+/// Returns the least of all blocks of four lanes.
+template <class D>
+HWY_INLINE hn::Vec<hn::CappedTag<float, 4>> leastBlock(D d, hn::Vec<D> v) {
+  if constexpr (hn::MaxLanes(d) == 4) {
+    return v;
+  } else {
+    const hn::Half<D> half;
+    return leastBlock(half, hn::Min(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
+  }
+}
+
+/// Sets key[i] to the least lane of least[i]. The four vectors are interleaved, which takes half as many shuffles as
+/// one vector after the other.
+template <class D>
+HWY_INLINE void leastLanes(D d, const hn::Vec<D>* least, float* key) {
+  static_assert(kWidth == 4);
+  const hn::RepartitionToWide<D> pairs;
+  const auto leastOfTwo = [&](int i) HWY_ATTR {
+    return hn::BitCast(
+        pairs, hn::Min(hn::InterleaveLower(d, least[i], least[i + 1]), hn::InterleaveUpper(d, least[i], least[i + 1])));
+  };
+  const auto low = leastOfTwo(0), high = leastOfTwo(2);
+  const auto all = hn::Min(hn::BitCast(d, hn::InterleaveLower(pairs, low, high)),
+                           hn::BitCast(d, hn::InterleaveUpper(pairs, low, high)));
+  hn::StoreU(leastBlock(d, all), hn::CappedTag<float, 4>(), key);
+}
+
+#endif
 
 /// Pointers to the arrays of a hierarchy. As local copies they stay in registers during the search.
 struct Arrays {
@@ -332,20 +377,21 @@ struct Arrays {
   const TriangleFrame* frames;
 };
 
-using PacketPoint = Point<hn::Vec<PacketTag>>;
-
-HWY_INLINE PacketPoint pointAt(PacketTag d, const Search<kPacket>& s, std::size_t at) {
+template <int Lanes>
+HWY_INLINE Point<hn::Vec<PacketTag<Lanes>>> pointAt(const Search<Lanes>& s, std::size_t at) {
+  const PacketTag<Lanes> d;
   return {hn::Load(d, s.point[0] + at), hn::Load(d, s.point[1] + at), hn::Load(d, s.point[2] + at)};
 }
 
 /// Adds to the candidates those triangles of a block that may be nearest to a point of the packet. The distances to
 /// all triangles are computed before any triangle is rejected, because branches would be mispredicted.
-HWY_INLINE void visitBlockOfPacket(Search<kPacket>& s, const Arrays& arrays, std::uint32_t blockIndex) {
-  const PacketTag d;
+template <int Lanes>
+HWY_INLINE void visitBlockOfPacket(Search<Lanes>& s, const Arrays& arrays, std::uint32_t blockIndex) {
+  const PacketTag<Lanes> d;
   const Block& block = arrays.blocks[blockIndex];
-  HWY_ALIGN float lower[kWidth][kPacket];
-  for (std::size_t at = 0; at < kPacket; at += kLanes) {
-    const PacketPoint point = pointAt(d, s, at);
+  HWY_ALIGN float lower[kWidth][Lanes];
+  for (std::size_t at = 0; at < Lanes; at += hn::MaxLanes(d)) {
+    const auto point = pointAt(s, at);
     auto upper = hn::Set(d, kOutOfReach);
     HWY_UNROLL(4)
     for (int i = 0; i < kWidth; ++i) {
@@ -357,36 +403,41 @@ HWY_INLINE void visitBlockOfPacket(Search<kPacket>& s, const Arrays& arrays, std
   }
   if (s.count + kWidth > s.kCapacity) settle(s);
   for (std::uint32_t i = 0; i < kWidth; ++i) {
-    std::copy_n(lower[i], kPacket, s.lower[s.count]);
+    std::copy_n(lower[i], Lanes, s.lower[s.count]);
     s.candidates[s.count] = blockIndex * kWidth + i;
-    const bool kept = anyInReach<kPacket>(lower[i], s.limit) & (i < block.count);
+    const bool kept = anyInReach<Lanes>(lower[i], s.limit) & (i < block.count);
     s.count += kept;
     prefetch(arrays.frames + block.first + (kept ? i : 0));
   }
 }
 
 /// Pushes onto the stack the children of a node that may contain the nearest triangle of a point of the packet.
-HWY_INLINE void visitNodeOfPacket(const Search<kPacket>& s, const Arrays& arrays, const Node& node,
-                                  Stack<PendingOfPacket>& stack) {
-  const PacketTag d;
-  HWY_ALIGN float lower[kWidth][kPacket];
-  for (std::size_t at = 0; at < kPacket; at += kLanes) {
-    const PacketPoint point = pointAt(d, s, at);
+template <int Lanes>
+HWY_INLINE void visitNodeOfPacket(const Search<Lanes>& s, const Arrays& arrays, const Node& node,
+                                  Stack<PendingOfPacket<Lanes>>& stack) {
+  const PacketTag<Lanes> d;
+  HWY_ALIGN float lower[kWidth][Lanes];
+  for (std::size_t at = 0; at < Lanes; at += hn::MaxLanes(d)) {
+    const auto point = pointAt(s, at);
     HWY_UNROLL(4)
     for (int child = 0; child < kWidth; ++child)
       hn::Store(boxDistance(d, point, [&](int f) HWY_ATTR { return hn::Set(d, node.field[f][child]); }), d,
                 lower[child] + at);
   }
-  float key[kWidth];
+  hn::Vec<PacketTag<Lanes>> least[kWidth];
   HWY_UNROLL(4)
-  for (int child = 0; child < kWidth; ++child) key[child] = leastInReach(d, lower[child], s.limit);
-  PendingOfPacket* const room = stack.room();
+  for (int child = 0; child < kWidth; ++child) least[child] = leastInReach<Lanes>(lower[child], s.limit);
+  float key[kWidth];
+  leastLanes(d, least, key);
+  HWY_UNROLL(4)
+  for (float& bound : key) bound = bound < kOutOfReach ? bound : -1;
+  PendingOfPacket<Lanes>* const room = stack.room();
   const std::array<int, kWidth> ranks = ranksOf(key);
   int hits = 0;
   HWY_UNROLL(4)
   for (int child = 0; child < kWidth; ++child) {
-    PendingOfPacket& pending = room[ranks[child]];
-    std::copy_n(lower[child], kPacket, pending.lower);
+    PendingOfPacket<Lanes>& pending = room[ranks[child]];
+    std::copy_n(lower[child], Lanes, pending.lower);
     pending.child = node.child[child];
     const bool hit = key[child] >= 0;
     hits += hit;
@@ -395,15 +446,19 @@ HWY_INLINE void visitNodeOfPacket(const Search<kPacket>& s, const Arrays& arrays
   stack.grow(hits);
 }
 
-void runPacket(Search<kPacket>& s) {
+template <int Lanes>
+HWY_INLINE void runPacket(Search<Lanes>& s) {
   if (s.tooFar) return tryAll(s);
   const Arrays arrays(s.hierarchy);
-  Stack<PendingOfPacket> stack;
+  Stack<PendingOfPacket<Lanes>> stack;
   traverse(
       s, stack, [&](const Node& node) HWY_ATTR { visitNodeOfPacket(s, arrays, node, stack); },
       [&](std::uint32_t blockIndex) HWY_ATTR { visitBlockOfPacket(s, arrays, blockIndex); },
-      [&](const PendingOfPacket& next) HWY_ATTR { return anyInReach<kPacket>(next.lower, s.limit); });
+      [&](const PendingOfPacket<Lanes>& next) HWY_ATTR { return anyInReach<Lanes>(next.lower, s.limit); });
 }
+
+void runSmallPacket(Search<kSmallPacket>& s) { runPacket(s); }
+void runLargePacket(Search<kPacket>& s) { runPacket(s); }
 
 }  // namespace
 }  // namespace HWY_NAMESPACE
@@ -414,10 +469,11 @@ HWY_AFTER_NAMESPACE();
 namespace hpsdf::bvh {
 
 HWY_EXPORT(runOne);
-HWY_EXPORT(runPacket);
+HWY_EXPORT(runSmallPacket);
+HWY_EXPORT(runLargePacket);
 
 Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x) {
-  Search<1> search(hierarchy, {x});
+  Search<1> search(hierarchy, {&x, 1});
   run(search);
   return search.result(0);
 }
@@ -426,12 +482,24 @@ double distanceTo(const Hierarchy& hierarchy, const Vector3& x) {
   return std::sqrt(squaredDistance(hierarchy.frameAt(nearestTriangle(hierarchy, x).triangleRef), x));
 }
 
-void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
-                      std::array<Nearest, kPacket>& nearest) {
-  Search<kPacket> search(hierarchy, points);
+namespace {
+
+template <int Lanes>
+void findNearest(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest) {
+  Search<Lanes> search(hierarchy, points);
   for (const Nearest& start : nearest) search.addSeed(start.triangleRef);
   run(search);
-  for (int lane = 0; lane < kPacket; ++lane) nearest[lane] = search.result(lane);
+  for (std::size_t lane = 0; lane < points.size(); ++lane) nearest[lane] = search.result(int(lane));
+}
+
+}  // namespace
+
+void nearestTriangles(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest) {
+  assert(points.size() == nearest.size() && !points.empty() && points.size() <= kPacket);
+  if (points.size() <= kSmallPacket)
+    findNearest<kSmallPacket>(hierarchy, points, nearest);
+  else
+    findNearest<kPacket>(hierarchy, points, nearest);
 }
 
 std::string_view instructionSet() {
@@ -441,16 +509,18 @@ std::string_view instructionSet() {
 }
 
 void run(Search<1>& search) { HWY_DYNAMIC_DISPATCH(runOne)(search); }
-void run(Search<kPacket>& search) { HWY_DYNAMIC_DISPATCH(runPacket)(search); }
+void run(Search<kSmallPacket>& search) { HWY_DYNAMIC_DISPATCH(runSmallPacket)(search); }
+void run(Search<kPacket>& search) { HWY_DYNAMIC_DISPATCH(runLargePacket)(search); }
 
 template <int Lanes>
-Search<Lanes>::Search(const Hierarchy& tree, const std::array<Vector3, Lanes>& points) : hierarchy(tree) {
+Search<Lanes>::Search(const Hierarchy& tree, std::span<const Vector3> points) : hierarchy(tree) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double largest = 1;
   for (int lane = 0; lane < Lanes; ++lane) {
-    const Vector3 local = hierarchy.local(points[lane]);
+    const Vector3& x = points[std::min(std::size_t(lane), points.size() - 1)];
+    const Vector3 local = hierarchy.local(x);
     for (int axis = 0; axis < 3; ++axis) {
-      exact[axis][lane] = points[lane][axis];
+      exact[axis][lane] = x[axis];
       point[axis][lane] = static_cast<float>(local[axis]);
       tooFar |= !(std::abs(local[axis]) < 1e15);  // This is also true for NaN, which std::max below ignores.
       largest = std::max(largest, std::abs(local[axis]));
@@ -479,6 +549,7 @@ Nearest Search<Lanes>::result(int lane) const {
 }
 
 template struct Search<1>;
+template struct Search<kSmallPacket>;
 template struct Search<kPacket>;
 
 }  // namespace hpsdf::bvh

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 #include "bvh/hierarchy.h"
@@ -17,7 +18,8 @@ template <int Lanes>
 struct Search {
   static constexpr int kCapacity = 96;  ///< capacity of the list of candidates, which `settle` empties
 
-  Search(const Hierarchy& hierarchy, const std::array<Vector3, Lanes>& points);
+  /// Begins the search for 1 to `Lanes` points. Lanes beyond them repeat the last point.
+  Search(const Hierarchy& hierarchy, std::span<const Vector3> points);
 
   /// Makes the search visit the block of this triangle first. If the triangle is close to the query points, the
   /// search has a tight distance bound from the start.
@@ -50,10 +52,12 @@ struct Search {
 };
 
 extern template struct Search<1>;
+extern template struct Search<kSmallPacket>;
 extern template struct Search<kPacket>;
 
 /// Runs the search with the best instruction set of this processor.
 void run(Search<1>& search);
+void run(Search<kSmallPacket>& search);
 void run(Search<kPacket>& search);
 
 /// Returns the triangle nearest to x.
@@ -62,11 +66,10 @@ Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x);
 /// Returns the distance from x to the nearest triangle.
 double distanceTo(const Hierarchy& hierarchy, const Vector3& x);
 
-/// Finds the nearest triangle of each point of a packet in one search. The points should be close to each other. On
-/// entry, `nearest` holds triangles from which the search starts, such as those found for nearby points. On return, it
-/// holds the nearest triangles.
-void nearestTriangles(const Hierarchy& hierarchy, const std::array<Vector3, kPacket>& points,
-                      std::array<Nearest, kPacket>& nearest);
+/// Finds the nearest triangle of each point of a packet, of 1 to kPacket points, in one search. The points should be
+/// close to each other. On entry, `nearest` holds triangles from which the search starts, such as those found for
+/// nearby points. On return, it holds the nearest triangles. Both spans must have the same length.
+void nearestTriangles(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest);
 
 /// Returns the name of the SIMD instruction set in use, such as "AVX2".
 std::string_view instructionSet();

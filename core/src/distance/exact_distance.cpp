@@ -247,11 +247,9 @@ struct ExactDistance::Data {
     using bvh::kPacket;
     std::array<bvh::Nearest, kPacket> nearest{};  // nearest triangles of the previous points; they bound the search
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
-      const std::size_t count = std::min<std::size_t>(kPacket, points.size() - first);
-      std::array<Vector3, kPacket> packet;
-      for (std::size_t i = 0; i < kPacket; ++i) packet[i] = points[first + std::min(i, count - 1)];
-      nearestTriangles(triangles, packet, nearest);
-      for (std::size_t i = 0; i < count; ++i) {
+      const auto packet = points.subspan(first, std::min<std::size_t>(kPacket, points.size() - first));
+      nearestTriangles(triangles, packet, std::span(nearest).first(packet.size()));
+      for (std::size_t i = 0; i < packet.size(); ++i) {
         const ClosestPoint closest = resolve(triangles, packet[i], nearest[i]);
         out[first + i] = closest.signedDistance;
         if (!directions.empty()) directions[first + i] = directionFrom(closest, triangles, packet[i], nearest[i]);

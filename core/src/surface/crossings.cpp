@@ -130,10 +130,14 @@ double squaredDistance(const Vector3& a, const Vector3& b, const Vector3& c, con
   return least;
 }
 
-/// Returns true if all points lie on one side of the triangle's plane, farther from it than the margin.
+/// Returns true only if all points certainly lie on one side of the triangle's plane, farther from it than the margin.
 bool lieFarOnOneSide(const Corners& t, std::span<const Vector3> points, double margin) {
-  const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
-  const double least = margin * normal.norm();
+  // A bound of the rounding errors of the heights below, relative to the lengths of two sides, for coordinates of
+  // magnitudes of about 1.
+  constexpr double kRounding = 2e-14;
+  const Vector3 left = t[1] - t[0], right = t[2] - t[0];
+  const Vector3 normal = left.cross(right);
+  const double least = margin * normal.norm() + kRounding * std::sqrt(left.squaredNorm() * right.squaredNorm());
   int above = 0, below = 0;
   for (const Vector3& point : points) {
     const double height = normal.dot(point - t[0]);
@@ -158,34 +162,52 @@ bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
   return false;
 }
 
+/// Returns the corners that come after those that a triangle shares with another one.
+std::span<const Vector3> unsharedOf(const Corners& t, int shared) {
+  return std::span(t).subspan(static_cast<std::size_t>(shared));
+}
+
 /// Returns true if one of two triangles comes nearer than `margin` to the unshared corners of the other one, or to the
 /// edges between these corners. The triangles have `shared` common corners, which come first in both.
 bool areNear(const Corners& one, const Corners& other, int shared, double margin) {
-  const auto unshared = [&](const Corners& t) { return std::span(t).subspan(static_cast<std::size_t>(shared)); };
-  return isNear(one, unshared(other), margin) || isNear(other, unshared(one), margin);
+  return isNear(one, unsharedOf(other, shared), margin) || isNear(other, unsharedOf(one, shared), margin);
 }
 
-/// Returns true if a line along an edge of the triangle t, in its plane, has the other triangle on its outer side,
-/// farther from t than the margin.
-bool liesBeyondEdge(const Corners& t, const Corners& other, double margin) {
-  // A bound of the rounding errors of the products below, for unit axes and coordinates of magnitudes of about 1.
-  constexpr double kRounding = 1e-13;
+/// Returns true only if a line along an edge of the triangle t, in its plane, certainly has all points on its outer
+/// side, farther from t than the margin. Only edges between the first `shared` corners count, or edges at the first
+/// corner if that alone is shared.
+bool lieFarBeyondEdge(const Corners& t, std::span<const Vector3> points, int shared, double margin) {
+  // A bound of the rounding errors of the products below, for unit axes and coordinates of magnitudes of about 1. It is
+  // so large that it also covers the rounding of an axis that should be perpendicular to an edge at a shared corner.
+  constexpr double kRounding = 1e-11;
   const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
-  for (int k = 0; k < 3; ++k) {
+  const auto isBeyond = [&](std::size_t k) {
     const Vector3 outward = (t[(k + 1) % 3] - t[k]).cross(normal);
     const auto height = [&](const Vector3& x) { return outward.dot(x - t[k]); };
     const double inner = std::max({height(t[0]), height(t[1]), height(t[2])});
-    const double outer = std::min({height(other[0]), height(other[1]), height(other[2])});
-    if (outer - inner > (margin + kRounding) * outward.norm()) return true;
-  }
-  return false;
+    const double least = inner + (margin + kRounding) * outward.norm();
+    return std::ranges::all_of(points, [&](const Vector3& x) { return height(x) > least; });
+  };
+  return isBeyond(0) || (shared < 2 && isBeyond(2)) || (shared < 1 && isBeyond(1));
 }
 
-/// Returns true only if an axis certainly separates two triangles by more than the margin. The axes are normal to the
-/// edges, in the planes of the triangles: they separate the long, thin triangles of a flat face, whose boxes nearly all
-/// overlap, before the exact predicates are asked, which are slowest for points in one plane.
-bool areSeparated(const Corners& one, const Corners& other, double margin) {
-  return liesBeyondEdge(one, other, margin) || liesBeyondEdge(other, one, margin);
+/// Returns true if the sine of the angle at the triangle's first corner is below 1/1000.
+bool isThinAtFirstCorner(const Corners& t) {
+  const Vector3 left = t[1] - t[0], right = t[2] - t[0];
+  return !(left.cross(right).squaredNorm() > 1e-6 * left.squaredNorm() * right.squaredNorm());
+}
+
+/// Returns true only if two triangles certainly have no points in common but their first `shared` corners, at most two,
+/// and the edge between these, and if either is farther than `margin` from the unshared corners of the other one, and
+/// from the edges between them. Planes along a triangle, or normal to it along an edge, show that for nearly all pairs
+/// of triangles whose boxes overlap. The exact tests take longer, and longest for points in one plane.
+bool areCertainlyApart(const Corners& one, const Corners& other, int shared, double margin) {
+  const auto isApart = [&](const Corners& t, std::span<const Vector3> points) {
+    return lieFarOnOneSide(t, points, margin) ||
+           ((shared == 0 || !isThinAtFirstCorner(t)) && lieFarBeyondEdge(t, points, shared, margin));
+  };
+  if (shared == 0) return isApart(one, other) || isApart(other, one);
+  return isApart(one, unsharedOf(other, shared)) && isApart(other, unsharedOf(one, shared));
 }
 
 /// Finds pairs of intersecting triangles by a tree of axis-aligned bounding boxes. Each box contains up to four
@@ -208,9 +230,10 @@ class Finder {
                                                  const Progress& progress) const {
     std::vector<std::vector<Crossing>> ofSlot(end - begin);
     std::atomic<std::size_t> count = 0;
-    tbb::parallel_for(begin, end, [&](std::uint32_t slot) {
+    tbb::parallel_for(std::uint32_t{0}, (end - begin + kGroup - 1) / kGroup, [&](std::uint32_t group) {
       progress.throwIfCancelled();
-      find(slot, [&](const Crossing& crossing) {
+      const std::uint32_t first = begin + group * kGroup;
+      find(first, std::min(first + kGroup, end), [&](std::uint32_t slot, const Crossing& crossing) {
         ofSlot[slot - begin].push_back(crossing);
         return ++count < most;
       });
@@ -225,7 +248,7 @@ class Finder {
   /// triangles at later positions.
   std::vector<Crossing> findFirst(std::uint32_t slot, std::size_t most) const {
     std::vector<Crossing> found;
-    find(slot, [&](const Crossing& crossing) {
+    find(slot, slot + 1, [&](std::uint32_t, const Crossing& crossing) {
       found.push_back(crossing);
       return found.size() < most;
     });
@@ -233,14 +256,25 @@ class Finder {
   }
 
  private:
-  /// Calls take(crossing) for each crossing of the triangle at the position `slot` of the hierarchy's order with
-  /// a triangle at a later position, until `take` returns false.
-  template <typename Take>
-  void find(std::uint32_t slot, const Take& take) const {
-    if (!isDegenerate(corners(slot))) visit(static_cast<int>(levels_.size()) - 1, 0, slot, take);
-  }
+  static constexpr std::uint32_t kWidth = 4;   ///< number of boxes that one box of the next higher level contains
+  static constexpr std::uint32_t kGroup = 16;  ///< number of triangles that search the tree together
 
-  static constexpr std::uint32_t kWidth = 4;  ///< number of boxes that one box of the next higher level contains
+  /// Calls take(slot, crossing) for each crossing of a triangle at a position `slot` in [begin, end) of the hierarchy's
+  /// order with a triangle at a later position, until `take` returns false.
+  template <typename Take>
+  void find(std::uint32_t begin, std::uint32_t end, const Take& take) const {
+    Box box;
+    for (std::uint32_t slot = begin; slot < end; ++slot) box.extend(levels_[0][slot]);
+    std::vector<std::uint32_t> others;
+    collect(static_cast<int>(levels_.size()) - 1, 0, begin, box, others);
+    for (std::uint32_t slot = begin; slot < end; ++slot) {
+      if (isDegenerate(corners(slot))) continue;
+      for (const std::uint32_t other : others)
+        if (other > slot && levels_[0][other].intersects(levels_[0][slot]) && isCrossing(slot, other) &&
+            !take(slot, crossing(slot, other)))
+          return;
+    }
+  }
 
   Corners cornersOf(const Indices& t) const { return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]}; }
   Corners corners(std::uint32_t slot) const { return cornersOf(hierarchy_.triangles()[slot]); }
@@ -261,33 +295,37 @@ class Finder {
     }
   }
 
-  template <typename Take>
-  bool visit(int level, std::uint32_t box, std::uint32_t slot, const Take& take) const {
-    const Box& slotBox = levels_[0][slot];
-    if (!levels_[level][box].intersects(slotBox)) return true;
-    if (level == 0) return box == slot || !isCrossing(slot, box) || take(crossing(slot, box));
+  /// Appends to `found` the positions after `slot` of the triangles in a box of the tree whose boxes intersect `query`,
+  /// in ascending order.
+  void collect(int level, std::uint32_t box, std::uint32_t slot, const Box& query,
+               std::vector<std::uint32_t>& found) const {
+    if (!levels_[level][box].intersects(query)) return;
+    if (level == 0) {
+      if (box > slot) found.push_back(box);
+      return;
+    }
     const auto end =
         static_cast<std::uint32_t>(std::min<std::size_t>((std::size_t{box} + 1) * kWidth, levels_[level - 1].size()));
     for (std::uint32_t child = box * kWidth; child < end; ++child) {
       const bool endsAfterSlot = (std::uint64_t{child} + 1) << (2 * (level - 1)) > slot + std::uint64_t{1};
-      if (endsAfterSlot && !visit(level - 1, child, slot, take)) return false;
+      if (endsAfterSlot) collect(level - 1, child, slot, query, found);
     }
-    return true;
   }
 
   bool isCrossing(std::uint32_t slot, std::uint32_t otherSlot) const {
     Indices one = hierarchy_.triangles()[slot], other = hierarchy_.triangles()[otherSlot];
     const int shared = moveSharedToFront(one, other);
+    if (shared == 3) return true;
     const Corners first = cornersOf(one), second = cornersOf(other);
-    if (shared == 0 && areSeparated(first, second, margin_)) return false;
-    if (isDegenerate(second)) return false;
+    if (areCertainlyApart(first, second, shared, margin_) || isDegenerate(second)) return false;
     return intersectBeyondShared(first, second, shared) || (margin_ > 0 && areNear(first, second, shared, margin_));
   }
 
+  /// Returns true if two triangles with at most two shared corners, which come first, have any other point in common.
   static bool intersectBeyondShared(const Corners& first, const Corners& second, int shared) {
     if (shared == 0) return intersect(first, second);
     if (shared == 1) return intersectBeyondCorner(first, second);
-    return shared == 3 || intersectBeyondEdge(first, second);
+    return intersectBeyondEdge(first, second);
   }
 
   Crossing crossing(std::uint32_t slot, std::uint32_t other) const {
