@@ -701,9 +701,17 @@ TEST(ExactDistance, instructionSetsAgreeBitForBit) {
     std::vector<double> all(points.size());
     distance(points, all);
     for (const Vector3& x : points) all.push_back(distance(x));
+    std::vector<double> inParts(points.size());
+    for (std::size_t first = 0, size = 1; first < points.size(); first += size, size = size % 20 + 1) {
+      size = std::min(size, points.size() - first);
+      distance(std::span(points).subspan(first, size), std::span(inParts).subspan(first, size));
+    }
+    all.insert(all.end(), inParts.begin(), inParts.end());
     return all;
   };
   const std::vector<double> best = answers();
+  const auto third = std::ptrdiff_t(points.size());
+  EXPECT_TRUE(std::equal(best.begin(), best.begin() + third, best.end() - third)) << "batches of 1 to 20 points";
   std::set<std::string_view> names;
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
@@ -745,7 +753,7 @@ TEST(ExactDistance, acceptsNonFinitePoints) {
     }
 }
 
-/// Each SIMD packet of eight points contains a NaN and a point that is very near, far or beyond single precision.
+/// Each SIMD packet contains a NaN and a point that is very near, far or beyond single precision.
 TEST(ExactDistance, nonFinitePointsDoNotAffectTheirPacket) {
   const ExactDistance distance(sphere(2));
   std::vector<Vector3> points;

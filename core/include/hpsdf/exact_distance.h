@@ -37,7 +37,7 @@ struct DistanceOptions {
 /// Exact signed distance to a triangle mesh in double precision.
 ///
 /// The unsigned distance comes from a search for the nearest triangle in a hierarchy of oriented boxes, which takes
-/// eight points at a time. The sign comes from an inside test:
+/// up to sixteen points at a time. The sign comes from an inside test:
 /// - `InsideTest::pseudonormal`: the sign of the dot product of the vector from the closest point to the query point
 ///   with the angle-weighted pseudonormal of the closest face, edge or vertex (Bærentzen & Aanæs 2005). It is right
 ///   for closed meshes without self-intersections.

@@ -30,7 +30,7 @@ std::unique_ptr<const basis::Projection> makeProjection(int degree, const BuildO
 
 /// Number of points whose exact distances are searched together. The search is fastest if these points lie close
 /// to each other.
-constexpr std::size_t kGroup = 8;
+constexpr std::size_t kGroup = 16;
 
 /// Sorts the point indices in `order` into compact groups. Halves the set of points recursively along the longest
 /// axis of its box.
@@ -47,7 +47,7 @@ void intoGroups(std::span<std::uint32_t> order, const std::vector<Vector3>& poin
 }
 
 /// Returns the indices of the points, sorted into compact groups. Returns an empty list if the given order is
-/// good enough: with very many points, eight consecutive ones lie close to each other anyway.
+/// good enough: with very many points, consecutive ones lie close to each other anyway.
 std::vector<std::uint32_t> groupedOrder(const std::vector<Vector3>& points) {
   constexpr std::size_t kMost = 8 * 1000;
   if (points.size() > kMost) return {};
