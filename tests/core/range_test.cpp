@@ -166,6 +166,27 @@ TEST(Range, containsEveryValueOfExactLeaves) {
 }
 
 /// The test above would see intervals that are a little too narrow.
+/// A leaf lists triangles for each of its octants. A small leaf is a single part, so that the boxes in it must ask the
+/// octant that they lie in.
+TEST(Range, ofSmallBoxesInSmallExactLeavesContainsTheirValues) {
+  const ExactDistance gear(shapes::mesh("gear"));
+  const Field field = build(gear, domainAround(gear.source().box),
+                            {.targetError = 1e-6, .grid = {33, 33, 33}, .strategy = Strategy::hpx});
+  const RangeIndex index(field);
+  RandomBoxes random(12);
+  int leaves = 0, outside = 0;
+  field.forEachCell([&](const Cell& cell) {
+    if (cell.degree != kExactDegree || ++leaves % 8 != 0) return;
+    for (const double size : {0.3, 0.03}) {
+      const Box box = random.within(cell.box, size);
+      const Interval range = index.range(box).value;
+      for (const Vector3& x : random.pointsOf(box, 16)) outside += static_cast<int>(!range.contains(field.value(x)));
+    }
+  });
+  EXPECT_GT(leaves, 2000);
+  EXPECT_EQ(outside, 0);
+}
+
 TEST(Range, aRangeThatIsTooNarrowIsFound) {
   const Field field = build(torus, cube(), {.targetError = 1e-6});
   const RangeIndex index(field);

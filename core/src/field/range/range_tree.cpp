@@ -10,6 +10,7 @@
 
 #include "field/query/evaluate.h"
 #include "field/query/leaves.h"
+#include "field/query/quantized.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::range {
@@ -372,8 +373,12 @@ class RangeSearch {
 
   Enclosure exactAround(const Cell& cell, std::uint64_t bits, const std::array<double, 3>& middle,
                         double radius) const {
-    int octant = 0;  // a part lies in one octant of the leaf; a whole leaf gives the same distance in all of them
-    for (int axis = 0; axis < 3; ++axis) octant |= int(cell.cube.centre[axis] >= cell.leafCentre[axis]) << axis;
+    // A part lies in one octant of the leaf. The list of each octant is complete only there, so that in a whole leaf
+    // the octant of the middle counts.
+    const bool isWhole = tree_.details_[cell.group].levelsBelowLeaf == 0;
+    const std::array<double, 3>& inOctant = isWhole ? middle : cell.cube.centre;
+    int octant = 0;
+    for (int axis = 0; axis < 3; ++axis) octant |= int(inOctant[axis] >= cell.leafCentre[axis]) << axis;
     const Vector3 x = query::worldPoint(frame_, middle);
     KnownDistance known{.offset = tree_.field_.exact.offset,
                         .isSignUncertain = (tree_.details_[cell.group].uncertainSigns >> cell.number & 1) != 0};
