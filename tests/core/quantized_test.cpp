@@ -120,6 +120,18 @@ void expectEqualAnswers(const Field& quantized, const Field& decoded, std::size_
   }
 }
 
+/// Integers from a few bits up to the most that SIMD decodes, in leaves of every degree with SIMD code and beyond.
+TEST(Quantized, batchesDecodeIntegersOfAnyLength) {
+  const Field field = randomField(7, {.minDegree = 0, .maxDegree = 6});
+  for (double step = 0.25; step > 1e-6; step /= 4) {
+    const Field quantized(quantizedData(field, step));
+    FieldData data = quantized.data();
+    query::toDouble(data);
+    SCOPED_TRACE(step);
+    expectEqualAnswers(quantized, Field(std::move(data)), 3000, 1e-11);
+  }
+}
+
 TEST(Quantized, blendedFieldsToo) {
   const Field quantized = blended(Field(quantizedData(randomField(4), 1e-3)), 0.1);
   FieldData data = quantized.data();

@@ -192,6 +192,8 @@ auto withDegree(int degree, const F& f) {
       return f(Constant<3>());
     case 4:
       return f(Constant<4>());
+    case 5:
+      return f(Constant<5>());
     default:
       return f(degree);
   }

@@ -26,7 +26,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Tag = hn::CappedTag<double, 4>;
+using Tag = hn::CappedTag<double, 8>;
 using Unsigned = hn::RebindToUnsigned<Tag>;
 using Vec = hn::Vec<Tag>;
 constexpr std::size_t kLanes = hn::MaxLanes(Tag());
@@ -57,6 +57,17 @@ struct LaneWords {
   friend HWY_INLINE LaneWords operator>>(LaneWords a, LaneWords count) { return hn::Shr(a.v, count.v); }
 };
 
+/// Returns N times each word.
+template <int N>
+HWY_INLINE LaneWords times(LaneWords words) {
+  if constexpr (N == 1) {
+    return words;
+  } else {
+    const LaneWords even(hn::ShiftLeft<1>(times<N / 2>(words).v));
+    return N % 2 == 0 ? even : even + words;
+  }
+}
+HWY_INLINE bool isZero(LaneWords a) { return hn::AllTrue(Unsigned(), hn::Eq(a.v, hn::Zero(Unsigned()))); }
 HWY_INLINE LaneWords orAnd(LaneWords a, LaneWords b, LaneWords c) { return hn::OrAnd(a.v, b.v, c.v); }
 HWY_INLINE Lanes asNumber(LaneWords words) { return hn::BitCast(Tag(), words.v); }
 
@@ -76,11 +87,19 @@ HWY_INLINE auto wordsAt(const std::uint8_t* bytes, const std::uint64_t* at) {
 /// The bits of several leaves in an array of bytes, in the form that decodeLeaves takes.
 struct LanesOfBits {
   const std::uint8_t* bytes;
-  hn::Vec<Unsigned> begins;  ///< the first bit of each leaf in the array
+  std::array<std::uint64_t, kLanes> offsets;  ///< the first byte of each leaf in the array
+  hn::Vec<Unsigned> begins;                   ///< the first bit of each leaf in the array
 
   HWY_INLINE LaneWords begin() const { return begins; }
+  HWY_INLINE LaneWords head() const { return wordsAt<kLanes>(bytes, offsets.data()); }
 
-  /// Returns for each leaf at least 57 bits from a bit of the array on, the first in the lowest bit.
+  /// Returns for each leaf at least 57 bits from a bit of the leaf on, the first in the lowest bit. The bit is the same
+  /// in all leaves.
+  HWY_INLINE LaneWords readAllAt(std::uint32_t position) const {
+    return LaneWords(wordsAt<kLanes>(bytes + (position >> 3), offsets.data())) >> LaneWords(position & 7);
+  }
+
+  /// Returns as many bits of each leaf from a bit of the array on.
   HWY_INLINE LaneWords read(LaneWords position) const {
     HWY_ALIGN std::uint64_t at[kLanes];
     hn::Store(hn::ShiftRight<3>(position.v), Unsigned(), at);
@@ -92,14 +111,14 @@ struct LanesOfBits {
 #include "field/query/polynomial-inl.h"
 #include "field/query/quantized-inl.h"
 
-/// Number of points in a batch: large enough that loops over a batch overlap their memory accesses, small
-/// enough for a batch to fit into the L1 cache.
-constexpr std::size_t kBatch = 128;
-static_assert(kBatch % kLanes == 0);
+/// Number of points in a batch: large enough that loops over a batch overlap their memory accesses and that few lanes
+/// are left over at the end of each list, small enough for a batch to fit into the L1 cache.
+constexpr std::size_t kBatch = kLanes > 4 ? 256 : 128;
+static_assert(kBatch % kLanes == 0 && kBatch <= 256, "the indices of a batch fit into a byte");
 
 /// The lowest and the highest polynomial degree with SIMD code. `withDegree` has compile-time constants for the
 /// same degrees.
-constexpr int kMinVectorDegree = 1, kMaxVectorDegree = 4;
+constexpr int kMinVectorDegree = 1, kMaxVectorDegree = 5;
 
 /// Number of lists into which the points of a batch are sorted: one for each degree with SIMD code, and one for
 /// all other degrees.
@@ -118,14 +137,14 @@ struct Batch {
   const Vector3* points;
   std::size_t count;
   bool allInDomain;
-  HWY_ALIGN double coordinates[3][kBatch];       ///< grid coordinates, in which base cells are unit cubes
-  HWY_ALIGN double fixedPoint[3][kBatch];        ///< grid coordinates as fixed-point integers, exact in double
-  HWY_ALIGN std::uint64_t path[kBatch];          ///< octree paths: the bits that select a child at each depth
-  HWY_ALIGN std::uint64_t entry[kBatch];         ///< index into `LookupGrid::entries`
-  std::uint64_t blendExtentsIndex[kBatch];       ///< index into `LookupGrid::blendExtents`; only for blending
-  HWY_ALIGN std::uint64_t bits[kBatch];          ///< octree nodes with their depths in bits 40 to 47
-  HWY_ALIGN PackedLeafPoint leafPoints[kBatch];  ///< set when all leaves are found
-  std::uint8_t listed[kLists][kBatch + kLanes];  ///< indices of the points in each list
+  HWY_ALIGN double coordinates[3][kBatch];        ///< grid coordinates, in which base cells are unit cubes
+  HWY_ALIGN double fixedPoint[3][kBatch];         ///< grid coordinates as fixed-point integers, exact in double
+  HWY_ALIGN std::uint64_t path[kBatch];           ///< octree paths: the bits that select a child at each depth
+  HWY_ALIGN std::uint64_t entry[kBatch];          ///< index into `LookupGrid::entries`
+  std::uint64_t blendExtentsIndex[kBatch];        ///< index into `LookupGrid::blendExtents`; only for blending
+  HWY_ALIGN std::uint64_t bits[kBatch];           ///< octree nodes with their depths in bits 40 to 47
+  HWY_ALIGN PackedLeafPoint leafPoints[kBatch];   ///< set when all leaves are found
+  std::uint32_t listed[kLists][kBatch + kLanes];  ///< indices of the points in each list
   std::size_t listedCount[kLists];
 };
 
@@ -204,34 +223,73 @@ void descend(const FieldData& field, const LookupGrid& lookupGrid, Batch& batch)
   for (std::size_t i = batch.count; i % kLanes != 0; ++i) batch.bits[i] = batch.bits[i - 1];
 }
 
+/// The highest degree all of whose coefficients are prefetched. Higher degrees are rare.
+constexpr int kPrefetchedDegree = 4;
+
 /// Prefetches the coefficients of a leaf: the same number of cache lines for each leaf, because a varying end of the
 /// loop would be mispredicted.
 template <typename T>
 HWY_INLINE void prefetch(const std::vector<T>& coefficients, std::size_t offset, int degree) {
   const std::size_t last = coefficientCount(degree) - 1;
-  for (std::size_t at = 0; at < coefficientCount(kMaxVectorDegree); at += 64 / sizeof(T))
+  for (std::size_t at = 0; at < coefficientCount(kPrefetchedDegree); at += 64 / sizeof(T))
     __builtin_prefetch(coefficients.data() + offset + std::min(at, last));
 }
 
-/// A quantized leaf of up to `kMaxVectorDegree` takes less than a cache line, nearly always.
+/// A quantized leaf of up to degree 4 takes at most 32 bytes, nearly always.
 HWY_INLINE void prefetch(const QuantizedCoefficients& coefficients, std::size_t offset, int /*degree*/) {
   __builtin_prefetch(coefficients.bytes.data() + offset);
-  __builtin_prefetch(coefficients.bytes.data() + std::min(offset + 63, coefficients.bytes.size() - 1));
+  __builtin_prefetch(coefficients.bytes.data() + std::min(offset + 31, coefficients.bytes.size() - 1));
 }
 
-/// Groups the points of a batch by the degree of their leaves, and prefetches the leaves' coefficients. No branch
-/// depends on the degree.
+template <typename Coefficients>
+HWY_INLINE void prefetchLeaf(const Coefficients& coefficients, std::uint64_t leaf) {
+  const bool isExact = node::isExact(leaf);
+  prefetch(coefficients, isExact ? 0 : node::offset(leaf), isExact ? 0 : node::degree(leaf));
+}
+
+/// The bits of a node by which points are grouped, in the node's upper half: the degree, and whether the leaf is wide.
+constexpr std::uint32_t kKeyBits = (node::quantizedLeaf(0xff, 0, true, 0) & ~node::kLeafBit) >> 32;
+
+/// Adds the points of one SIMD vector, the first of which is point `first`, to the lists of their leaves' degrees. No
+/// branch depends on the degree.
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3  // better targets have lower numbers
+HWY_INLINE void listPoints(std::size_t first, Batch& batch, std::array<std::size_t, kLists>& counts) {
+  const hn::Rebind<std::uint32_t, Tag> d;
+  const auto points = hn::Iota(d, static_cast<std::uint32_t>(first));
+  const auto upper = hn::TruncateTo(d, hn::ShiftRight<32>(hn::Load(Unsigned(), batch.bits + first)));
+  const auto key = hn::And(upper, hn::Set(d, kKeyBits));
+  const auto add = [&](std::size_t list, auto mask) HWY_ATTR {
+    // To compress in a register and then store is faster than CompressStore on some processors.
+    hn::StoreU(hn::Compress(points, mask), d, batch.listed[list] + counts[list]);
+    counts[list] += hn::CountTrue(d, mask);
+  };
+  auto others = hn::FirstN(d, batch.count - first);
+  for (std::size_t k = 0; k + 1 < kLists; ++k) {
+    const auto hasDegree = hn::Eq(key, hn::Set(d, std::uint32_t(kMinVectorDegree + k)));
+    add(k, hn::And(others, hasDegree));
+    others = hn::AndNot(hasDegree, others);
+  }
+  add(kLists - 1, others);
+}
+#else
+HWY_INLINE void listPoints(std::size_t first, Batch& batch, std::array<std::size_t, kLists>& counts) {
+  for (std::size_t i = first; i < std::min(first + kLanes, batch.count); ++i) {
+    const auto key = static_cast<std::uint32_t>(batch.bits[i] >> 32) & kKeyBits;
+    for (std::size_t k = 0; k < kLists; ++k) batch.listed[k][counts[k]] = static_cast<std::uint32_t>(i);
+    for (std::size_t k = 0; k + 1 < kLists; ++k) counts[k] += key == kMinVectorDegree + k;
+    counts[kLists - 1] += key - kMinVectorDegree > kMaxVectorDegree - kMinVectorDegree;
+  }
+}
+#endif
+
+/// Groups the points of a batch by the degree of their leaves, and prefetches the leaves' coefficients. Wide leaves
+/// have no SIMD code.
 template <typename Coefficients>
 void listByDegree(const Coefficients& coefficients, Batch& batch) {
   std::array<std::size_t, kLists> counts{};
-  for (std::size_t i = 0; i < batch.count; ++i) {
-    const int degree = node::degree(batch.bits[i]);
-    const bool isExact = degree == kExactDegree;
-    prefetch(coefficients, isExact ? 0 : node::offset(batch.bits[i]), isExact ? 0 : degree);
-    const int key = degree + (node::isWide(batch.bits[i]) ? kMaxVectorDegree : 0);  // Wide leaves have no SIMD code.
-    for (std::size_t k = 0; k < kLists; ++k) batch.listed[k][counts[k]] = static_cast<std::uint8_t>(i);
-    for (std::size_t k = 0; k + 1 < kLists; ++k) counts[k] += key == kMinVectorDegree + int(k);
-    counts[kLists - 1] += key < kMinVectorDegree || key > kMaxVectorDegree;
+  for (std::size_t i = 0; i < batch.count; i += kLanes) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) prefetchLeaf(coefficients, batch.bits[i + lane]);
+    listPoints(i, batch, counts);
   }
   for (std::size_t k = 0; k < kLists; ++k) {
     if (counts[k] > 0) std::fill_n(batch.listed[k] + counts[k], kLanes - 1, batch.listed[k][counts[k] - 1]);
@@ -254,26 +312,33 @@ void enterLeaves(Batch& batch) {
   }
 }
 
-HWY_INLINE Vec load(const double* from) { return hn::LoadU(Tag(), from); }
-HWY_INLINE Vec load(const float* from) { return hn::PromoteTo(Tag(), hn::LoadU(hn::Rebind<float, Tag>(), from)); }
+/// The lanes that are transposed together. A vector with more lanes is joined from such blocks.
+using Block = hn::CappedTag<double, 4>;
+using BlockVec = hn::Vec<Block>;
+constexpr std::size_t kBlockLanes = hn::MaxLanes(Block());
 
-/// Loads from several arrays and transposes: sets lane l of out[i] to from[l][offset + i], for each i below the
-/// number of lanes.
+HWY_INLINE BlockVec load(const double* from) { return hn::LoadU(Block(), from); }
+HWY_INLINE BlockVec load(const float* from) {
+  return hn::PromoteTo(Block(), hn::LoadU(hn::Rebind<float, Block>(), from));
+}
+
+/// Loads from `kBlockLanes` arrays and transposes: sets lane l of out[i] to from[l][offset + i], for each i below
+/// `kBlockLanes`.
 template <typename T>
-HWY_INLINE void loadTransposed(const std::array<const T*, kLanes>& from, std::size_t offset, Lanes* out) {
+HWY_INLINE void loadBlockTransposed(const T* const* from, std::size_t offset, BlockVec* out) {
 #if HWY_TARGET == HWY_SCALAR
   out[0] = load(from[0] + offset);
 #else
-  const Tag d;
-  const auto pair = [&](std::size_t lane, Vec& even, Vec& odd) HWY_ATTR {
-    const Vec a = load(from[lane] + offset), b = load(from[lane + 1] + offset);
+  const Block d;
+  const auto pair = [&](std::size_t lane, BlockVec& even, BlockVec& odd) HWY_ATTR {
+    const BlockVec a = load(from[lane] + offset), b = load(from[lane + 1] + offset);
     even = hn::InterleaveLower(d, a, b);
     odd = hn::InterleaveUpper(d, a, b);
   };
-  if constexpr (kLanes == 2) {
-    pair(0, out[0].v, out[1].v);
+  if constexpr (kBlockLanes == 2) {
+    pair(0, out[0], out[1]);
   } else {
-    Vec even[2], odd[2];
+    BlockVec even[2], odd[2];
     pair(0, even[0], odd[0]);
     pair(2, even[1], odd[1]);
     out[0] = hn::ConcatLowerLower(d, even[1], even[0]);
@@ -284,31 +349,51 @@ HWY_INLINE void loadTransposed(const std::array<const T*, kLanes>& from, std::si
 #endif
 }
 
+/// Loads from an array for each lane, like `loadBlockTransposed`.
+template <typename T>
+HWY_INLINE void loadTransposed(const std::array<const T*, kLanes>& from, std::size_t offset, Lanes* out) {
+  BlockVec block[kBlockLanes];
+  loadBlockTransposed(from.data(), offset, block);
+#if HWY_MAX_BYTES >= 64  // a vector is two blocks
+  BlockVec upper[kBlockLanes];
+  loadBlockTransposed(from.data() + kBlockLanes, offset, upper);
+  for (std::size_t i = 0; i < kBlockLanes; ++i) out[i] = hn::Combine(Tag(), upper[i], block[i]);
+#else
+  for (std::size_t i = 0; i < kBlockLanes; ++i) out[i] = block[i];
+#endif
+}
+
 template <typename T, std::size_t Count>
 HWY_INLINE void loadAllTransposed(const std::array<const T*, kLanes>& from, std::array<Lanes, Count>& out) {
-  for (std::size_t i = 0; i < Count; i += kLanes) {
-    const std::size_t at = std::min(i, Count - kLanes);  // The last step overlaps the one before to stay in range.
+  for (std::size_t i = 0; i < Count; i += kBlockLanes) {
+    const std::size_t at = std::min(i, Count - kBlockLanes);  // The last step overlaps the one before to stay in range.
     loadTransposed(from, at, out.data() + at);
   }
 }
 
-/// Loads the coefficients of several leaves of degree P, one leaf for each lane.
+/// The leaves of several points, one for each lane.
+struct LaneLeaves {
+  std::array<std::uint64_t, kLanes> offsets;  ///< of the leaves' coefficients
+  Lanes bits;                                 ///< packed nodes
+};
+
+/// Loads the coefficients of several leaves of degree P.
 template <int P, typename T>
-HWY_INLINE void loadLeaves(const std::vector<T>& coefficients, const std::array<std::uint32_t, kLanes>& offsets,
+HWY_INLINE void loadLeaves(const std::vector<T>& coefficients, const LaneLeaves& leaves,
                            std::array<Lanes, coefficientCount(P)>& out) {
-  std::array<const T*, kLanes> leaves;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) leaves[lane] = coefficients.data() + offsets[lane];
-  loadAllTransposed(leaves, out);
+  std::array<const T*, kLanes> from;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) from[lane] = coefficients.data() + leaves.offsets[lane];
+  loadAllTransposed(from, out);
 }
 
 /// Quantized coefficients are loaded in units of the step.
 template <int P>
-HWY_INLINE void loadLeaves(const QuantizedCoefficients& coefficients, const std::array<std::uint32_t, kLanes>& offsets,
+HWY_INLINE void loadLeaves(const QuantizedCoefficients& coefficients, const LaneLeaves& leaves,
                            std::array<Lanes, coefficientCount(P)>& out) {
-  std::array<std::uint64_t, kLanes> begins;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) begins[lane] = std::uint64_t{offsets[lane]} << 3;
-  decodeLeaves<P>(LanesOfBits{coefficients.bytes.data(), hn::LoadU(Unsigned(), begins.data())}, coefficients.meanBits,
-                  out.data());
+  // A vector of the offsets that have just been stored one by one would have to wait for them.
+  const auto offsets = hn::And(hn::BitCast(Unsigned(), leaves.bits.v), hn::Set(Unsigned(), 0xffffffff));
+  decodeLeaves<P>(LanesOfBits{coefficients.bytes.data(), leaves.offsets, hn::ShiftLeft<3>(offsets)},
+                  coefficients.meanBits, out.data());
 }
 
 /// Returns loaded coefficients in the form that `evaluatePolynomial` takes.
@@ -339,31 +424,32 @@ template <int P, typename Coefficients, typename Result>
 void evaluateListed(const Coefficients& coefficients, const GridFrame& frame, const Batch& batch, Result* out) {
   const Tag d;
   for (std::size_t n = 0; n < batch.listedCount[P - kMinVectorDegree]; n += kLanes) {
-    const std::uint8_t* points = batch.listed[P - kMinVectorDegree] + n;
+    const std::uint32_t* points = batch.listed[P - kMinVectorDegree] + n;
     std::array<const double*, kLanes> leafPoints;
-    std::array<std::uint32_t, kLanes> offsets;
+    LaneLeaves leaves;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       leafPoints[lane] = batch.leafPoints[points[lane]].local;
-      offsets[lane] = node::offset(batch.bits[points[lane]]);
+      leaves.offsets[lane] = node::offset(batch.bits[points[lane]]);
     }
     std::array<Lanes, 4> leafPoint;
     std::array<Lanes, coefficientCount(P)> c;
     loadAllTransposed(leafPoints, leafPoint);
-    loadLeaves<P>(coefficients, offsets, c);
+    leaves.bits = leafPoint[3];
+    loadLeaves<P>(coefficients, leaves, c);
     const auto loaded = asCoefficients<P>(coefficients, c.data());
     const std::array<Lanes, 3> local = {leafPoint[0], leafPoint[1], leafPoint[2]};
     if constexpr (std::is_same_v<Result, double>) {
       HWY_ALIGN double value[kLanes];
-      hn::Store(inUnits(coefficients, leafPoint[3], evaluatePolynomial(loaded, Constant<P>(), local).v), d, value);
+      hn::Store(inUnits(coefficients, leaves.bits, evaluatePolynomial(loaded, Constant<P>(), local).v), d, value);
       for (std::size_t lane = 0; lane < kLanes; ++lane) out[points[lane]] = value[lane];
     } else {
       const auto result = evaluatePolynomialWithGradient(loaded, Constant<P>(), local);
-      const auto scale = hn::Set(d, 2.0) * depthScale(hn::BitCast(Unsigned(), leafPoint[3].v));
+      const auto scale = hn::Set(d, 2.0) * depthScale(hn::BitCast(Unsigned(), leaves.bits.v));
       HWY_ALIGN double number[4][kLanes];
-      hn::Store(inUnits(coefficients, leafPoint[3], result[0].v), d, number[0]);
+      hn::Store(inUnits(coefficients, leaves.bits, result[0].v), d, number[0]);
       for (int axis = 0; axis < 3; ++axis) {
         const auto toWorld = scale * hn::Set(d, frame.cells[axis]) / hn::Set(d, frame.size[axis]);
-        hn::Store(inUnits(coefficients, leafPoint[3], result[axis + 1].v) * toWorld, d, number[axis + 1]);
+        hn::Store(inUnits(coefficients, leaves.bits, result[axis + 1].v) * toWorld, d, number[axis + 1]);
       }
       for (std::size_t lane = 0; lane < kLanes; ++lane)
         out[points[lane]] = {number[0][lane], {number[1][lane], number[2][lane], number[3][lane]}};
@@ -409,10 +495,10 @@ void evaluateLeaves(const FieldData& field, const Coefficients& coefficients, co
   std::array<ExactPoint, kBatch> exactPoints;
   std::size_t exactCount = 0;
   for (std::size_t n = 0; n < batch.listedCount[kLists - 1]; ++n) {
-    const std::uint8_t i = batch.listed[kLists - 1][n];
+    const std::size_t i = batch.listed[kLists - 1][n];
     const auto& [u, v, w] = batch.leafPoints[i].local;
     if (node::isExact(batch.bits[i])) {
-      exactPoints[exactCount++] = {exactKey(batch.bits[i], octantOf({u, v, w})), i};
+      exactPoints[exactCount++] = {exactKey(batch.bits[i], octantOf({u, v, w})), static_cast<std::uint8_t>(i)};
       continue;
     }
     const LeafPoint leaf{batch.bits[i], LookupGrid::depthOf(batch.bits[i]), {u, v, w}, {}, 0};

@@ -20,6 +20,12 @@ namespace hpsdf::query {
 namespace HWY_NAMESPACE {
 namespace {
 
+// The functions of quantized-inl.h take numbers of one leaf or of several.
+template <int N>
+HWY_INLINE std::uint64_t times(std::uint64_t word) {
+  return N * word;
+}
+HWY_INLINE bool isZero(std::uint64_t word) { return word == 0; }
 HWY_INLINE std::uint64_t orAnd(std::uint64_t a, std::uint64_t b, std::uint64_t c) { return a | (b & c); }
 HWY_INLINE double asNumber(std::uint64_t bits) { return std::bit_cast<double>(bits); }
 
@@ -37,6 +43,22 @@ using Words = hn::FixedTag<std::uint64_t, 4>;
 /// The greatest width of which four integers can be read at once. Degree 1 has only three.
 constexpr int kMostAtOnce = 14;
 
+/// The constants that decode four integers of one width. To load them is faster than to compute them in every query.
+struct alignas(64) FourDigits {
+  std::uint64_t shifts[4];  ///< multiples of the width
+  std::uint64_t mask;
+  double bias;
+};
+
+constexpr auto kFourDigits = [] {
+  std::array<FourDigits, QuantizedCoefficients::kMostBits + 1> digits{};
+  for (std::uint64_t width = 0; width < digits.size(); ++width) {
+    const std::uint64_t values = std::uint64_t{1} << width;
+    digits[width] = {{0, width, 2 * width, 3 * width}, values - 1, std::bit_cast<double>(values >> 1 | kWholeBits)};
+  }
+  return digits;
+}();
+
 /// Decodes the integers of the total degree D, four at a time. Returns the position after them.
 template <int D>
 HWY_INLINE std::uint64_t decodeFours(const std::uint8_t* leaf, std::uint64_t position, std::uint64_t width,
@@ -44,17 +66,14 @@ HWY_INLINE std::uint64_t decodeFours(const std::uint8_t* leaf, std::uint64_t pos
   const Words words;
   const Numbers numbers;
   constexpr int kCount = basis::termsOfDegree(D);
-  const Digits<double, std::uint64_t> digits(width);
+  const FourDigits& digits = kFourDigits[width];
   const auto mask = hn::Set(words, digits.mask), whole = hn::Set(words, kWholeBits);
   const auto bias = hn::Set(numbers, digits.bias);
-  // The product of 32-bit numbers suffices.
-  const auto multiples =
-      hn::BitCast(words, hn::MulEven(hn::BitCast(hn::FixedTag<std::uint32_t, 8>(), hn::Set(words, width)),
-                                     hn::BitCast(hn::FixedTag<std::uint32_t, 8>(), hn::Iota(words, 0))));
+  const auto shifts = hn::Load(words, digits.shifts);
   for (int at = 0; at < kCount; at += 4) {
     std::uint64_t word = 0;
     std::memcpy(&word, leaf + (position >> 3), sizeof word);
-    const auto shifted = hn::Set(words, word) >> (hn::Set(words, position & 7) + multiples);
+    const auto shifted = hn::Set(words, word >> (position & 7)) >> shifts;
     hn::StoreU(hn::BitCast(numbers, hn::OrAnd(whole, shifted, mask)) - bias, numbers, out + at);
     position += std::uint64_t(std::min(4, kCount - at)) * width;
   }
@@ -66,16 +85,15 @@ HWY_INLINE void decode(const std::uint8_t* leaf, std::uint32_t meanBits, double*
   constexpr int kWidthBits = QuantizedCoefficients::kWidthBits;
   const LeafBits bits{leaf};
   const std::uint64_t head = bits.read(0);
-  const auto widthOf = [&](int degree) { return head >> ((degree - 1) * kWidthBits) & ((1 << kWidthBits) - 1); };
   bool areLong = false;
-  for (int degree = 2; degree <= P; ++degree) areLong |= widthOf(degree) > kMostAtOnce;
+  for (int degree = 2; degree <= P; ++degree) areLong |= widthOf(head, degree) > kMostAtOnce;
   if (areLong) [[unlikely]]
     return decodeLeaves<P>(bits, meanBits, out);
   out[0] = Digits<double, std::uint64_t>(meanBits).first(head >> (P * kWidthBits));
   std::uint64_t position = P * kWidthBits + meanBits;
   forEachUpTo(Constant<P - 1>(), [&](auto below) HWY_ATTR {
     constexpr int kBelow = decltype(below)::value;
-    position = decodeFours<kBelow + 1>(leaf, position, widthOf(kBelow + 1), out + coefficientCount(kBelow));
+    position = decodeFours<kBelow + 1>(leaf, position, widthOf(head, kBelow + 1), out + coefficientCount(kBelow));
   });
 }
 
@@ -88,7 +106,7 @@ HWY_INLINE void decode(const std::uint8_t* leaf, std::uint32_t meanBits, double*
 
 #endif
 
-/// Calls f(coefficients, Constant<P>) for the coefficients of a leaf of degree P from 1 to 4.
+/// Calls f(coefficients, Constant<P>) for the coefficients of a leaf of degree P from 1 to 5.
 template <typename F>
 HWY_INLINE auto withDecoded(const QuantizedCoefficients& coefficients, std::uint64_t leaf, const F& f) {
   const std::uint8_t* const bytes = coefficients.bytes.data() + node::offset(leaf);
@@ -105,8 +123,10 @@ HWY_INLINE auto withDecoded(const QuantizedCoefficients& coefficients, std::uint
       return decoded(Constant<2>());
     case 3:
       return decoded(Constant<3>());
-    default:
+    case 4:
       return decoded(Constant<4>());
+    default:
+      return decoded(Constant<5>());
   }
 }
 
@@ -133,7 +153,7 @@ namespace {
 HWY_EXPORT(valueOf);
 HWY_EXPORT(valueAndGradientOf);
 
-constexpr int kMostVectorDegree = 4;
+constexpr int kMostVectorDegree = 5;
 
 /// Returns true if SIMD decodes a leaf.
 bool hasVectorCode(std::uint64_t leaf) {

@@ -44,6 +44,8 @@ struct LeafBits {
   const std::uint8_t* bytes;
 
   std::uint64_t begin() const { return 0; }
+  std::uint64_t head() const { return read(0); }
+  std::uint64_t readAllAt(std::uint32_t position) const { return read(position); }  ///< like that of several leaves
 
   /// Returns at least 57 bits from the bit `position` on, the first in the lowest bit.
   std::uint64_t read(std::uint64_t position) const {
