@@ -6,6 +6,7 @@
 #include "hpsdf/build_options.h"
 #include "hpsdf/cell_history.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/contour.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/error.h"
 #include "hpsdf/exact_distance.h"

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "contour/contour_octree.h"
+#include "contour/implicit_surface.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::contouring {
+
+/// The function at a lattice of 3 × 3 × 3 points of a cell, reduced to what contouring needs.
+struct CellSamples {
+  std::array<double, 8> corners = {};  ///< values at the corners, in the order of children
+  bool mayHoldSurface = false;         ///< the function may be 0 in the cell
+  bool changesSign = false;            ///< the corners have different signs
+  /// A sheet of the surface passes through the cell that its corners do not see: somewhere in the lattice, a point lies
+  /// between two points of the other sign. If no corner differs, the function may also become clearly negative and
+  /// clearly positive in the cell.
+  bool hides = false;
+};
+
+inline bool isInside(double value) { return value < 0; }
+
+/// Samples the function in cells. `thin` is a value that does not count as clearly negative or positive.
+void sampleCells(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
+                 double thin, const Progress& progress, std::vector<CellSamples>& samples);
+
+}  // namespace hpsdf::contouring

@@ -1,0 +1,157 @@
+#include "contour/dual_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "util/chunks.h"
+
+namespace hpsdf::contouring {
+namespace {
+
+constexpr std::uint32_t kNoPoint = 0xffffffff;
+
+/// Makes the polygons of a dual mesh and divides them into triangles.
+class Polygons {
+ public:
+  Polygons(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
+           std::vector<Vector3> vertices, const std::vector<bool>& fans)
+      : surface_(surface), edges_(edges), sheets_(sheets), fans_(fans) {
+    mesh_.vertices = std::move(vertices);
+    if (!fans_.empty()) addFacePoints();
+  }
+
+  DualMesh make() {
+    for (std::uint32_t e = 0; e < edges_.size(); ++e) {
+      const std::vector<std::uint32_t>& ring = ringOf(e);
+      if (!fans_.empty() && (fans_[e] || ring.size() > 4))
+        addFan(e, ring);
+      else if (ring.size() == 3)
+        add(e, {ring[0], ring[1], ring[2]});
+      else
+        quads_.push_back({e, {ring[0], ring[1], ring[2], ring[3]}});
+    }
+    addQuads();
+    return std::move(mesh_);
+  }
+
+ private:
+  struct Quad {
+    std::uint32_t edge;
+    std::array<std::uint32_t, 4> corners;
+  };
+
+  void add(std::uint32_t edge, const Triangle& triangle) {
+    mesh_.triangles.push_back(triangle);
+    mesh_.edgeOfTriangle.push_back(edge);
+  }
+
+  std::uint32_t addVertex(const Vector3& point) {
+    mesh_.vertices.push_back(point);
+    return static_cast<std::uint32_t>(mesh_.vertices.size() - 1);
+  }
+
+  /// Adds a point for each link of a marked edge.
+  void addFacePoints() {
+    facePoints_.assign(sheets_.links().size(), kNoPoint);
+    for (std::size_t n = 0; n < sheets_.links().size(); ++n) {
+      const Link& link = sheets_.links()[n];
+      if (fans_[link.edges[0]] || fans_[link.edges[1]]) facePoints_[n] = addVertex(pointOn(link));
+    }
+  }
+
+  /// Returns a point of the face of a link: where the planes at both crossings meet in the face, or else a point of the
+  /// surface near the middle between them. If other links share the face, returns the middle, so that straight lines
+  /// separate them.
+  Vector3 pointOn(const Link& link) const {
+    const CrossedEdge &one = edges_[link.edges[0]], &other = edges_[link.edges[1]];
+    const int axis = link.axis, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const double a = one.normal[u], b = one.normal[v], c = other.normal[u], d = other.normal[v];
+    const double right = one.normal.dot(one.point) - one.normal[axis] * one.point[axis];
+    const double otherRight = other.normal.dot(other.point) - other.normal[axis] * other.point[axis];
+    const double determinant = a * d - b * c;
+    Vector3 point = (one.point + other.point) / 2;
+    if (!link.isOnly) return point;
+    if (std::abs(determinant) > 0.1) {
+      Vector3 meeting = point;
+      meeting[u] = (right * d - otherRight * b) / determinant;
+      meeting[v] = (otherRight * a - right * c) / determinant;
+      if (link.face.contains(meeting)) return meeting;
+    }
+    for (int step = 0; step < 4; ++step) {
+      ValueAndGradient at;
+      surface_.valuesAndGradients({&point, 1}, {&at, 1});
+      at.gradient[axis] = 0;
+      const double squared = at.gradient.squaredNorm();
+      if (!(squared > 0.01)) break;
+      point = (point - at.gradient * (at.value / squared)).cwiseMax(link.face.min()).cwiseMin(link.face.max());
+    }
+    return point;
+  }
+
+  /// Returns the corners of an edge's polygon, counter-clockwise as seen from outside.
+  const std::vector<std::uint32_t>& ringOf(std::uint32_t e) {
+    const CrossedEdge& edge = edges_[e];
+    ring_.clear();
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t next = (i + 1) % 4;
+      if (edge.cells[i] == edge.cells[next]) continue;
+      ring_.push_back(sheets_.sheetAt(e, i));
+      if (facePoints_.empty()) continue;
+      const std::uint32_t point = facePoints_[sheets_.linkOf(e, edge.cells[i], edge.cells[next])];
+      if (point != kNoPoint) ring_.push_back(point);
+    }
+    if (!edge.lowerInside) std::ranges::reverse(ring_);
+    return ring_;
+  }
+
+  void addFan(std::uint32_t e, std::span<const std::uint32_t> ring) {
+    const std::uint32_t center = addVertex(edges_[e].point);
+    for (std::size_t i = 0; i < ring.size(); ++i) add(e, {center, ring[i], ring[(i + 1) % ring.size()]});
+  }
+
+  /// Divides quadrilaterals along the diagonal whose middle is nearer to the surface.
+  void addQuads() {
+    constexpr std::size_t kAtOnce = 256;
+    std::vector<char> second(quads_.size());
+    detail::forEachChunk(quads_.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      std::array<Vector3, 2 * kAtOnce> points;
+      std::array<double, 2 * kAtOnce> values;
+      for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t k = 0; k < 2; ++k) {
+          const auto& corners = quads_[first + i].corners;
+          points[2 * i + k] = (mesh_.vertices[corners[k]] + mesh_.vertices[corners[k + 2]]) / 2;
+        }
+      surface_.values(std::span(points).first(2 * count), std::span(values).first(2 * count));
+      for (std::size_t i = 0; i < count; ++i) second[first + i] = std::abs(values[2 * i + 1]) < std::abs(values[2 * i]);
+    });
+    for (std::size_t i = 0; i < quads_.size(); ++i) {
+      const auto& [edge, c] = quads_[i];
+      if (second[i]) {
+        add(edge, {c[0], c[1], c[3]});
+        add(edge, {c[1], c[2], c[3]});
+      } else {
+        add(edge, {c[0], c[1], c[2]});
+        add(edge, {c[0], c[2], c[3]});
+      }
+    }
+  }
+
+  const ImplicitSurface& surface_;
+  std::span<const CrossedEdge> edges_;
+  const Sheets& sheets_;
+  const std::vector<bool>& fans_;
+  DualMesh mesh_;
+  std::vector<std::uint32_t> facePoints_;  ///< by link: a vertex, or kNoPoint
+  std::vector<std::uint32_t> ring_;
+  std::vector<Quad> quads_;
+};
+
+}  // namespace
+
+DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
+                      std::vector<Vector3> vertices, const std::vector<bool>& fans) {
+  return Polygons(surface, edges, sheets, std::move(vertices), fans).make();
+}
+
+}  // namespace hpsdf::contouring

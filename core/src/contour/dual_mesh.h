@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "contour/contour_octree.h"
+#include "contour/crossed_edges.h"
+#include "contour/implicit_surface.h"
+#include "contour/sheets.h"
+#include "hpsdf/triangle_mesh.h"
+#include "hpsdf/types.h"
+
+namespace hpsdf::contouring {
+
+/// The triangles of the polygons around crossed edges. A polygon is divided by a diagonal, or, if it is marked, into a
+/// fan around the point where the surface crosses its edge, with further corners in the faces between its leaves. The
+/// triangles of a fan lie within one leaf each and therefore do not cross those of other leaves (Ju and Udeshi 2006).
+struct DualMesh {
+  std::vector<Vector3> vertices;  ///< one for each sheet, then others
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> edgeOfTriangle;  ///< the crossed edge around which a triangle's polygon lies
+};
+
+/// Makes the mesh. `fans` marks the edges whose polygons become fans; it is empty if there are none.
+DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
+                      std::vector<Vector3> vertices, const std::vector<bool>& fans);
+
+}  // namespace hpsdf::contouring

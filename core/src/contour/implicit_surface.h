@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "hpsdf/contour.h"
+#include "hpsdf/field.h"
+#include "hpsdf/range.h"
+#include "hpsdf/types.h"
+
+namespace hpsdf::contouring {
+
+/// A function whose zero set is the surface to be meshed: a field less the offset, and with a wall the greater of this
+/// and the distance to a box. It is negative inside.
+class ImplicitSurface {
+ public:
+  /// With `wall`, the solid ends at this distance within the field's domain.
+  ImplicitSurface(const Field& field, double offset, std::optional<double> wall, int threads);
+
+  void values(std::span<const Vector3> points, std::span<double> out) const;
+  void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
+
+  /// Returns the values that there are without the wall.
+  void valuesWithoutWall(std::span<const Vector3> points, std::span<double> out) const;
+
+  /// Returns true if the value at x is that of the wall.
+  bool isAtWall(const Vector3& x) const;
+
+  /// Returns an interval that contains all values in the box.
+  Interval range(const Box& box) const;
+
+ private:
+  const Field& field_;
+  RangeIndex ranges_;
+  double offset_;
+  std::optional<Box> wall_;
+};
+
+}  // namespace hpsdf::contouring

@@ -1,0 +1,187 @@
+// Contours of fields: closed manifolds without crossings, within the tolerance of the surface.
+
+#include "hpsdf/contour.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/detail/crossings.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_report.h"
+#include "hpsdf/shapes.h"
+#include "support/random_field.h"
+
+namespace hpsdf {
+namespace {
+
+double sphere(const Vector3& x) { return x.norm() - 0.7; }
+
+double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.6, x.z()) - 0.25; }
+
+Box cubeOf(double half = 1) { return Box(Vector3::Constant(-half), Vector3::Constant(half)); }
+
+const Field& sphereField() {
+  static const Field field = build(sphere, cubeOf(), {.targetError = 1e-9});
+  return field;
+}
+
+const Field& torusField() {
+  static const Field field = build(torus, cubeOf(), {.targetError = 1e-9});
+  return field;
+}
+
+/// Returns the field of a built-in shape, with exact leaves near the surface.
+Field exactField(const std::string& shape) {
+  const ExactDistance distance(shapes::mesh(shape));
+  const Box box = distance.source().box;
+  const Vector3 margin = 0.1 * box.sizes();
+  return build(distance, Box(Vector3(box.min() - margin), Vector3(box.max() + margin)),
+               {.targetError = 1e-6, .strategy = Strategy::hpx});
+}
+
+/// Returns the defects of a mesh in words, or "" for a closed manifold without crossings. Edges on its boundary do not
+/// count if it may be open.
+std::string defectsOf(const TriangleMesh& mesh, bool mayBeOpen = false) {
+  const Crossings crossings = findCrossings(mesh);
+  const MeshDefects defects = findDefects(mesh, crossings);
+  std::string text;
+  const auto add = [&](DefectKind kind, const char* name) {
+    if (defects.count(kind) > 0) text += std::to_string(defects.count(kind)) + " " + name + "; ";
+  };
+  if (!mayBeOpen) add(DefectKind::boundaryEdge, "boundary edges");
+  add(DefectKind::nonManifoldEdge, "non-manifold edges");
+  add(DefectKind::inconsistentEdge, "inconsistent edges");
+  add(DefectKind::pinchedVertex, "pinched vertices");
+  add(DefectKind::crossing, "crossings");
+  return text;
+}
+
+/// Returns the greatest |f| at vertices, and at the middles of triangles and of their sides.
+double greatestAt(const TriangleMesh& mesh, const std::function<double(const Vector3&)>& f) {
+  double greatest = 0;
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    for (const Vector3& x : {a, Vector3((a + b + c) / 3), Vector3((a + b) / 2), Vector3((b + c) / 2)})
+      greatest = std::max(greatest, std::abs(f(x)));
+  }
+  return greatest;
+}
+
+TEST(Contour, ofSmoothSurfacesIsAClosedManifoldWithinTheTolerance) {
+  for (const double tolerance : {0.03, 0.01, 0.003}) {
+    const Contour round = contour(sphereField(), {.tolerance = tolerance});
+    EXPECT_EQ(defectsOf(round.mesh), "") << tolerance;
+    EXPECT_LE(greatestAt(round.mesh, sphere), 1.05 * tolerance);
+    EXPECT_NEAR(signedVolume(round.mesh), 4.0 / 3 * M_PI * 0.343, 6.2 * tolerance);
+    EXPECT_EQ(round.unresolved, 0u);
+    EXPECT_EQ(round.flawed, 0u);
+
+    const Contour ring = contour(torusField(), {.tolerance = tolerance});
+    EXPECT_EQ(defectsOf(ring.mesh), "") << tolerance;
+    EXPECT_LE(greatestAt(ring.mesh, torus), 1.05 * tolerance);
+    const MeshReport report = inspect(ring.mesh);
+    EXPECT_EQ(int(report.vertices) - int(report.faces) / 2, 0) << "the Euler characteristic of a torus";
+  }
+}
+
+TEST(Contour, verticesLieOnTheSurfaceAndNormalsPointAwayFromIt) {
+  const double tolerance = 0.01;
+  const Contour round = contour(sphereField(), {.tolerance = tolerance});
+  ASSERT_EQ(round.normals.size(), round.mesh.vertices.size());
+  for (std::size_t i = 0; i < round.normals.size(); ++i) {
+    EXPECT_LE(std::abs(sphereField().value(round.mesh.vertices[i])), 1e-3 * tolerance);
+    EXPECT_GT(round.normals[i].dot(round.mesh.vertices[i].normalized()), 0.999);
+  }
+}
+
+TEST(Contour, offsetsMoveTheSurface) {
+  for (const double offset : {-0.2, 0.1, 0.25}) {
+    const Contour moved = contour(sphereField(), {.offset = offset, .tolerance = 0.01});
+    EXPECT_EQ(defectsOf(moved.mesh), "") << offset;
+    EXPECT_LE(greatestAt(moved.mesh, [&](const Vector3& x) { return sphere(x) - offset; }), 0.011);
+  }
+}
+
+TEST(Contour, keepsSharpEdgesAndCorners) {
+  const Field box = exactField("box");
+  const Contour found = contour(box, {.tolerance = 0.01});
+  EXPECT_EQ(defectsOf(found.mesh), "");
+  const Box bounds = boundingBox(shapes::mesh("box"));
+  EXPECT_NEAR(signedVolume(found.mesh), bounds.volume(), 1e-9);
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3 at = bounds.corner(static_cast<Box::CornerType>(corner));
+    const bool isFound =
+        std::ranges::any_of(found.mesh.vertices, [&](const Vector3& x) { return (x - at).norm() < 1e-9; });
+    EXPECT_TRUE(isFound) << at.transpose();
+  }
+}
+
+TEST(Contour, ofPartsWithSharpEdgesIsAClosedManifoldWithinTheTolerance) {
+  const Field gear = exactField("gear");
+  const ExactDistance distance(shapes::mesh("gear"));
+  for (const double tolerance : {0.02, 0.005}) {
+    const Contour found = contour(gear, {.tolerance = tolerance});
+    EXPECT_EQ(defectsOf(found.mesh), "") << tolerance;
+    EXPECT_LE(greatestAt(found.mesh, [&](const Vector3& x) { return distance(x); }), 1.01 * tolerance);
+    EXPECT_EQ(found.unresolved, 0u);
+  }
+}
+
+/// Random leaves disagree, so that the surface jumps from leaf to leaf, and has parts of all sizes.
+TEST(Contour, ofRandomFieldsIsAClosedManifold) {
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    const Field field = randomField(seed);
+    for (const Field& one : {field, blended(field, 0.2)}) {
+      const Contour found = contour(one, {.tolerance = 0.02 * field.domain().sizes().maxCoeff()});
+      EXPECT_EQ(defectsOf(found.mesh), "") << seed;
+      EXPECT_GT(found.mesh.triangles.size(), 100u);
+      EXPECT_EQ(found.flawed, 0u);
+    }
+  }
+}
+
+TEST(Contour, isClosedByAWallOrOpenWhereTheDomainCutsTheSolid) {
+  const Field cut = build(sphere, cubeOf(0.6), {.targetError = 1e-8});
+  const Contour closed = contour(cut, {.tolerance = 0.01});
+  EXPECT_EQ(defectsOf(closed.mesh), "");
+  EXPECT_TRUE(cubeOf(0.6).contains(boundingBox(closed.mesh)));
+  EXPECT_NEAR(boundingBox(closed.mesh).max().x(), 0.595, 1e-6);
+
+  const Contour open = contour(cut, {.tolerance = 0.01, .domainCut = DomainCut::open});
+  EXPECT_EQ(defectsOf(open.mesh, true), "");
+  EXPECT_GT(inspect(open.mesh).boundaryEdges, 20u);
+  EXPECT_LE(greatestAt(open.mesh, sphere), 0.011);
+}
+
+TEST(Contour, ofADomainThatIsAllOutsideIsEmptyAndOfOneAllInsideItsWall) {
+  const Contour all = contour(sphereField(), {.offset = 100, .tolerance = 0.01});
+  EXPECT_EQ(defectsOf(all.mesh), "");
+  EXPECT_NEAR(signedVolume(all.mesh), std::pow(2 - 0.01, 3), 1e-9);
+  const Contour none = contour(sphereField(), {.offset = -100});
+  EXPECT_TRUE(none.mesh.triangles.empty());
+  EXPECT_TRUE(none.mesh.vertices.empty());
+}
+
+TEST(Contour, doesNotDependOnThreads) {
+  const Contour one = contour(torusField(), {.tolerance = 0.01, .threads = 1});
+  const Contour two = contour(torusField(), {.tolerance = 0.01, .threads = 2});
+  EXPECT_EQ(fingerprint(one.mesh), fingerprint(two.mesh));
+  EXPECT_EQ(one.normals, two.normals);
+}
+
+TEST(Contour, refusesOptionsOutOfRangeAndCanBeCancelled) {
+  EXPECT_THROW(contour(sphereField(), {.offset = NAN}), Error);
+  EXPECT_THROW(contour(sphereField(), {.tolerance = -1}), Error);
+  EXPECT_THROW(contour(sphereField(), {.tolerance = INFINITY}), Error);
+  EXPECT_THROW(contour(sphereField(), {}, Progress{.cancelled = [] { return true; }}), Cancelled);
+}
+
+}  // namespace
+}  // namespace hpsdf
