@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <vector>
+#include <span>
 
 #include "hpsdf/types.h"
 
@@ -34,7 +34,7 @@ inline LegendreRows legendreOfPart(double shift, double scale, int degree) {
 /// Converts the coefficients c of a cell's polynomial to the local coordinates of a part of the cell, along one axis.
 /// `rows` is the result of `legendreOfPart` for the part along this axis. c is a cube of (degree + 1)³ numbers, z
 /// fastest, with zeros above the total degree.
-inline void restrictToPart(std::vector<double>& c, int degree, int axis, const LegendreRows& rows) {
+inline void restrictToPart(std::span<double> c, int degree, int axis, const LegendreRows& rows) {
   const int n = degree + 1;
   const std::array<std::size_t, 3> stride = {std::size_t(n) * n, std::size_t(n), 1};
   for (int j = 0; j < n; ++j)

@@ -197,13 +197,27 @@ class BoundFinder {
         known_(whereKnown(field.domain, distance)),
         rounding_(kRounding * field.domain.diagonal().norm()) {}
 
-  /// Returns the bounds of a leaf in its own box.
-  CellBound operator()(const query::OctreeNode& leaf) const {
-    const Bounds found = isExact(leaf) ? Bounds{exact_.error(leaf), 1} : ofPolynomial(leaf);
-    CellBound bound;
-    bound.error = roundedUp(found.error + rounding_);
-    bound.slope = roundedUp(found.slope * (1 + kRounding));
-    return bound;
+  /// Finds the bounds of leaves, each in its own box, and stores them by node. It is fastest for leaves that are close
+  /// to each other.
+  void operator()(std::span<const query::OctreeNode> leaves, std::vector<CellBound>& bounds) const {
+    const auto store = [&](std::uint32_t node, const Bounds& found) {
+      bounds[node].error = roundedUp(found.error + rounding_);
+      bounds[node].slope = roundedUp(found.slope * (1 + kRounding));
+    };
+    std::vector<BoxPolynomial> polynomials;
+    std::vector<std::uint32_t> nodes;
+    for (const query::OctreeNode& leaf : leaves) {
+      if (isExact(leaf)) {
+        store(leaf.node, {exact_.error(leaf), 1});
+        continue;
+      }
+      const int degree = node::degree(field_.nodes[leaf.node]);
+      const Box box = query::cellBox(frame_, leaf.depth, leaf.cellIndex);
+      polynomials.push_back(polynomialIn(box, cubeOf(field_, leaf.node, degree), degree));
+      nodes.push_back(leaf.node);
+    }
+    const std::vector<Bounds> found = boundsOf(polynomials, kEvaluationsOfLeaf);
+    for (std::size_t n = 0; n < nodes.size(); ++n) store(nodes[n], found[n]);
   }
 
   /// Bounds the errors of exact leaves in all zones, which `inZone` needs.
@@ -230,9 +244,9 @@ class BoundFinder {
       upper[axis] = std::ldexp(corner + zone.to[axis], -small.depth);
     }
     const Box box(query::worldPoint(frame_, lower), query::worldPoint(frame_, upper));
-    const Bounds found =
-        boundsIn(box, partCoefficients(cubeOf(field_, leaf.node, degree), degree, {&rows[0], &rows[1], &rows[2]}),
-                 degree, kEvaluationsOfZone);
+    const BoxPolynomial polynomial = polynomialIn(
+        box, partCoefficients(cubeOf(field_, leaf.node, degree), degree, {&rows[0], &rows[1], &rows[2]}), degree);
+    const Bounds found = boundsOf({&polynomial, 1}, kEvaluationsOfZone).front();
     return {found.error + rounding_, found.slope * (1 + kRounding)};
   }
 
@@ -241,19 +255,19 @@ class BoundFinder {
   std::uint64_t evaluations() const { return evaluations_; }
 
  private:
-  Bounds ofPolynomial(const query::OctreeNode& leaf) const {
-    const int degree = node::degree(field_.nodes[leaf.node]);
-    return boundsIn(query::cellBox(frame_, leaf.depth, leaf.cellIndex), cubeOf(field_, leaf.node, degree), degree,
-                    kEvaluationsOfLeaf);
+  /// Returns a polynomial over a box. `cube` holds its coefficients in local coordinates of the box.
+  static BoxPolynomial polynomialIn(const Box& box, std::vector<double> cube, int degree) {
+    const Part part = partOf(cube, degree, box.center(), box.sizes() / 2);
+    return {std::move(cube), degree, part};
   }
 
-  /// Computes the bounds of a polynomial in a box. `cube` holds its coefficients in local coordinates of the box.
-  Bounds boundsIn(const Box& box, std::vector<double> cube, int degree, std::uint64_t mostEvaluations) const {
-    const Part part = partOf(cube, degree, box.center(), box.sizes() / 2);
-    const ErrorBound found =
-        boundError({std::move(cube), part}, {degree, mostEvaluations, distance_, known_, below_, above_});
-    evaluations_ += found.evaluations;
-    return {found.error, found.slope};
+  std::vector<Bounds> boundsOf(std::span<const BoxPolynomial> polynomials, std::uint64_t mostEvaluations) const {
+    std::vector<Bounds> bounds;
+    for (const ErrorBound& found : boundErrors(polynomials, {mostEvaluations, distance_, known_, below_, above_})) {
+      evaluations_ += found.evaluations;
+      bounds.push_back({found.error, found.slope});
+    }
+    return bounds;
   }
 
   const FieldData& field_;
@@ -374,6 +388,9 @@ std::vector<int> deepestAround(const FieldData& field, const std::vector<query::
 }
 
 constexpr std::size_t kLeavesPerStep = 4096;
+/// Leaves whose errors are bounded together. Their points make batches of 32, in which a distance takes less time than
+/// in batches of eight. With eight leaves at once, a field of high degrees takes a fifth longer.
+constexpr std::size_t kLeavesAtOnce = 4;
 
 void report(const Progress& progress, double fraction) { progress.update("finding bounds", fraction); }
 
@@ -433,8 +450,12 @@ std::uint64_t findBounds(FieldData& field, const DistanceFunction& distance, con
   const double share = field.blend > 0 ? 0.5 : 1;  // part of the whole progress that this loop makes
   for (std::size_t begin = 0; begin < leaves.size(); begin += kLeavesPerStep) {
     report(progress, share * double(begin) / double(leaves.size()));
-    tbb::parallel_for(begin, std::min(begin + kLeavesPerStep, leaves.size()),
-                      [&](std::size_t n) { bounds[leaves[n].node] = find(leaves[n]); });
+    const std::span<const query::OctreeNode> step =
+        std::span(leaves).subspan(begin, std::min(kLeavesPerStep, leaves.size() - begin));
+    tbb::parallel_for(std::size_t{0}, (step.size() + kLeavesAtOnce - 1) / kLeavesAtOnce, [&](std::size_t n) {
+      const std::size_t first = n * kLeavesAtOnce;
+      find(step.subspan(first, std::min(kLeavesAtOnce, step.size() - first)), bounds);
+    });
   }
   field.bounds = std::move(bounds);
   if (field.blend > 0) widenForBlending(field, find, leaves, progress);

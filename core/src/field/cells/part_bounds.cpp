@@ -11,22 +11,6 @@
 namespace hpsdf::detail {
 namespace {
 
-/// Returns a bound of the derivatives of the terms of degree 2 and more, by |L_i| ≤ 1 and |L_i'| ≤ i(i+1)/2.
-Vector3 restGradientOf(const PartWithCube& at, int degree) {
-  Vector3 sum = Vector3::Zero();
-  basis::forEachCoefficient(degree, [&](int i, int j, int k, int) {
-    if (i + j + k < 2) return;
-    const double c = std::abs(at.cube[basis::cubeIndex(i, j, k, degree)]);
-    sum += c / 2 * Vector3(i * (i + 1), j * (j + 1), k * (k + 1));
-  });
-  return sum.cwiseQuotient(at.part.half);
-}
-
-/// Returns a bound of the slope of a part's polynomial.
-double slopeOf(const PartWithCube& at, int degree) {
-  return (at.part.gradient.cwiseAbs() + restGradientOf(at, degree)).norm();
-}
-
 /// The sum of a part's polynomial, up to its terms of degree 2, times `sign` and of |x − y|, at its greatest corner.
 struct Corners {
   double greatest, farthest;  ///< the greatest sum, and the greatest distance |x − y|
@@ -40,21 +24,23 @@ Corners cornersOf(const Part& part, double sign, const Vector3& offset) {
       linear[axis][side] = sign * (part.gradient[axis] * step + part.squares[axis]);
       squared[axis][side] = (offset[axis] + step) * (offset[axis] + step);
     }
-  std::array<double, 8> sums, distances;
+  using Numbers = Eigen::Array<double, 8, 1>;  // one for each corner
+  Numbers sums, distances;
   for (int corner = 0; corner < 8; ++corner) {
     const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
     const double products = (y == z ? part.products[0] : -part.products[0]) +
                             (x == z ? part.products[1] : -part.products[1]) +
                             (x == y ? part.products[2] : -part.products[2]);
-    distances[corner] = std::sqrt(squared[0][x] + squared[1][y] + squared[2][z]);
-    sums[corner] = sign * (part.value + products) + linear[0][x] + linear[1][y] + linear[2][z] + distances[corner];
+    distances[corner] = squared[0][x] + squared[1][y] + squared[2][z];
+    sums[corner] = sign * (part.value + products) + linear[0][x] + linear[1][y] + linear[2][z];
   }
-  return {*std::ranges::max_element(sums), *std::ranges::max_element(distances)};
+  distances = distances.sqrt();
+  return {(sums + distances).maxCoeff(), distances.maxCoeff()};
 }
 
 }  // namespace
 
-Part partOf(const std::vector<double>& cube, int degree, const Vector3& center, const Vector3& half) {
+Part partOf(std::span<const double> cube, int degree, const Vector3& center, const Vector3& half) {
   const auto coefficient = [&](int i, int j, int k) {
     return i + j + k <= degree ? cube[basis::cubeIndex(i, j, k, degree)] : 0;
   };
@@ -89,13 +75,30 @@ double coneBound(const Part& part, double sign, const Vector3& y) {
 
 namespace {
 
+/// The greatest slopes i(i+1)/2 of the Legendre polynomials L_i in [-1, 1].
+constexpr auto kSteepest = [] {
+  std::array<double, kMaxDegree + 1> slopes{};
+  for (int i = 0; i <= kMaxDegree; ++i) slopes[i] = i * (i + 1) / 2;
+  return slopes;
+}();
+
+/// Returns a bound of the derivatives of the terms of degree 2 and more, by |L_i| ≤ 1 and `kSteepest`.
+Vector3 restGradientOf(std::span<const double> cube, int degree, const Vector3& half) {
+  Vector3 sum = Vector3::Zero();
+  for (int i = 0; i <= degree; ++i)
+    for (int j = 0; i + j <= degree; ++j)
+      for (int k = std::max(0, 2 - i - j); i + j + k <= degree; ++k)
+        sum += std::abs(cube[basis::cubeIndex(i, j, k, degree)]) * Vector3(kSteepest[i], kSteepest[j], kSteepest[k]);
+  return sum.cwiseQuotient(half);
+}
+
 /// The two errors: f − Φ, which is bounded by points beyond the part along the gradient, and Φ − f, which is bounded by
 /// points on the other side.
 enum class Side : std::uint8_t { above, below };
 
 /// A part of the leaf with a bound of one of the two errors.
 struct Region {
-  PartWithCube at;
+  Part part;
   Side side;
   double bound = std::numeric_limits<double>::infinity();
   double reach = 0;  ///< distance of the next apex from the centre
@@ -112,86 +115,136 @@ struct Region {
 /// small up to the next surface halfway between two faces. Across the line, the cone departs from Φ by about s²/2r,
 /// where s is the half width of the region and r the distance of the apex. So the apex moves out while the loss is
 /// small against s²/2r, and in where it is greater; and regions are halved along axes that run across the gradient.
+///
+/// The search does not evaluate Φ itself. It tells at which points it needs Φ (`points`), and goes on with the values
+/// (`take`), so that several searches can be served at once.
 class ErrorSearch {
  public:
-  explicit ErrorSearch(const ErrorQuestion& question) : question_(question) {}
+  ErrorSearch(const BoxPolynomial& whole, const ErrorQuestion& question)
+      : question_(question), degree_(whole.degree), cubes_(whole.cube), cubeSize_(whole.cube.size()) {
+    const std::size_t most = question.mostEvaluations + kPoints;  // every region but few has an apex of its own
+    cubes_.reserve(most * cubeSize_);
+    regions_.reserve(most);
+    regions_.push_back({.part = whole.part, .side = Side::above, .reach = 2 * whole.part.half.maxCoeff()});
+    waiting_ = {0};
+    halveAll();
+    halveAll();
+    for (std::size_t n = 0; n < kPoints / 2; ++n) {
+      waiting_.push_back(copyOf(waiting_[n]));
+      regions_[waiting_.back()].side = Side::below;
+    }
+    chooseApexes();
+  }
 
-  ErrorBound operator()(const PartWithCube& whole) {
-    Region root{.at = whole, .side = Side::above};
-    root.reach = 2 * whole.part.half.maxCoeff();
-    std::vector<Region> found = quarters(std::move(root));
-    for (std::size_t n = 0; n < 4; ++n) {
-      found.push_back(found[n]);
-      found.back().side = Side::below;
+  /// Returns the points at which Φ is needed next. There are none when the search has ended.
+  std::span<const Vector3> points() const { return points_; }
+
+  /// Goes on with the values of Φ at `points`.
+  void take(std::span<const double> values) {
+    for (std::size_t n = 0; n < waiting_.size(); ++n) {
+      if (!std::isfinite(values[n])) throw Error("bounds: the signed distance is not finite within the domain");
+      boundBy(points_[n], values[n], regions_[waiting_[n]]);
+      push(waiting_[n]);
     }
-    addApexes(found);
-    while (evaluations_ + 2 * kPairs <= question_.mostEvaluations) {
-      found.clear();
-      for (std::size_t n = 0; n < kPairs; ++n) halve(popGreatest(), found);
-      addApexes(found);
+    evaluations_ += waiting_.size();
+    waiting_.clear();
+    if (evaluations_ + kPoints <= question_.mostEvaluations) {
+      for (std::size_t n = 0; n < kPoints / 2; ++n) waiting_.push_back(popGreatest());
+      halveAll();
     }
+    chooseApexes();
+  }
+
+  ErrorBound result() const {
     ErrorBound result{.error = std::max(bound(Side::above), bound(Side::below)), .evaluations = evaluations_};
-    for (const std::vector<Region>& regions : regions_) {
+    for (const std::vector<std::uint32_t>& heap : heaps_) {
       double slope = 0;
-      for (const Region& region : regions) slope = std::max(slope, slopeOf(region.at, question_.degree));
+      for (const std::uint32_t n : heap) slope = std::max(slope, slopeOf(n));
       result.slope = std::min(result.slope, slope);
     }
     return result;
   }
 
  private:
-  /// Regions that are halved at once: eight points share the search for their nearest triangles.
-  static constexpr std::size_t kPairs = 4;
+  /// Points of each step: eight points share the search for their nearest triangles.
+  static constexpr std::size_t kPoints = 8;
   static constexpr double kStep = 1.6;  ///< factor by which an apex moves out or in
+
+  std::span<double> cubeOf(std::uint32_t region) { return {&cubes_[region * cubeSize_], cubeSize_}; }
+
+  /// Returns a bound of the slope of a region's polynomial.
+  double slopeOf(std::uint32_t region) const {
+    const Part& part = regions_[region].part;
+    const std::span<const double> cube(&cubes_[region * cubeSize_], cubeSize_);
+    return (part.gradient.cwiseAbs() + restGradientOf(cube, degree_, part.half)).norm();
+  }
+
+  /// Returns the heap of the regions with a bound of this error, the greatest bound first.
+  std::vector<std::uint32_t>& heapOf(Side side) { return heaps_[side == Side::above ? 0 : 1]; }
 
   /// Returns the greatest bound of one error; 0 if no region is left.
   double bound(Side side) const {
-    const std::vector<Region>& regions = regions_[side == Side::above ? 0 : 1];
-    return regions.empty() ? 0 : regions.front().bound;
+    const std::vector<std::uint32_t>& heap = heaps_[side == Side::above ? 0 : 1];
+    return heap.empty() ? 0 : regions_[heap.front()].bound;
   }
 
-  void push(Region&& region) {
-    std::vector<Region>& heap = regions_[region.side == Side::above ? 0 : 1];
-    heap.push_back(std::move(region));
-    std::ranges::push_heap(heap, {}, &Region::bound);
+  void push(std::uint32_t region) {
+    std::vector<std::uint32_t>& heap = heapOf(regions_[region].side);
+    heap.push_back(region);
+    std::ranges::push_heap(heap, {}, [&](std::uint32_t n) { return regions_[n].bound; });
   }
 
-  Region popGreatest() {
-    std::vector<Region>& regions = regions_[bound(Side::above) >= bound(Side::below) ? 0 : 1];
-    std::ranges::pop_heap(regions, {}, &Region::bound);
-    Region region = std::move(regions.back());
-    regions.pop_back();
+  std::uint32_t popGreatest() {
+    std::vector<std::uint32_t>& heap = heapOf(bound(Side::above) >= bound(Side::below) ? Side::above : Side::below);
+    std::ranges::pop_heap(heap, {}, [&](std::uint32_t n) { return regions_[n].bound; });
+    const std::uint32_t region = heap.back();
+    heap.pop_back();
     return region;
   }
 
-  std::vector<Region> quarters(Region&& whole) const {
-    std::vector<Region> halves, found;
-    halve(std::move(whole), halves);
-    for (Region& half : halves) halve(std::move(half), found);
-    return found;
+  std::uint32_t copyOf(std::uint32_t region) {
+    const auto copy = static_cast<std::uint32_t>(regions_.size());
+    regions_.push_back(Region(regions_[region]));
+    cubes_.resize(cubes_.size() + cubeSize_);
+    std::ranges::copy(cubeOf(region), cubeOf(copy).begin());
+    return copy;
   }
 
-  /// Halves a region along the axis along which it extends most across the gradient, and adds the halves to `found`.
-  void halve(Region&& region, std::vector<Region>& found) const {
-    int axis = 0;
-    spreadAcross(region.at.part).maxCoeff(&axis);
-    const Vector3 center = region.at.part.center;
-    Vector3 half = region.at.part.half;
-    half[axis] /= 2;
-    found.push_back(region);
-    found.push_back(std::move(region));
-    for (const bool isUpper : {false, true}) {
-      Region& child = found[found.size() - (isUpper ? 1 : 2)];
-      restrictToPart(child.at.cube, question_.degree, axis, isUpper ? question_.upper : question_.lower);
-      Vector3 at = center;
-      at[axis] += isUpper ? half[axis] : -half[axis];
-      child.at.part = partOf(child.at.cube, question_.degree, at, half);
-      const double gap = spreadAcross(child.at.part).sum() / (2 * child.reach);
-      if (child.loss > 2 * gap)
-        child.reach = std::min(child.reach / kStep, std::max(child.reach - child.loss / 2, child.reach / 8));
-      else if (child.loss < gap / 4)
-        child.reach *= kStep;
+  /// Halves the waiting regions. Each makes place for its two halves.
+  void halveAll() {
+    std::vector<std::uint32_t> halves;
+    for (const std::uint32_t region : waiting_) {
+      halves.push_back(region);
+      halves.push_back(halve(region));
     }
+    waiting_ = std::move(halves);
+  }
+
+  /// Halves a region along the axis along which it extends most across the gradient. The region becomes its lower half;
+  /// the function returns the upper half.
+  std::uint32_t halve(std::uint32_t region) {
+    const std::uint32_t other = copyOf(region);
+    const Part whole = regions_[region].part;
+    int axis = 0;
+    spreadAcross(whole).maxCoeff(&axis);
+    for (const bool isUpper : {false, true}) {
+      const std::uint32_t half = isUpper ? other : region;
+      restrictToPart(cubeOf(half), degree_, axis, isUpper ? question_.upper : question_.lower);
+      Vector3 size = whole.half, center = whole.center;
+      size[axis] /= 2;
+      center[axis] += isUpper ? size[axis] : -size[axis];
+      regions_[half].part = partOf(cubeOf(half), degree_, center, size);
+      adaptReach(regions_[half]);
+    }
+    return other;
+  }
+
+  static void adaptReach(Region& region) {
+    const double gap = spreadAcross(region.part).sum() / (2 * region.reach);
+    if (region.loss > 2 * gap)
+      region.reach = std::min(region.reach / kStep, std::max(region.reach - region.loss / 2, region.reach / 8));
+    else if (region.loss < gap / 4)
+      region.reach *= kStep;
   }
 
   /// Returns the squares of the half edges of a part, each in so far as its axis runs across the gradient.
@@ -201,28 +254,14 @@ class ErrorSearch {
     return part.half.cwiseAbs2().cwiseProduct(Vector3::Ones() - part.gradient.cwiseAbs2() / squared);
   }
 
-  /// Evaluates Φ at an apex of each region, and adds the regions to the heap.
-  void addApexes(std::vector<Region>& regions) {
+  void chooseApexes() {
     points_.clear();
-    for (Region& region : regions) points_.push_back(apexOf(region));
-    values_.resize(points_.size());
-    question_.distance(points_, values_);
-    evaluations_ += points_.size();
-    for (std::size_t n = 0; n < regions.size(); ++n) {
-      if (!std::isfinite(values_[n])) throw Error("bounds: the signed distance is not finite within the domain");
-      Region& region = regions[n];
-      const Part& part = region.at.part;
-      // L_2(0) is −1/2.
-      const double centre = part.value - (part.squares[0] + part.squares[1] + part.squares[2]) / 2;
-      region.loss = std::abs(centre + region.direction() * region.reach - values_[n]);
-      boundBy(points_[n], values_[n], region);
-      push(std::move(region));
-    }
+    for (const std::uint32_t region : waiting_) points_.push_back(apexOf(regions_[region]));
   }
 
   /// Returns the next apex of a region. Reduces its reach if it would lie outside the domain.
   Vector3 apexOf(Region& region) const {
-    const Part& part = region.at.part;
+    const Part& part = region.part;
     const double steepness = part.gradient.norm();
     if (!(steepness > 0)) region.reach = 0;
     const Vector3 unit =
@@ -237,19 +276,51 @@ class ErrorSearch {
 
   /// Reduces the bound of a region to what Φ at an apex y proves: Φ(x) lies between Φ(y) − |x − y| and Φ(y) + |x − y|.
   static void boundBy(const Vector3& apex, double distance, Region& region) {
-    const double bound = coneBound(region.at.part, region.direction(), apex) - region.direction() * distance;
+    const Part& part = region.part;
+    // L_2(0) is −1/2.
+    const double centre = part.value - (part.squares[0] + part.squares[1] + part.squares[2]) / 2;
+    region.loss = std::abs(centre + region.direction() * region.reach - distance);
+    const double bound = coneBound(part, region.direction(), apex) - region.direction() * distance;
     region.bound = std::min(region.bound, bound);
   }
 
   const ErrorQuestion& question_;
-  std::array<std::vector<Region>, 2> regions_;  ///< by side: a heap with the greatest bound first
+  int degree_;
+  std::vector<double> cubes_;  ///< the regions' coefficients as for `partOf`, one region after the other
+  std::size_t cubeSize_;
+  std::vector<Region> regions_;
+  std::array<std::vector<std::uint32_t>, 2> heaps_;  ///< by side: see `heapOf`
+  std::vector<std::uint32_t> waiting_;               ///< regions that wait for Φ at their apexes, which are `points_`
   std::vector<Vector3> points_;
-  std::vector<double> values_;
   std::uint64_t evaluations_ = 0;
 };
 
 }  // namespace
 
-ErrorBound boundError(const PartWithCube& whole, const ErrorQuestion& question) { return ErrorSearch(question)(whole); }
+std::vector<ErrorBound> boundErrors(std::span<const BoxPolynomial> leaves, const ErrorQuestion& question) {
+  std::vector<ErrorSearch> searches;
+  searches.reserve(leaves.size());
+  for (const BoxPolynomial& leaf : leaves) searches.emplace_back(leaf, question);
+  std::vector<Vector3> points;
+  std::vector<double> values;
+  while (true) {
+    points.clear();
+    for (const ErrorSearch& search : searches)
+      points.insert(points.end(), search.points().begin(), search.points().end());
+    if (points.empty()) break;
+    values.resize(points.size());
+    question.distance(points, values);
+    std::span<const double> rest(values);
+    for (ErrorSearch& search : searches) {
+      const std::size_t count = search.points().size();
+      search.take(rest.first(count));
+      rest = rest.subspan(count);
+    }
+  }
+  std::vector<ErrorBound> bounds;
+  bounds.reserve(searches.size());
+  for (const ErrorSearch& search : searches) bounds.push_back(search.result());
+  return bounds;
+}
 
 }  // namespace hpsdf::detail

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "hpsdf/detail/legendre_part.h"
@@ -25,15 +26,16 @@ struct Part {
 
 /// Makes a part with this centre and half edges. `cube` holds the polynomial's coefficients in local coordinates of the
 /// part, as a cube of (degree + 1)³ numbers.
-Part partOf(const std::vector<double>& cube, int degree, const Vector3& center, const Vector3& half);
+Part partOf(std::span<const double> cube, int degree, const Vector3& center, const Vector3& half);
 
 /// Returns an upper bound of sign · f(x) + |x − y| over all points x of a part with the polynomial f, for one point y.
 /// The sign is 1 or −1.
 double coneBound(const Part& part, double sign, const Vector3& y);
 
-/// A part of a leaf, and the polynomial's coefficients as for `partOf`.
-struct PartWithCube {
+/// The polynomial of a leaf over a box, and the coefficients as for `partOf`.
+struct BoxPolynomial {
   std::vector<double> cube;
+  int degree;
   Part part;
 };
 
@@ -44,17 +46,18 @@ struct ErrorBound {
   std::uint64_t evaluations = 0;
 };
 
-/// The parameters with which the error of a polynomial is bounded.
+/// The parameters with which the errors of polynomials are bounded.
 struct ErrorQuestion {
-  int degree;
-  std::uint64_t mostEvaluations;  ///< at least 8
+  std::uint64_t mostEvaluations;  ///< for each polynomial, at least 8
   const DistanceFunction& distance;
   const Box& domain;                  ///< where the distance may be evaluated
   const LegendreRows &lower, &upper;  ///< `legendreOfPart` for the two halves of a cell
 };
 
-/// Returns upper bounds of the error |f − Φ| and of the slope of a leaf's polynomial f over a box. Throws `Error` if Φ
-/// is not finite.
-ErrorBound boundError(const PartWithCube& whole, const ErrorQuestion& question);
+/// Returns for each leaf upper bounds of the error |f − Φ| and of the slope of its polynomial f over a box. The bounds
+/// do not depend on which other leaves are in the list. It takes less time for several leaves that are close to each
+/// other than for each on its own, as the distance is evaluated at more points at a time. Throws `Error` if Φ is not
+/// finite.
+std::vector<ErrorBound> boundErrors(std::span<const BoxPolynomial> leaves, const ErrorQuestion& question);
 
 }  // namespace hpsdf::detail
