@@ -36,7 +36,7 @@ class RecordingDistance {
 /// Returns all points at which the construction of the bunny's field asks for the distance.
 ConstructionPoints record() {
   ConstructionPoints all;
-  build(RecordingDistance(all), paperDomain(), {.targetError = 1e-5, .threads = 1});
+  build(RecordingDistance(all), paperDomain(), {.targetError = 1e-6, .threads = 1});
   return all;
 }
 

@@ -11,7 +11,7 @@ struct Batch {
   bool withGradients;
 };
 
-/// About 300,000 points at which the bunny's construction at τ = 1e-5 asks for distances: whole batches, in order.
+/// About 300,000 points at which the bunny's construction at τ = 1e-6 asks for distances: whole batches, in order.
 struct ConstructionPoints {
   std::vector<Vector3> points;
   std::vector<Batch> batches;
