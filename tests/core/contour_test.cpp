@@ -1,6 +1,6 @@
 // Contours of fields: closed manifolds without crossings, within the tolerance of the surface.
 
-#include "hpsdf/contour.h"
+#include "hpsdf/output/contour.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

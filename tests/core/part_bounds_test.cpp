@@ -37,8 +37,8 @@ double valueAt(const BoxPolynomial& polynomial, const Vector3& local) {
   // std::legendre takes no negative arguments in every library, hence L_i(−t) = (−1)^i L_i(t).
   const auto factor = [](int i, double t) { return t < 0 && i % 2 == 1 ? -legendre(i, -t) : legendre(i, std::abs(t)); };
   basis::forEachCoefficient(polynomial.degree, [&](int i, int j, int k, int) {
-    value += polynomial.cube[basis::cubeIndex(i, j, k, polynomial.degree)] * factor(i, local[0]) *
-             factor(j, local[1]) * factor(k, local[2]);
+    value += polynomial.cube[basis::cubeIndex(i, j, k, polynomial.degree)] * factor(i, local[0]) * factor(j, local[1]) *
+             factor(k, local[2]);
   });
   return value;
 }

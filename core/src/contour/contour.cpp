@@ -1,4 +1,4 @@
-#include "hpsdf/contour.h"
+#include "hpsdf/output/contour.h"
 
 #include <algorithm>
 #include <array>

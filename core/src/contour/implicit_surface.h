@@ -3,7 +3,6 @@
 #include <optional>
 #include <span>
 
-#include "hpsdf/contour.h"
 #include "hpsdf/field.h"
 #include "hpsdf/range.h"
 #include "hpsdf/types.h"
