@@ -60,13 +60,15 @@ TEST_F(Outputs, outputsThatDoNotFitLeaveOlderFiles) {
       {"smooth", field(), "-o"},
       {"blend", field(), "-o"},
       {"bounds", field(), "-o"},
+      {"contour", field(), "--tolerance", "5%", "-o"},
       {"export", field(), "--resolution", "9", "-o"},
       {"jumps", field(), "-o"},
       {"slice", field(), "--cpu", "--size", "64x64", "-o"},
       {"render", field(), "--cpu", "--size", "64x64", "-o"},
       {"docs", "-o"}};
   for (std::vector<std::string> words : calls) {
-    const std::string output = at(words[0] == "export"                          ? "old.cdf"
+    const std::string output = at(words[0] == "contour"                         ? "old.ply"
+                                  : words[0] == "export"                        ? "old.cdf"
                                   : words[0] == "slice" || words[0] == "render" ? "old.png"
                                   : words[0] == "jumps"                         ? "old.csv"
                                                                                 : "old.hpsdf");
@@ -181,6 +183,7 @@ TEST_F(Outputs, interruptStopsTheConstruction) {
                                  "--cpu"},
         std::vector<std::string>{"compare", field(), field(), "-o", at("page.html"), "--points", "2e7"},
         std::vector<std::string>{"study", "tradeoff", "builtin:gear", "-o", at("study"), "--target-errors", "1e-12"},
+        std::vector<std::string>{"contour", field(), "-o", at("surface.ply"), "--tolerance", "1e-5"},
         std::vector<std::string>{"export", field(), "-o", at("grid.cdf"), "--resolution", "3", "--points", "1e8"}}) {
     Process process({words});
     process.waitForErrorLine();

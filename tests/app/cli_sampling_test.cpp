@@ -1,4 +1,4 @@
-// Tests `hpsdf jumps`, `export` and `probe`.
+// Tests `hpsdf jumps`, `export`, `contour` and `probe`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +10,7 @@
 #include "hpsdf/detail/cubic_grid.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/jumps.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/render/image.h"
 
 namespace hpsdf::app {
@@ -44,6 +45,35 @@ TEST_F(Sampling, jumpsAreReportedAndListed) {
   EXPECT_THAT(run({{"jumps", field(), "--worst", "0"}}).out, Not(HasSubstr("degrees, depths")));
   expectRefused({{"jumps", field(), "--by", "valeu"}}, "value");
   expectRefused({{"jumps", field(), "-o", field()}}, field(), {"jumps.csv"});
+}
+
+TEST_F(Sampling, contoursAreWrittenAsClosedMeshes) {
+  const Outcome outcome = run({{"contour", field(), "-o", at("s.ply"), "--tolerance", "1%", "--json"}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  const ImportedMesh mesh = importMesh(at("s.ply"));
+  EXPECT_TRUE(mesh.report.closed());
+  EXPECT_EQ(json.at("triangles"), mesh.report.faces);
+  EXPECT_EQ(json.at("vertices"), mesh.report.vertices);
+  EXPECT_EQ(json.at("file_bytes"), readFile(at("s.ply")).size());
+  const double tolerance = 0.01 * load(field()).domain().sizes().maxCoeff();
+  EXPECT_NEAR(json.at("tolerance"), tolerance, 1e-12);
+  EXPECT_LE(json.at("greatest_value"), tolerance);
+  EXPECT_EQ(json.at("missed"), 0);
+  EXPECT_TRUE(json.at("blended"));
+
+  const Outcome text =
+      run({{"contour", field(), "-o", at("grown.obj"), "--tolerance", "0.05", "--offset", "0.1", "--keep-jumps"}});
+  EXPECT_EQ(text.status, 0) << text.err;
+  EXPECT_THAT(text.out, AllOf(HasSubstr("vertices"), HasSubstr("a tolerance of 0.05"), Not(HasSubstr("blended"))));
+  EXPECT_GT(signedVolume(importMesh(at("grown.obj")).mesh), signedVolume(mesh.mesh));
+
+  const std::set<std::string> before = namesIn(folder_.path());
+  expectRefused({{"contour", field(), "-o", at("x.stp")}}, "x.stp", before);
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--tolerance", "0"}}, "--tolerance", before);
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--offset", "-9"}}, "there is no surface", before);
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--tolerance", "1e-9"}}, "allow a greater tolerance", before);
+  expectRefused({{"contour", field(), "-o", at("none/x.ply")}}, "none/x.ply", before);
 }
 
 TEST_F(Sampling, cubicGridsAreExportedAndMeasured) {

@@ -87,6 +87,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"expect", "expect at(0.3,0,0.25).degree == exact; expect at(1,1,1).degree != exact; expect jumps.max < 1"},
     {"probe", "probe from=-0.9,0,0.24 to=0.9,0,0.24 samples=50 output=$out/line.csv"},
     {"probe", "probe from=-0.9,0,0.24 to=0.9,0,0.24 samples=50 size=320x240 output=$out/line.png"},
+    {"contour", "contour output=$out/surface.ply tolerance=1%"},
     {"export", "export resolution=4 points=100 output=$out/grid.cdf"},
     {"show", "show slice; shot output=$out/shot.png"},
     {"camera", "camera 120,10,0.9; shot output=$out/shot.png"},

@@ -21,6 +21,7 @@ Registry makeRegistry() {
   addFigureCommands(registry);
   addProbeCommand(registry);
   addWhyCommand(registry);
+  addContourCommand(registry);
   addExportCommand(registry);
   addExplorerCommands(registry);
   addUiCommand(registry);

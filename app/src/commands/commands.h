@@ -8,6 +8,7 @@ namespace hpsdf::app {
 Registry makeRegistry();
 
 // Each of the following functions adds the commands that are defined in the source file of the same name.
+void addContourCommand(Registry& registry);
 void addExportCommand(Registry& registry);
 void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, info, query, load and save
 void addJumpsCommand(Registry& registry);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "contour/meeting_point.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
@@ -41,6 +42,41 @@ CellSamples samplesOf(const Lattice& values) {
   return samples;
 }
 
+/// Sets the misfits of cells, at most kCellsAtOnce.
+void findMisfits(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
+                 std::span<CellSamples> samples) {
+  constexpr std::size_t kEdges = 12;
+  std::array<Vector3, kCellsAtOnce * kEdges> points;
+  std::array<ValueAndGradient, kCellsAtOnce * kEdges> found;
+  std::array<std::size_t, kCellsAtOnce + 1> first{};
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Box box = octree.box(octree[cells[i]]);
+    const std::array<double, 8>& corners = samples[i].corners;
+    for (int axis = 0; axis < 3 && samples[i].changesSign; ++axis)
+      for (int lower = 0; lower < 8; ++lower) {
+        const int upper = lower | 1 << axis;
+        if (upper == lower || isInside(corners[lower]) == isInside(corners[upper])) continue;
+        const double t = corners[lower] / (corners[lower] - corners[upper]);
+        points[count] = box.corner(static_cast<Box::CornerType>(lower));
+        points[count++][axis] += t * box.sizes()[axis];
+      }
+    first[i + 1] = count;
+  }
+  surface.valuesAndGradients(std::span(points).first(count), std::span(found).first(count));
+  std::vector<TangentPlane> planes;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    planes.clear();
+    for (std::size_t n = first[i]; n < first[i + 1]; ++n)
+      if (const double length = found[n].gradient.norm(); length > 0) {
+        // The point is near the surface only; one step along the gradient leads to it.
+        const Vector3 normal = found[n].gradient / length;
+        planes.push_back({points[n] - normal * (found[n].value / length), normal});
+      }
+    if (!planes.empty()) samples[i].misfit = greatestDistance(meetingPointOf(planes), planes);
+  }
+}
+
 /// Samples at most kCellsAtOnce cells. Cells of which the range excludes 0 are not sampled.
 void sampleChunk(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
                  double thin, std::span<CellSamples> out) {
@@ -75,6 +111,7 @@ void sampleChunk(const ImplicitSurface& surface, const ContourOctree& octree, st
     CellSamples& samples = out[sampled[n]] = samplesOf(lattice);
     if (!samples.changesSign) samples.hides |= ranges[n].min < -thin && ranges[n].max > thin;
   }
+  findMisfits(surface, octree, cells, out);
 }
 
 }  // namespace

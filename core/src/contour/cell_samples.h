@@ -20,6 +20,9 @@ struct CellSamples {
   /// between two points of the other sign. If no corner differs, the function may also become clearly negative and
   /// clearly positive in the cell.
   bool hides = false;
+  /// The greatest distance between the tangent planes where the surface crosses the cell's edges and the point where
+  /// they meet best, about the error of a mesh with a vertex there; 0 if the corners have the same sign.
+  double misfit = 0;
 };
 
 inline bool isInside(double value) { return value < 0; }

@@ -4,7 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "contour/cell_samples.h"
 #include "contour/contour_octree.h"
@@ -14,6 +18,7 @@
 #include "contour/sheets.h"
 #include "contour/vertex_placement.h"
 #include "hpsdf/detail/crossings.h"
+#include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "mesh/connectivity.h"
 #include "util/chunks.h"
@@ -37,15 +42,16 @@ class Contouring {
         progress_(progress) {
     // The smallest cells have edges of one to two tolerances.
     const double smallest = std::exp2(std::floor(std::log2(tolerance / octree_.smallestEdge())) + 1);
-    smallest_ = static_cast<std::int32_t>(std::clamp(smallest, 1.0, std::ldexp(1.0, ContourOctree::kDepth)));
+    smallest_ = static_cast<std::int32_t>(std::clamp(smallest, 2.0, std::ldexp(1.0, ContourOctree::kDepth)));
   }
 
   Contour make() {
     std::vector<std::int32_t> fresh(octree_.cells().size());
     for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = static_cast<std::int32_t>(i);
     sample(fresh);
-    divideHiding();
+    divideUnfit();
     for (;;) {
+      result_.fans = result_.flawed = 0;
       extract({});
       wanted_.clear();
       wantAtMultipleSheets();
@@ -97,28 +103,38 @@ class Contouring {
           if (samplesOf(child).changesSign && octree_[child].size > sizes[i]) want(child, sizes[i]);
         }
     }
-    divideHiding();
+    divideUnfit();
     return true;
   }
 
   void divide(std::span<const std::int32_t> cells) {
     const std::size_t first = octree_.cells().size();
+    requireMemoryFor(first + 8 * cells.size());
     octree_.divide(cells);
     fresh_.clear();
     for (std::size_t i = first; i < octree_.cells().size(); ++i) fresh_.push_back(static_cast<std::int32_t>(i));
     sample(fresh_);
   }
 
-  /// Divides leaves while they hide sheets.
-  void divideHiding() {
+  /// Checks the memory of so many cells, with as many edges for each as there are now, and of the search for crossings
+  /// between triangles.
+  void requireMemoryFor(std::size_t cells) const {
+    constexpr double kBytesOfEdge = 1500;
+    const double edges = double(edges_.size()) / double(octree_.cells().size());
+    const double bytes = double(cells) * (sizeof(ContourCell) + sizeof(CellSamples) + kBytesOfEdge * edges);
+    requireMemory("a contour of " + std::to_string(cells) + " cells", bytes, "allow a greater tolerance");
+  }
+
+  /// Divides leaves while they hide sheets or while the surface in them bends too much.
+  void divideUnfit() {
     for (std::size_t first = 0; first < octree_.cells().size();) {
-      std::vector<std::int32_t> hiding;
+      std::vector<std::int32_t> unfit;
       const std::size_t end = octree_.cells().size();
       for (; first < end; ++first) {
         const auto cell = static_cast<std::int32_t>(first);
-        if (samplesOf(cell).hides && canDivide(cell)) hiding.push_back(cell);
+        if ((samplesOf(cell).hides || samplesOf(cell).misfit > tolerance_) && canDivide(cell)) unfit.push_back(cell);
       }
-      if (!hiding.empty()) divide(hiding);
+      if (!unfit.empty()) divide(unfit);
     }
   }
 
@@ -139,7 +155,7 @@ class Contouring {
     mesh_ = makeDualMesh(surface_, edges_, *sheets_, std::move(vertices), fans);
   }
 
-  /// Wants leaves divided through which more than one sheet passes.
+  /// Asks that leaves be divided through which more than one sheet passes.
   void wantAtMultipleSheets() {
     for (std::uint32_t sheet = 1; sheet < sheets_->size(); ++sheet) {
       const std::int32_t cell = sheets_->cellOf(sheet);
@@ -147,7 +163,7 @@ class Contouring {
     }
   }
 
-  /// Measures the greatest value, and wants leaves divided at triangles that are too far from the surface.
+  /// Measures the greatest value, and asks that leaves be divided at triangles that are too far from the surface.
   void wantWhereTooFar() {
     constexpr std::size_t kAtOnce = 128;
     std::vector<double> greatest(mesh_.triangles.size());
@@ -189,17 +205,17 @@ class Contouring {
       for (const std::int32_t cell : edge.cells)
         if (octree_[cell].size == largest) want(cell, largest >> halvings);
     }
+    progress_.update("meshing", 1 - double(result_.unresolved) / double(std::max<std::size_t>(greatest.size(), 1)));
   }
 
-  /// Wants leaves divided that are more than twice as large as one beside them at a crossed edge.
+  /// Asks that leaves be divided that are more than twice as large as one beside them at a crossed edge.
   void wantWhereUneven() {
     for (const CrossedEdge& edge : edges_)
       for (const std::int32_t cell : edge.cells)
         if (octree_[cell].size > 2 * edge.size) want(cell, 2 * edge.size);
   }
 
-  /// Returns the crossed edges whose polygons cross others, or meet others falsely: at an edge of more than two
-  /// triangles.
+  /// Returns the crossed edges whose polygons cross others, or share an edge with more than one other.
   std::vector<std::uint32_t> wrongPolygons() const {
     std::vector<std::uint32_t> wrong;
     const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(mesh_.triangles);
@@ -208,7 +224,8 @@ class Contouring {
       for (const mesh::DirectedEdge& one : side) wrong.push_back(mesh_.edgeOfTriangle[one.face]);
     });
     if (!mesh_.triangles.empty()) {
-      const Crossings crossings = findCrossings({mesh_.vertices, mesh_.triangles, "contour"}, kMaxCrossings, {});
+      const Crossings crossings = findCrossings({mesh_.vertices, mesh_.triangles, "contour"}, kMaxCrossings,
+                                                Progress{.cancelled = progress_.cancelled});
       for (const Crossing& crossing : crossings.found)
         for (const std::uint32_t triangle : crossing.triangles) wrong.push_back(mesh_.edgeOfTriangle[triangle]);
     }
@@ -227,42 +244,72 @@ class Contouring {
       extract(fans);
       wrong = wrongPolygons();
     }
+    result_.fans = static_cast<std::size_t>(std::ranges::count(fans, true));
     result_.flawed = wrong.size();
   }
 
-  /// Removes the triangles of the wall, and vertices that no triangle uses.
+  /// Removes the triangles of the wall, and vertices that no triangle uses. Where the wall held fans of triangles
+  /// together, each gets a vertex of its own.
   void removeWall() {
     std::vector<Triangle> kept;
     for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
       if (!surface_.isAtWall(edges_[mesh_.edgeOfTriangle[i]].point)) kept.push_back(mesh_.triangles[i]);
-    constexpr std::uint32_t kUnused = 0xffffffff;
-    std::vector<std::uint32_t> number(mesh_.vertices.size(), kUnused);
+
+    // The corners of triangles, three for each, are united across edges that two triangles share.
+    mesh::DisjointSets corners(3 * kept.size());
+    const auto cornerAt = [&](std::uint32_t triangle, std::uint32_t vertex) {
+      const auto place = std::ranges::find(kept[triangle], vertex) - kept[triangle].begin();
+      return 3 * triangle + static_cast<std::uint32_t>(place);
+    };
+    const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(kept);
+    mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> side) {
+      for (std::size_t i = 1; i < side.size(); ++i)
+        for (const std::uint32_t end : {side[0].low(), side[0].high()})
+          corners.join(cornerAt(side[0].face, end), cornerAt(side[i].face, end));
+    });
+    std::vector<std::uint32_t> number(3 * kept.size());
     std::vector<Vector3> vertices;
-    for (Triangle& triangle : kept)
-      for (std::uint32_t& corner : triangle) {
-        if (number[corner] == kUnused) {
-          number[corner] = static_cast<std::uint32_t>(vertices.size());
-          vertices.push_back(mesh_.vertices[corner]);
-        }
-        corner = number[corner];
+    for (std::uint32_t corner = 0; corner < number.size(); ++corner) {
+      std::uint32_t& vertex = kept[corner / 3][corner % 3];
+      if (corners.first(corner) == corner) {
+        number[corner] = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(mesh_.vertices[vertex]);
       }
+      vertex = number[corners.first(corner)];
+    }
     mesh_.vertices = std::move(vertices);
     mesh_.triangles = std::move(kept);
+  }
+
+  /// Sets the normals of the finished mesh.
+  void findNormals() {
+    constexpr std::size_t kAtOnce = 256;
+    const std::vector<Vector3>& vertices = result_.mesh.vertices;
+    result_.normals.resize(vertices.size());
+    detail::forEachChunk(vertices.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      std::array<ValueAndGradient, kAtOnce> found;
+      const std::span points = std::span(vertices).subspan(first, count);
+      if (isOpen_)
+        surface_.field().valuesAndGradients(points, std::span(found).first(count));
+      else
+        surface_.valuesAndGradients(points, std::span(found).first(count));
+      for (std::size_t i = 0; i < count; ++i) result_.normals[first + i] = found[i].gradient.stableNormalized();
+    });
+    std::vector<Vector3> means(vertices.size(), Vector3::Zero());
+    for (const Triangle& triangle : result_.mesh.triangles) {
+      const auto [a, b, c] = cornersOf(result_.mesh, triangle);
+      const Vector3 normal = (b - a).cross(c - a);
+      for (const std::uint32_t corner : triangle) means[corner] += normal;
+    }
+    for (std::size_t i = 0; i < vertices.size(); ++i)
+      if (!(result_.normals[i].squaredNorm() > 0.5)) result_.normals[i] = means[i].stableNormalized();
   }
 
   Contour finish() {
     if (isOpen_) removeWall();
     result_.mesh.vertices = std::move(mesh_.vertices);
     result_.mesh.triangles = std::move(mesh_.triangles);
-    result_.normals.resize(result_.mesh.vertices.size());
-    constexpr std::size_t kAtOnce = 256;
-    detail::forEachChunk(result_.normals.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
-      std::array<ValueAndGradient, kAtOnce> found;
-      surface_.valuesAndGradients(std::span(result_.mesh.vertices).subspan(first, count),
-                                  std::span(found).first(count));
-      for (std::size_t i = 0; i < count; ++i) result_.normals[first + i] = found[i].gradient.normalized();
-    });
-    result_.cells = sheets_->size();
+    findNormals();
     return std::move(result_);
   }
 
@@ -288,7 +335,11 @@ Contour contour(const Field& field, const ContourOptions& options, const Progres
   if (!std::isfinite(options.offset)) throw Error(ErrorKind::option, "offset", "must be a finite number");
   if (!(options.tolerance >= 0) || !std::isfinite(options.tolerance))
     throw Error(ErrorKind::option, "tolerance", "must be a finite number of at least 0");
-  const double tolerance = options.tolerance > 0 ? options.tolerance : 1e-3 * field.domain().sizes().maxCoeff();
+  const double longest = field.domain().sizes().maxCoeff();
+  const double tolerance = options.tolerance > 0 ? options.tolerance : 1e-3 * longest;
+  if (tolerance < kLeastContourTolerance * longest)
+    throw Error(ErrorKind::option, "tolerance",
+                "must be at least 1/4,000,000 of the longest side of the domain; allow a greater tolerance");
   return withThreads(options.threads,
                      [&] { return contouring::Contouring(field, options, tolerance, progress).make(); });
 }

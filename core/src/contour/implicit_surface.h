@@ -19,6 +19,9 @@ class ImplicitSurface {
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
 
+  /// Returns the field, whose gradients are those without the wall.
+  const Field& field() const { return field_; }
+
   /// Returns the values that there are without the wall.
   void valuesWithoutWall(std::span<const Vector3> points, std::span<double> out) const;
 

@@ -1,9 +1,11 @@
 #include "contour/vertex_placement.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
+#include "contour/meeting_point.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
@@ -12,8 +14,7 @@ namespace {
 constexpr std::size_t kSheetsAtOnce = 256;
 
 /// Returns the box in which the vertices of a leaf may lie. It leaves a margin, so that vertices of neighbours never
-/// coincide, not even in files of single precision. The margin is so narrow that it keeps no vertex farther from the
-/// surface than `accuracy`.
+/// coincide. The margin is so narrow that it keeps no vertex farther from the surface than `accuracy`.
 Box roomOf(const ContourOctree& octree, std::int32_t leaf, double accuracy) {
   constexpr double kFromFaces = 1e-3;
   const Box box = octree.box(octree[leaf]);
@@ -21,29 +22,11 @@ Box roomOf(const ContourOctree& octree, std::int32_t leaf, double accuracy) {
   return Box(Vector3(box.min() + margin), Vector3(box.max() - margin));
 }
 
-/// Returns the point with the least sum of squared distances to the planes through the sheet's crossings, as far from
-/// their middle as they determine it (Ju et al. 2002; Lindstrom 2000 for the pseudoinverse).
-Vector3 meetingPoint(const Sheets& sheets, std::uint32_t sheet, std::span<const CrossedEdge> edges) {
-  // Directions in which the planes differ less than this hardly determine the point. The number is the square of the
-  // sine of half the angle between two planes at a sharp edge, about 8 degrees.
-  constexpr double kSharp = 0.005;
-  const Vector3 middle = middleOf(sheets, sheet, edges);
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  Vector3 right = Vector3::Zero();
-  for (const std::uint32_t e : sheets.edgesOf(sheet)) {
-    const Vector3& normal = edges[e].normal;
-    squares += normal * normal.transpose();
-    right += normal * normal.dot(edges[e].point - middle);
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(squares);
-  const double count = double(sheets.edgesOf(sheet).size());
-  Vector3 step = Vector3::Zero();
-  for (int k = 0; k < 3; ++k) {
-    const double eigenvalue = solver.eigenvalues()[k];
-    const Vector3 direction = solver.eigenvectors().col(k);
-    if (eigenvalue > kSharp * count) step += direction * (direction.dot(right) / eigenvalue);
-  }
-  return middle + step;
+/// Fills `planes` with the tangent planes at a sheet's crossings.
+void listPlanes(const Sheets& sheets, std::uint32_t sheet, std::span<const CrossedEdge> edges,
+                std::vector<TangentPlane>& planes) {
+  planes.clear();
+  for (const std::uint32_t e : sheets.edgesOf(sheet)) planes.push_back({edges[e].point, edges[e].normal});
 }
 
 /// Moves points along the gradient towards the zero set, within their rooms.
@@ -77,9 +60,9 @@ void project(const ImplicitSurface& surface, std::span<Vector3> points, std::spa
 }  // namespace
 
 Vector3 middleOf(const Sheets& sheets, std::uint32_t sheet, std::span<const CrossedEdge> edges) {
-  Vector3 sum = Vector3::Zero();
-  for (const std::uint32_t e : sheets.edgesOf(sheet)) sum += edges[e].point;
-  return sum / double(sheets.edgesOf(sheet).size());
+  std::vector<TangentPlane> planes;
+  listPlanes(sheets, sheet, edges, planes);
+  return middleOf(planes);
 }
 
 std::vector<Vector3> placeVertices(const ImplicitSurface& surface, const ContourOctree& octree,
@@ -89,11 +72,13 @@ std::vector<Vector3> placeVertices(const ImplicitSurface& surface, const Contour
   detail::forEachChunk(sheets.size(), kSheetsAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
     progress.throwIfCancelled();
     std::array<Box, kSheetsAtOnce> rooms;
+    std::vector<TangentPlane> planes;
     for (std::size_t i = 0; i < count; ++i) {
       const auto sheet = static_cast<std::uint32_t>(first + i);
       rooms[i] = roomOf(octree, sheets.cellOf(sheet), accuracy);
-      const Vector3 meeting = meetingPoint(sheets, sheet, edges);
-      const Vector3 start = rooms[i].contains(meeting) ? meeting : middleOf(sheets, sheet, edges);
+      listPlanes(sheets, sheet, edges, planes);
+      const Vector3 meeting = meetingPointOf(planes);
+      const Vector3 start = rooms[i].contains(meeting) ? meeting : middleOf(planes);
       vertices[sheet] = start.cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
     }
     project(surface, std::span(vertices).subspan(first, count), std::span(rooms).first(count), accuracy);

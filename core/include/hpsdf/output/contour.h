@@ -11,18 +11,21 @@
 
 namespace hpsdf {
 
-/// What happens where the domain's boundary cuts the solid.
+/// The choices for the places where the domain's boundary cuts the solid.
 enum class DomainCut : unsigned char {
   wall,  ///< a wall closes the mesh, half of the tolerance within the domain
   open,  ///< the mesh ends there
 };
 
+/// The least tolerance of a contour, as a share of the longest side of the field's domain.
+constexpr double kLeastContourTolerance = 0x1p-22;
+
 struct ContourOptions {
   /// The value of the field on the surface, in the field's units: above 0 for a surface around the solid.
   double offset = 0;
   /// Greatest distance between the mesh and the surface on which the field has this value, in the field's units; 0 for
-  /// a thousandth of the longest side of the field's domain. Parts of the solid and gaps that are thinner than twice
-  /// the tolerance may be lost.
+  /// a thousandth of the longest side of the field's domain. It must be at least `kLeastContourTolerance` of that side.
+  /// Parts of the solid and gaps that are thinner than twice the tolerance may be lost.
   double tolerance = 0;
   DomainCut domainCut = DomainCut::wall;
   int threads = 0;  ///< greatest number of threads, 0 for all; the mesh does not depend on it
@@ -30,13 +33,14 @@ struct ContourOptions {
 
 /// A mesh of a field's surface, and what is known about it.
 struct Contour {
-  TriangleMesh mesh;             ///< triangles face outward: towards greater values
-  std::vector<Vector3> normals;  ///< unit vectors along the field's gradient, one for each vertex
-  double greatestValue = 0;      ///< greatest |f − offset| found at edges and in triangles: the measured error
-  std::size_t cells = 0;         ///< cells of the contour's octree that hold vertices
-  std::size_t unresolved = 0;    ///< places where the tolerance was not reached in the smallest cells
-  std::size_t fans = 0;          ///< polygons that were divided more finely because they would have crossed others
-  std::size_t flawed = 0;        ///< polygons that still cross others or meet them falsely: none, as far as is known
+  TriangleMesh mesh;  ///< triangles face outward: towards greater values
+  /// A unit vector for each vertex: along the field's gradient, normal to the wall at the wall, and the mean of the
+  /// triangles' normals where there is no gradient.
+  std::vector<Vector3> normals;
+  double greatestValue = 0;    ///< greatest |f − offset| found at edges and in triangles: the measured error
+  std::size_t unresolved = 0;  ///< triangles that miss the tolerance although their cells are the smallest ones
+  std::size_t fans = 0;        ///< polygons that were divided more finely because they would have crossed others
+  std::size_t flawed = 0;  ///< polygons that still cross others, or share an edge with more than one: none are known
 };
 
 /// Returns the mesh of the surface on which the field has the value `options.offset`, by dual contouring (Ju et al.
@@ -46,10 +50,13 @@ struct Contour {
 ///
 /// The mesh is a manifold without crossings: each edge belongs to two triangles, which traverse it in opposite
 /// directions, unless it lies on the boundary of the domain and this is left open; the triangles at each vertex form
-/// one fan; and triangles have only their common vertices and edges in common. If the whole domain is outside, the mesh
-/// is empty.
+/// one fan; and triangles have only their common vertices and edges in common. Where the surface is rougher than the
+/// smallest cells, which are as large as one to two tolerances, the corners of a triangle may lie in one line, and fans
+/// of an open mesh that touch at its boundary have a vertex each at the same position. If the
+/// whole domain is outside, the mesh is empty.
 ///
-/// Throws `Error` for options out of range, and `Cancelled` when `progress` says so.
+/// Throws `Error` for options out of range and for a contour that would not fit into memory, and `Cancelled` when
+/// `progress` says so.
 Contour contour(const Field& field, const ContourOptions& options = {}, const Progress& progress = {});
 
 }  // namespace hpsdf

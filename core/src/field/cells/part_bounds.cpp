@@ -166,7 +166,7 @@ class ErrorSearch {
   }
 
  private:
-  /// Points of each step: eight points share the search for their nearest triangles.
+  /// Points of each step: the points of four leaves share the search for their nearest triangles.
   static constexpr std::size_t kPoints = 8;
   static constexpr double kStep = 1.6;  ///< factor by which an apex moves out or in
 

@@ -54,8 +54,8 @@ template <typename Words>
   return (head >> Words((degree - 1) * kWidthBits)) & Words((1 << kWidthBits) - 1);
 }
 
-/// Returns true if the integers of some leaves of degree P are so short that `kShortAtOnce` can be decoded from one
-/// read. `head` is the first word of each leaf. A sum reaches `kOverflow` if a width is too great.
+/// Returns true if the integers of all given leaves of degree P are so short that `kShortAtOnce` can be decoded from
+/// one read. `head` is the first word of each leaf. A sum reaches `kOverflow` if a width is too great.
 template <int P, typename Words>
 [[gnu::always_inline]] inline bool areShort(Words head) {
   constexpr int kOverflow = 1 << QuantizedCoefficients::kWidthBits;
