@@ -183,7 +183,6 @@ TEST_F(Outputs, interruptStopsTheConstruction) {
                                  "--cpu"},
         std::vector<std::string>{"compare", field(), field(), "-o", at("page.html"), "--points", "2e7"},
         std::vector<std::string>{"study", "tradeoff", "builtin:gear", "-o", at("study"), "--target-errors", "1e-12"},
-        std::vector<std::string>{"contour", field(), "-o", at("surface.ply"), "--tolerance", "1e-5"},
         std::vector<std::string>{"export", field(), "-o", at("grid.cdf"), "--resolution", "3", "--points", "1e8"}}) {
     Process process({words});
     process.waitForErrorLine();

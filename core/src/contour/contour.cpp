@@ -70,6 +70,7 @@ class Contouring {
 
  private:
   void sample(std::span<const std::int32_t> cells) {
+    progress_.update("meshing", 1 - missedShare_);
     sampleCells(surface_, octree_, cells, 0.1 * tolerance_, progress_, samples_);
   }
 
@@ -205,7 +206,7 @@ class Contouring {
       for (const std::int32_t cell : edge.cells)
         if (octree_[cell].size == largest) want(cell, largest >> halvings);
     }
-    progress_.update("meshing", 1 - double(result_.unresolved) / double(std::max<std::size_t>(greatest.size(), 1)));
+    missedShare_ = double(result_.unresolved) / double(std::max<std::size_t>(greatest.size(), 1));
   }
 
   /// Asks that leaves be divided that are more than twice as large as one beside them at a crossed edge.
@@ -320,6 +321,7 @@ class Contouring {
   std::int32_t smallest_;
   const Progress& progress_;
   std::vector<CellSamples> samples_;
+  double missedShare_ = 1;  ///< share of the triangles that missed the tolerance when they were last measured
   std::vector<std::int32_t> fresh_;
   std::vector<std::pair<std::int32_t, std::int32_t>> wanted_;  ///< leaves to be divided, and into which size
   std::vector<CrossedEdge> edges_;
