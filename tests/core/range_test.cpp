@@ -253,6 +253,43 @@ double medianWidth(const Field& field, double share) {
   return ratios[30];
 }
 
+/// Counts the points of random boxes whose values lie neither in the range made for known values nor among these.
+int countOutsideOfKnown(const Field& field, const Interval& known) {
+  const RangeIndex index(field);
+  return countOutside(
+      field.domain(),
+      [&](const Box& box) {
+        const Interval range = index.range(box, known).value;
+        return Interval{std::min(range.min, known.min), std::max(range.max, known.max)};
+      },
+      [&](const Vector3& x) { return field.value(x); });
+}
+
+TEST(Range, besideKnownValuesContainsAllOthers) {
+  const double endless = std::numeric_limits<double>::infinity();
+  for (const Interval known : {Interval{0.01, endless}, Interval{-endless, 0.2}, Interval{-0.1, 0.1}}) {
+    EXPECT_EQ(countOutsideOfKnown(randomField(31), known), 0);
+    EXPECT_EQ(countOutsideOfKnown(blended(randomField(32), 0.1), known), 0);
+    EXPECT_EQ(countOutsideOfKnown(build(torus, cube(), {.targetError = 1e-6}), known), 0);
+  }
+}
+
+/// A range made for known values must not reach beyond them where the tight one does not.
+TEST(Range, besideKnownValuesTellsWhetherThereAreOthers) {
+  const Field field = build(torus, cube(), {.targetError = 1e-6});
+  const RangeIndex index(field);
+  RandomBoxes random(17);
+  int within = 0, told = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const Box box = random.within(Box(cube().min() / 2, cube().max() / 2), 0.1);
+    if (index.range(box).value.min < 0) continue;
+    ++within;
+    told += static_cast<int>(index.range(box, Interval{0, std::numeric_limits<double>::infinity()}).value.min >= 0);
+  }
+  EXPECT_GT(within, 1000);
+  EXPECT_EQ(told, within);
+}
+
 TEST(Range, isNotMuchWiderThanTheValues) {
   const Field smooth = build(torus, cube(), {.targetError = 1e-6});
   for (const double share : {0.5, 0.125, 0.01}) EXPECT_LT(medianWidth(smooth, share), 1.35) << share;

@@ -49,7 +49,10 @@ class RangeIndex {
   /// Returns the range of the field over a box, which contains its faces and may be a single point. The box may reach
   /// beyond the domain, where the field is continued (`Field`). Thread-safe and allocation-free. Throws `Error` if the
   /// box is empty or not finite.
-  FieldRange range(const Box& box) const;
+  ///
+  /// Values in the interval `known` do not matter to the caller: the range is made no tighter than is needed to tell
+  /// how far it reaches beyond them, which is several times as fast where it does not. Its ends may be infinite.
+  FieldRange range(const Box& box, const std::optional<Interval>& known = {}) const;
 
   /// Returns the bytes of memory that the index takes besides the field.
   std::size_t bytes() const;

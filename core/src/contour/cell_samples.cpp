@@ -30,18 +30,6 @@ bool hidesSheet(const Lattice& values) {
   return false;
 }
 
-CellSamples samplesOf(const Lattice& values) {
-  CellSamples samples{.mayHoldSurface = true};
-  int inside = 0;
-  for (int n = 0; n < 8; ++n) {
-    samples.corners[n] = values[latticeIndex((n & 1) * 2, (n >> 1 & 1) * 2, (n >> 2 & 1) * 2)];
-    inside += isInside(samples.corners[n]);
-  }
-  samples.changesSign = inside > 0 && inside < 8;
-  samples.hides = hidesSheet(values);
-  return samples;
-}
-
 /// Sets the misfits of cells, at most kCellsAtOnce.
 void findMisfits(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
                  std::span<CellSamples> samples) {
@@ -77,40 +65,65 @@ void findMisfits(const ImplicitSurface& surface, const ContourOctree& octree, st
   }
 }
 
-/// Samples at most kCellsAtOnce cells. Cells of which the range excludes 0 are not sampled.
-void sampleChunk(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
-                 double thin, std::span<CellSamples> out) {
+/// Sets the values at the corners of cells, at most kCellsAtOnce.
+void sampleCorners(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
+                   std::span<CellSamples> out) {
+  std::array<Vector3, kCellsAtOnce * 8> points;
+  std::array<double, kCellsAtOnce * 8> values;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Box box = octree.box(octree[cells[i]]);
+    for (int n = 0; n < 8; ++n) points[8 * i + n] = box.corner(static_cast<Box::CornerType>(n));
+  }
+  surface.values(std::span(points).first(8 * cells.size()), std::span(values).first(8 * cells.size()));
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    out[i] = {};
+    std::copy_n(&values[8 * i], 8, out[i].corners.begin());
+    const auto inside = std::ranges::count_if(out[i].corners, isInside);
+    out[i].changesSign = inside > 0 && inside < 8;
+  }
+}
+
+/// Finds out which of the cells whose corners have different signs hide a sheet.
+void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
+                      std::span<CellSamples> samples) {
   std::array<Vector3, kCellsAtOnce * kPoints> points;
   std::array<double, kCellsAtOnce * kPoints> values;
-  std::array<Interval, kCellsAtOnce> ranges;
-  std::array<std::size_t, kCellsAtOnce> sampled;
   std::size_t count = 0;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const ContourCell& cell = octree[cells[i]];
-    // The box is a little greater than the cell, because values at its faces may be those of neighbours.
-    Box box = octree.box(cell);
-    const Vector3 margin = 1e-9 * box.sizes();
-    box = Box(Vector3(box.min() - margin), Vector3(box.max() + margin));
-    ranges[count] = surface.range(box);
-    out[i] = {};
-    if (ranges[count].min > 0 || ranges[count].max < 0) continue;
-    sampled[count] = i;
+  // Corners of the cell are known, all other points of the lattice are evaluated.
+  const auto forEachPoint = [](const auto& visit) {
     for (int z = 0; z < kLattice; ++z)
       for (int y = 0; y < kLattice; ++y)
-        for (int x = 0; x < kLattice; ++x) {
-          const std::int32_t half = cell.size / 2;
-          points[count * kPoints + latticeIndex(x, y, z)] =
-              octree.position({cell.lower[0] + x * half, cell.lower[1] + y * half, cell.lower[2] + z * half});
-        }
-    ++count;
+        for (int x = 0; x < kLattice; ++x) visit(std::array{x, y, z}, x != 1 && y != 1 && z != 1);
+  };
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (!samples[i].changesSign) continue;
+    const auto& [lower, size, child] = octree[cells[i]];
+    forEachPoint([&, lower = lower, half = size / 2](const std::array<int, 3>& at, bool isCorner) {
+      if (!isCorner)
+        points[count++] = octree.position({lower[0] + at[0] * half, lower[1] + at[1] * half, lower[2] + at[2] * half});
+    });
   }
-  surface.values(std::span(points).first(count * kPoints), std::span(values).first(count * kPoints));
-  for (std::size_t n = 0; n < count; ++n) {
+  surface.values(std::span(points).first(count), std::span(values).first(count));
+  count = 0;
+  for (CellSamples& cell : samples) {
+    if (!cell.changesSign) continue;
     Lattice lattice;
-    std::copy_n(&values[n * kPoints], kPoints, lattice.begin());
-    CellSamples& samples = out[sampled[n]] = samplesOf(lattice);
-    if (!samples.changesSign) samples.hides |= ranges[n].min < -thin && ranges[n].max > thin;
+    forEachPoint([&](const std::array<int, 3>& at, bool isCorner) {
+      lattice[latticeIndex(at[0], at[1], at[2])] =
+          isCorner ? cell.corners[at[0] / 2 + at[1] / 2 * 2 + at[2] / 2 * 4] : values[count++];
+    });
+    cell.hides = hidesSheet(lattice);
   }
+}
+
+/// Samples at most kCellsAtOnce cells.
+void sampleChunk(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
+                 double thin, std::span<CellSamples> out) {
+  sampleCorners(surface, octree, cells, out);
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    if (!out[i].changesSign)
+      out[i].hides = surface.mayChangeSign(octree.box(octree[cells[i]]), isInside(out[i].corners[0]), thin);
+  findHiddenSheets(surface, octree, cells, out);
   findMisfits(surface, octree, cells, out);
 }
 

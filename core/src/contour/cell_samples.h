@@ -11,14 +11,14 @@
 
 namespace hpsdf::contouring {
 
-/// The function at a lattice of 3 × 3 × 3 points of a cell, reduced to what contouring needs.
+/// The function at the corners of a cell, and where these have different signs at a lattice of 3 × 3 × 3 points,
+/// reduced to what contouring needs.
 struct CellSamples {
   std::array<double, 8> corners = {};  ///< values at the corners, in the order of children
-  bool mayHoldSurface = false;         ///< the function may be 0 in the cell
   bool changesSign = false;            ///< the corners have different signs
-  /// A sheet of the surface passes through the cell that its corners do not see: somewhere in the lattice, a point lies
-  /// between two points of the other sign. If no corner differs, the function may also become clearly negative and
-  /// clearly positive in the cell.
+  /// A sheet of the surface may pass through the cell that its corners do not see. If the corners have different signs,
+  /// then somewhere in the lattice a point lies between two points of the other sign. If they do not, the function may
+  /// clearly have the other sign in the cell.
   bool hides = false;
   /// The greatest distance between the tangent planes where the surface crosses the cell's edges and the point where
   /// they meet best, about the error of a mesh with a vertex there; 0 if the corners have the same sign.
@@ -27,7 +27,7 @@ struct CellSamples {
 
 inline bool isInside(double value) { return value < 0; }
 
-/// Samples the function in cells. `thin` is a value that does not count as clearly negative or positive.
+/// Samples the function in cells. Values of a magnitude up to `thin` do not count as clearly negative or positive.
 void sampleCells(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
                  double thin, const Progress& progress, std::vector<CellSamples>& samples);
 

@@ -15,12 +15,14 @@
 #include "contour/crossed_edges.h"
 #include "contour/dual_mesh.h"
 #include "contour/implicit_surface.h"
+#include "contour/open_mesh.h"
 #include "contour/sheets.h"
+#include "contour/triangle_errors.h"
 #include "contour/vertex_placement.h"
-#include "hpsdf/detail/crossings.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "mesh/connectivity.h"
+#include "surface/crossings.h"
 #include "util/chunks.h"
 
 namespace hpsdf {
@@ -51,17 +53,15 @@ class Contouring {
     sample(fresh);
     divideUnfit();
     for (;;) {
-      result_.fans = result_.flawed = 0;
-      extract({});
-      wanted_.clear();
+      findEdges();
+      connect();
       wantAtMultipleSheets();
       wantWhereTooFar();
-      wantWhereUneven();
       if (divideAsWanted()) continue;
-      const std::vector<std::uint32_t> wrong = wrongPolygons();
+      const std::vector<std::uint32_t> wrong = wrongPolygons(std::vector<bool>(mesh_.triangles.size(), true));
+      result_.fans = result_.flawed = 0;
       if (wrong.empty()) break;
       mendByFans(wrong);
-      wanted_.clear();
       wantWhereTooFar();
       if (!divideAsWanted()) break;
     }
@@ -139,15 +139,27 @@ class Contouring {
     }
   }
 
-  void extract(const std::vector<bool>& fans) {
-    std::vector<std::int32_t> leaves;
-    for (std::size_t i = 0; i < octree_.cells().size(); ++i)
-      if (octree_.cells()[i].isLeaf() && samples_[i].changesSign) leaves.push_back(static_cast<std::int32_t>(i));
-    edges_ = findCrossedEdges(surface_, octree_, leaves, samples_, kAccuracy * tolerance_, progress_);
+  /// Finds the crossed edges, and divides leaves until none beside them is more than twice as large as another.
+  void findEdges() {
+    do {
+      updateCrossedEdges(surface_, octree_, cellsOfEdges_, samples_, kAccuracy * tolerance_, progress_, edges_);
+      cellsOfEdges_ = octree_.cells().size();
+      wantWhereUneven();
+    } while (divideAsWanted());
+  }
+
+  /// Connects the edges to the mesh's polygons.
+  void connect() {
     sheets_.emplace(octree_, edges_);
-    std::vector<Vector3> vertices =
-        placeVertices(surface_, octree_, edges_, *sheets_, kAccuracy * tolerance_, progress_);
-    for (std::uint32_t sheet = 0; sheet < sheets_->size() && !fans.empty(); ++sheet) {
+    vertices_ = placeVertices(surface_, octree_, edges_, *sheets_, kAccuracy * tolerance_, progress_);
+    mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {});
+  }
+
+  /// Makes the mesh with fans around the marked edges. Where sheets share a leaf, those of fans have their vertices in
+  /// the middle.
+  void makeFans(const std::vector<bool>& fans) {
+    std::vector<Vector3> vertices = vertices_;
+    for (std::uint32_t sheet = 0; sheet < sheets_->size(); ++sheet) {
       const bool alone = (sheet == 0 || sheets_->cellOf(sheet - 1) != sheets_->cellOf(sheet)) &&
                          (sheet + 1 == sheets_->size() || sheets_->cellOf(sheet + 1) != sheets_->cellOf(sheet));
       if (!alone && std::ranges::any_of(sheets_->edgesOf(sheet), [&](std::uint32_t edge) { return fans[edge]; }))
@@ -164,49 +176,27 @@ class Contouring {
     }
   }
 
-  /// Measures the greatest value, and asks that leaves be divided at triangles that are too far from the surface.
+  /// Measures the triangles, and asks that leaves be divided at those that are too far from the surface.
   void wantWhereTooFar() {
-    constexpr std::size_t kAtOnce = 128;
-    std::vector<double> greatest(mesh_.triangles.size());
-    detail::forEachChunk(mesh_.triangles.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
-      progress_.throwIfCancelled();
-      std::array<Vector3, 4 * kAtOnce> points;
-      std::array<double, 4 * kAtOnce> values;
-      for (std::size_t i = 0; i < count; ++i) {
-        const Triangle& t = mesh_.triangles[first + i];
-        const Vector3 &a = mesh_.vertices[t[0]], &b = mesh_.vertices[t[1]], &c = mesh_.vertices[t[2]];
-        points[4 * i] = (a + b + c) / 3;
-        points[4 * i + 1] = (a + b) / 2;
-        points[4 * i + 2] = (b + c) / 2;
-        points[4 * i + 3] = (c + a) / 2;
-      }
-      const auto take = [&](auto isCounted) {
-        for (std::size_t i = 0; i < 4 * count; ++i)
-          if (isCounted(first + i / 4))
-            greatest[first + i / 4] = std::max(greatest[first + i / 4], std::abs(values[i]));
-      };
-      surface_.values(std::span(points).first(4 * count), std::span(values).first(4 * count));
-      take([](std::size_t) { return true; });
-      if (!isOpen_) return;
-      // Where the mesh stays open, its boundary must lie on the surface, too.
-      surface_.valuesWithoutWall(std::span(points).first(4 * count), std::span(values).first(4 * count));
-      take([&](std::size_t triangle) { return !surface_.isAtWall(edges_[mesh_.edgeOfTriangle[triangle]].point); });
-    });
-    result_.greatestValue = 0;
+    const std::vector<double> errors = findTriangleErrors(surface_, mesh_, edges_, isOpen_, progress_);
+    result_.greatestValue = errors.empty() ? 0 : *std::ranges::max_element(errors);
     result_.unresolved = 0;
-    for (std::size_t i = 0; i < greatest.size(); ++i) {
-      result_.greatestValue = std::max(result_.greatestValue, greatest[i]);
-      if (greatest[i] <= tolerance_) continue;
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (errors[i] <= tolerance_) continue;
       ++result_.unresolved;
-      // The error falls by four with each halving of a leaf on a smooth surface.
-      const int halvings = greatest[i] > 4 * tolerance_ ? 2 : 1;
-      const CrossedEdge& edge = edges_[mesh_.edgeOfTriangle[i]];
-      std::int32_t largest = 0;
-      for (const std::int32_t cell : edge.cells) largest = std::max(largest, octree_[cell].size);
-      for (const std::int32_t cell : edge.cells)
-        if (octree_[cell].size == largest) want(cell, largest >> halvings);
+      wantAround(edges_[mesh_.edgeOfTriangle[i]], errors[i]);
     }
-    missedShare_ = double(result_.unresolved) / double(std::max<std::size_t>(greatest.size(), 1));
+    missedShare_ = double(result_.unresolved) / double(std::max<std::size_t>(errors.size(), 1));
+  }
+
+  /// Asks that the largest leaves around an edge be divided, as far as its polygon's error asks for.
+  void wantAround(const CrossedEdge& edge, double error) {
+    // The error falls by four with each halving of a leaf on a smooth surface.
+    const int halvings = error > 4 * tolerance_ ? 2 : 1;
+    std::int32_t largest = 0;
+    for (const std::int32_t cell : edge.cells) largest = std::max(largest, octree_[cell].size);
+    for (const std::int32_t cell : edge.cells)
+      if (octree_[cell].size == largest) want(cell, largest >> halvings);
   }
 
   /// Asks that leaves be divided that are more than twice as large as one beside them at a crossed edge.
@@ -216,8 +206,9 @@ class Contouring {
         if (octree_[cell].size > 2 * edge.size) want(cell, 2 * edge.size);
   }
 
-  /// Returns the crossed edges whose polygons cross others, or share an edge with more than one other.
-  std::vector<std::uint32_t> wrongPolygons() const {
+  /// Returns the crossed edges whose polygons cross others, or share an edge with more than one other. Two triangles
+  /// are tested for crossing if one of them is `chosen`.
+  std::vector<std::uint32_t> wrongPolygons(const std::vector<bool>& chosen) {
     std::vector<std::uint32_t> wrong;
     const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(mesh_.triangles);
     mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> side) {
@@ -225,14 +216,26 @@ class Contouring {
       for (const mesh::DirectedEdge& one : side) wrong.push_back(mesh_.edgeOfTriangle[one.face]);
     });
     if (!mesh_.triangles.empty()) {
-      const Crossings crossings = findCrossings({mesh_.vertices, mesh_.triangles, "contour"}, kMaxCrossings,
-                                                Progress{.cancelled = progress_.cancelled});
+      const Crossings crossings = surface::findCrossingsOf({mesh_.vertices, mesh_.triangles, "contour"}, chosen,
+                                                           kMaxCrossings, Progress{.cancelled = progress_.cancelled});
+      knowsAllCrossings_ = crossings.complete;
       for (const Crossing& crossing : crossings.found)
         for (const std::uint32_t triangle : crossing.triangles) wrong.push_back(mesh_.edgeOfTriangle[triangle]);
     }
     std::ranges::sort(wrong);
     wrong.erase(std::unique(wrong.begin(), wrong.end()), wrong.end());
     return wrong;
+  }
+
+  /// Returns, for each triangle, whether it has a vertex that is not where it was before there were fans. Others do not
+  /// cross each other, as those that did have become fans, unless not all crossings are known.
+  std::vector<bool> changedTriangles() const {
+    std::vector<bool> changed(mesh_.triangles.size());
+    for (std::size_t i = 0; i < changed.size(); ++i)
+      changed[i] = !knowsAllCrossings_ || std::ranges::any_of(mesh_.triangles[i], [&](std::uint32_t vertex) {
+        return vertex >= vertices_.size() || mesh_.vertices[vertex] != vertices_[vertex];
+      });
+    return changed;
   }
 
   /// Turns polygons into fans until none is wrong.
@@ -242,44 +245,11 @@ class Contouring {
       const auto marked = std::ranges::count(fans, true);
       for (const std::uint32_t edge : wrong) fans[edge] = true;
       if (std::ranges::count(fans, true) == marked) break;
-      extract(fans);
-      wrong = wrongPolygons();
+      makeFans(fans);
+      wrong = wrongPolygons(changedTriangles());
     }
     result_.fans = static_cast<std::size_t>(std::ranges::count(fans, true));
     result_.flawed = wrong.size();
-  }
-
-  /// Removes the triangles of the wall, and vertices that no triangle uses. Where the wall held fans of triangles
-  /// together, each gets a vertex of its own.
-  void removeWall() {
-    std::vector<Triangle> kept;
-    for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
-      if (!surface_.isAtWall(edges_[mesh_.edgeOfTriangle[i]].point)) kept.push_back(mesh_.triangles[i]);
-
-    // The corners of triangles, three for each, are united across edges that two triangles share.
-    mesh::DisjointSets corners(3 * kept.size());
-    const auto cornerAt = [&](std::uint32_t triangle, std::uint32_t vertex) {
-      const auto place = std::ranges::find(kept[triangle], vertex) - kept[triangle].begin();
-      return 3 * triangle + static_cast<std::uint32_t>(place);
-    };
-    const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(kept);
-    mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> side) {
-      for (std::size_t i = 1; i < side.size(); ++i)
-        for (const std::uint32_t end : {side[0].low(), side[0].high()})
-          corners.join(cornerAt(side[0].face, end), cornerAt(side[i].face, end));
-    });
-    std::vector<std::uint32_t> number(3 * kept.size());
-    std::vector<Vector3> vertices;
-    for (std::uint32_t corner = 0; corner < number.size(); ++corner) {
-      std::uint32_t& vertex = kept[corner / 3][corner % 3];
-      if (corners.first(corner) == corner) {
-        number[corner] = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back(mesh_.vertices[vertex]);
-      }
-      vertex = number[corners.first(corner)];
-    }
-    mesh_.vertices = std::move(vertices);
-    mesh_.triangles = std::move(kept);
   }
 
   /// Sets the normals of the finished mesh.
@@ -306,6 +276,13 @@ class Contouring {
       if (!(result_.normals[i].squaredNorm() > 0.5)) result_.normals[i] = means[i].stableNormalized();
   }
 
+  void removeWall() {
+    std::vector<bool> isKept(mesh_.triangles.size());
+    for (std::size_t i = 0; i < isKept.size(); ++i)
+      isKept[i] = !surface_.isAtWall(edges_[mesh_.edgeOfTriangle[i]].point);
+    removeTriangles(isKept, mesh_.vertices, mesh_.triangles);
+  }
+
   Contour finish() {
     if (isOpen_) removeWall();
     result_.mesh.vertices = std::move(mesh_.vertices);
@@ -324,8 +301,11 @@ class Contouring {
   double missedShare_ = 1;  ///< share of the triangles that missed the tolerance when they were last measured
   std::vector<std::int32_t> fresh_;
   std::vector<std::pair<std::int32_t, std::int32_t>> wanted_;  ///< leaves to be divided, and into which size
+  std::size_t cellsOfEdges_ = 0;  ///< number of the octree's cells when `edges_` was brought up to date
   std::vector<CrossedEdge> edges_;
   std::optional<Sheets> sheets_;
+  std::vector<Vector3> vertices_;  ///< one for each sheet
+  bool knowsAllCrossings_ = true;  ///< the last search for crossings found all
   DualMesh mesh_;
   Contour result_;
 };

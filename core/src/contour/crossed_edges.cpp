@@ -26,11 +26,10 @@ std::array<std::int32_t, 4> leavesAround(const ContourOctree& octree, const Grid
 }
 
 /// Appends the crossed edges of a leaf of which no shorter part is an edge of a smaller leaf. Of equal leaves around an
-/// edge, only the first one that may hold the surface appends it.
-void appendEdges(const ContourOctree& octree, std::int32_t leaf, const std::vector<CellSamples>& samples,
+/// edge, only the first one appends it. An edge that an older leaf shares is therefore not appended again.
+void appendEdges(const ContourOctree& octree, std::int32_t leaf, const std::array<double, 8>& corners,
                  std::vector<CrossedEdge>& edges) {
   const ContourCell& cell = octree[leaf];
-  const std::array<double, 8>& corners = samples[static_cast<std::size_t>(leaf)].corners;
   for (int axis = 0; axis < 3; ++axis)
     for (int corner = 0; corner < 8; ++corner) {
       if (corner >> axis & 1) continue;
@@ -42,8 +41,7 @@ void appendEdges(const ContourOctree& octree, std::int32_t leaf, const std::vect
       const bool isOurs = std::ranges::all_of(around, [&](std::int32_t other) {
         if (other < 0 || other == leaf) return true;
         const std::int32_t size = octree[other].size;
-        return size > cell.size ||
-               (size == cell.size && (other > leaf || !samples[static_cast<std::size_t>(other)].mayHoldSurface));
+        return size > cell.size || (size == cell.size && other > leaf);
       });
       if (!isOurs) continue;
       edges.push_back({lower,
@@ -125,22 +123,34 @@ void findPoints(const ImplicitSurface& surface, const ContourOctree& octree, std
   }
 }
 
+/// Gives an edge the leaves that are around it now. Returns false if one of them is smaller than the edge is long.
+bool keepsEdge(const ContourOctree& octree, CrossedEdge& edge) {
+  const auto isDivided = [&](std::int32_t cell) { return cell >= 0 && !octree[cell].isLeaf(); };
+  if (!std::ranges::any_of(edge.cells, isDivided)) return true;
+  edge.cells = leavesAround(octree, edge.lower, edge.axis);
+  return std::ranges::all_of(edge.cells, [&](std::int32_t cell) { return cell < 0 || octree[cell].size >= edge.size; });
+}
+
 }  // namespace
 
-std::vector<CrossedEdge> findCrossedEdges(const ImplicitSurface& surface, const ContourOctree& octree,
-                                          std::span<const std::int32_t> leaves, const std::vector<CellSamples>& samples,
-                                          double accuracy, const Progress& progress) {
-  auto edges =
-      detail::listOfChunks<CrossedEdge>(leaves.size(), kLeavesAtOnce, Progress{.cancelled = progress.cancelled}, "",
-                                        [&](std::vector<CrossedEdge>& found, std::size_t first, std::size_t count) {
-                                          for (const std::int32_t leaf : leaves.subspan(first, count))
-                                            appendEdges(octree, leaf, samples, found);
-                                        });
-  detail::forEachChunk(edges.size(), kEdgesAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+void updateCrossedEdges(const ImplicitSurface& surface, const ContourOctree& octree, std::size_t firstNew,
+                        const std::vector<CellSamples>& samples, double accuracy, const Progress& progress,
+                        std::vector<CrossedEdge>& edges) {
+  std::erase_if(edges, [&](CrossedEdge& edge) { return !keepsEdge(octree, edge); });
+  const auto added = detail::listOfChunks<CrossedEdge>(
+      octree.cells().size() - firstNew, kLeavesAtOnce, Progress{.cancelled = progress.cancelled}, "",
+      [&](std::vector<CrossedEdge>& found, std::size_t first, std::size_t count) {
+        for (std::size_t i = firstNew + first; i < firstNew + first + count; ++i)
+          if (octree.cells()[i].isLeaf() && samples[i].changesSign)
+            appendEdges(octree, static_cast<std::int32_t>(i), samples[i].corners, found);
+      });
+  const std::size_t kept = edges.size();
+  edges.insert(edges.end(), added.begin(), added.end());
+  const std::span fresh = std::span(edges).subspan(kept);
+  detail::forEachChunk(fresh.size(), kEdgesAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
     progress.throwIfCancelled();
-    findPoints(surface, octree, std::span(edges).subspan(first, count), accuracy);
+    findPoints(surface, octree, fresh.subspan(first, count), accuracy);
   });
-  return edges;
 }
 
 }  // namespace hpsdf::contouring

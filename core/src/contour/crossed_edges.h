@@ -28,10 +28,12 @@ struct CrossedEdge {
   Vector3 normal;                ///< unit vector along the gradient there
 };
 
-/// Finds all crossed edges of the given leaves, in their order. The points of crossing are within `accuracy` of a
-/// change of sign.
-std::vector<CrossedEdge> findCrossedEdges(const ImplicitSurface& surface, const ContourOctree& octree,
-                                          std::span<const std::int32_t> leaves, const std::vector<CellSamples>& samples,
-                                          double accuracy, const Progress& progress);
+/// Brings a list of all crossed edges up to date after the octree's leaves were divided into cells from number
+/// `firstNew` on. An edge that is still one of the smallest leaves around it stays, with the new leaves around it;
+/// others are removed, and those of the new leaves are appended in the order of their leaves. The points of crossing
+/// are within `accuracy` of a change of sign.
+void updateCrossedEdges(const ImplicitSurface& surface, const ContourOctree& octree, std::size_t firstNew,
+                        const std::vector<CellSamples>& samples, double accuracy, const Progress& progress,
+                        std::vector<CrossedEdge>& edges);
 
 }  // namespace hpsdf::contouring

@@ -61,14 +61,20 @@ bool ImplicitSurface::isAtWall(const Vector3& x) const {
   return wall_ && toWall(*wall_, x).value > field_.value(x) - offset_;
 }
 
-Interval ImplicitSurface::range(const Box& box) const {
-  const Interval value = ranges_.range(box).value;
+bool ImplicitSurface::mayChangeSign(const Box& box, bool isInside, double thin) const {
+  // The margin makes the faces belong to the box, because values there may be those of leaves beside it.
+  const Vector3 margin = 1e-9 * box.sizes();
+  const Box wider(Vector3(box.min() - margin), Vector3(box.max() + margin));
+  constexpr double kEndless = std::numeric_limits<double>::infinity();
+  const Interval harmless = isInside ? Interval{-kEndless, thin} : Interval{-thin, kEndless};
+  const Interval known{harmless.min + offset_, harmless.max + offset_};
+  const Interval value = ranges_.range(wider, known).value;
   Interval range{value.min - offset_, value.max - offset_};
   if (wall_) {
-    const Interval wall = wallRange(*wall_, box);
+    const Interval wall = wallRange(*wall_, wider);
     range = {std::max(range.min, wall.min), std::max(range.max, wall.max)};
   }
-  return range;
+  return range.min < harmless.min || range.max > harmless.max;
 }
 
 }  // namespace hpsdf::contouring

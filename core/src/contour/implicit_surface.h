@@ -28,8 +28,9 @@ class ImplicitSurface {
   /// Returns true if the value at x is that of the wall.
   bool isAtWall(const Vector3& x) const;
 
-  /// Returns an interval that contains all values in the box.
-  Interval range(const Box& box) const;
+  /// Returns false if no value in a box can have another sign than its corners, which are inside or outside, and a
+  /// magnitude above `thin`.
+  bool mayChangeSign(const Box& box, bool isInside, double thin) const;
 
  private:
   const Field& field_;

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "mesh/connectivity.h"
+#include "util/chunks.h"
 
 namespace hpsdf::contouring {
 namespace {
@@ -97,82 +98,81 @@ Box insideOf(const ContourOctree& octree, const ContourCell& cell, const CellFac
   return Box(lower, upper);
 }
 
-/// Finds the links through faces between leaves, and unites the incidences that they connect.
-class Linker {
- public:
-  Linker(const ContourOctree& octree, std::span<const CrossedEdge> edges, const Incidences& incidences)
-      : octree_(octree), edges_(edges), incidences_(incidences), sets_(incidences.size()) {
-    for (std::uint32_t i = 0; i < incidences.size(); ++i) {
-      const std::int32_t leaf = incidences[i].cell;
-      if (i > 0 && incidences[i - 1].cell == leaf) continue;
-      for (int axis = 0; axis < 3; ++axis)
-        for (const bool upper : {false, true}) linkThrough(leaf, {axis, upper});
-    }
+/// Returns the leaf on the other side of a face, on whose boundary the edge lies.
+std::int32_t leafBeyond(const CrossedEdge& edge, std::int32_t leaf, int axisOfFace) {
+  const auto place = static_cast<std::size_t>(std::ranges::find(edge.cells, leaf) - edge.cells.begin());
+  // The leaves lie counter-clockwise around the edge: numbers 0 and 1 differ along the next axis, 0 and 3 along the one
+  // after it.
+  return edge.cells[place ^ (axisOfFace == (edge.axis + 1) % 3 ? 1U : 3U)];
+}
+
+/// Appends the links through a face of a leaf. A face belongs to the smaller of the leaves on both sides, and to the
+/// first of two equal ones. `boundary` is memory for the crossed edges of a face.
+void appendLinks(const ContourOctree& octree, std::span<const CrossedEdge> edges, std::span<const Incidence> ofLeaf,
+                 const CellFace& face, std::vector<OnFace>& boundary, std::vector<Link>& links) {
+  const std::int32_t leaf = ofLeaf.front().cell;
+  const ContourCell& cell = octree[leaf];
+  boundary.clear();
+  for (const Incidence& at : ofLeaf)
+    if (const auto place = placeOnFace(cell, face, edges[at.edge], at.edge)) boundary.push_back(*place);
+  if (boundary.empty()) return;
+  const std::int32_t other = leafBeyond(edges[boundary.front().edge], leaf, face.axis);
+  if (other < 0 || octree[other].size < cell.size || (octree[other].size == cell.size && other < leaf)) return;
+  std::ranges::sort(boundary, {}, &OnFace::along);
+  for (std::size_t i = 0; i < boundary.size(); ++i) {
+    if (!boundary[i].insideAfter) continue;
+    const std::uint32_t one = boundary[i].edge, next = boundary[(i + 1) % boundary.size()].edge;
+    links.push_back({.edges = {std::min(one, next), std::max(one, next)},
+                     .cells = {leaf, other},
+                     .axis = face.axis,
+                     .face = insideOf(octree, cell, face),
+                     .isOnly = boundary.size() == 2});
   }
+}
 
-  std::vector<Link>& links() { return links_; }
-  mesh::DisjointSets& sets() { return sets_; }
-
- private:
-  /// Links the crossed edges of a face. A face belongs to the smaller of the leaves on both sides, and to the first of
-  /// two equal ones.
-  void linkThrough(std::int32_t leaf, const CellFace& face) {
-    const ContourCell& cell = octree_[leaf];
-    GridPoint beyond = cell.lower;
-    beyond[face.axis] += face.upper ? cell.size : -1;
-    const std::int32_t other = octree_.leafAt(beyond);
-    if (other < 0 || octree_[other].size < cell.size || (octree_[other].size == cell.size && other < leaf)) return;
-    boundary_.clear();
-    for (const Incidence& at : incidences_.ofCell(leaf))
-      if (const auto place = placeOnFace(cell, face, edges_[at.edge], at.edge)) boundary_.push_back(*place);
-    std::ranges::sort(boundary_, {}, &OnFace::along);
-    for (std::size_t i = 0; i < boundary_.size(); ++i) {
-      if (!boundary_[i].insideAfter) continue;
-      const std::uint32_t one = boundary_[i].edge, next = boundary_[(i + 1) % boundary_.size()].edge;
-      links_.push_back({.edges = {std::min(one, next), std::max(one, next)},
-                        .cells = {leaf, other},
-                        .axis = face.axis,
-                        .face = insideOf(octree_, cell, face),
-                        .isOnly = boundary_.size() == 2});
-      for (const std::int32_t side : {leaf, other})
-        sets_.join(incidences_.find(side, one), incidences_.find(side, next));
-    }
-  }
-
-  const ContourOctree& octree_;
-  std::span<const CrossedEdge> edges_;
-  const Incidences& incidences_;
-  std::vector<Link> links_;
-  mesh::DisjointSets sets_;
-  std::vector<OnFace> boundary_;
-};
+std::vector<Link> findLinks(const ContourOctree& octree, std::span<const CrossedEdge> edges,
+                            const Incidences& incidences) {
+  constexpr std::size_t kCellsAtOnce = 4096;
+  return detail::listOfChunks<Link>(
+      octree.cells().size(), kCellsAtOnce, {}, "", [&](std::vector<Link>& links, std::size_t first, std::size_t count) {
+        std::vector<OnFace> boundary;
+        for (std::size_t cell = first; cell < first + count; ++cell) {
+          const auto ofLeaf = incidences.ofCell(static_cast<std::int32_t>(cell));
+          for (int face = 0; face < 6 && !ofLeaf.empty(); ++face)
+            appendLinks(octree, edges, ofLeaf, {face / 2, face % 2 == 1}, boundary, links);
+        }
+      });
+}
 
 }  // namespace
 
 Sheets::Sheets(const ContourOctree& octree, std::span<const CrossedEdge> edges) : around_(edges.size()) {
   const Incidences incidences(octree.cells().size(), edges);
-  Linker linker(octree, edges, incidences);
-  links_ = std::move(linker.links());
+  links_ = findLinks(octree, edges, incidences);
+  mesh::DisjointSets sets(incidences.size());
+  for (const Link& link : links_)
+    for (const std::int32_t side : link.cells)
+      sets.join(incidences.find(side, link.edges[0]), incidences.find(side, link.edges[1]));
 
-  constexpr std::uint32_t kUnknown = 0xffffffff;
-  std::vector<std::uint32_t> sheetOf(incidences.size(), kUnknown);  // by the first incidence of a set
-  std::vector<std::vector<std::uint32_t>> edgesOfSheet;
+  // Number the sheets in the order of their first incidences, and count their edges.
+  std::vector<std::uint32_t> sheetOf(incidences.size());
   for (std::uint32_t i = 0; i < incidences.size(); ++i) {
     const auto [cell, edge] = incidences[i];
-    std::uint32_t& sheet = sheetOf[linker.sets().first(i)];
-    if (sheet == kUnknown) {
-      sheet = static_cast<std::uint32_t>(cells_.size());
+    const std::uint32_t lowest = sets.first(i);
+    if (lowest == i) {
+      sheetOf[i] = static_cast<std::uint32_t>(cells_.size());
       cells_.push_back(cell);
-      edgesOfSheet.emplace_back();
+      first_.push_back(0);
     }
-    edgesOfSheet[sheet].push_back(edge);
+    sheetOf[i] = sheetOf[lowest];
+    ++first_[sheetOf[i] + 1];
     for (std::size_t place = 0; place < 4; ++place)
-      if (edges[edge].cells[place] == cell) around_[edge][place] = sheet;
+      if (edges[edge].cells[place] == cell) around_[edge][place] = sheetOf[i];
   }
-  for (const auto& list : edgesOfSheet) {
-    edges_.insert(edges_.end(), list.begin(), list.end());
-    first_.push_back(edges_.size());
-  }
+  for (std::size_t sheet = 0; sheet < cells_.size(); ++sheet) first_[sheet + 1] += first_[sheet];
+  edges_.resize(first_.back());
+  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+  for (std::uint32_t i = 0; i < incidences.size(); ++i) edges_[next[sheetOf[i]]++] = incidences[i].edge;
   listLinks(edges.size());
 }
 

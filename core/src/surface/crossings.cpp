@@ -13,6 +13,7 @@
 #include "bvh/triangle_frame.h"
 #include "hpsdf/detail/crossings.h"
 #include "surface/exact_orientation.h"
+#include "util/morton_order.h"
 
 namespace hpsdf {
 namespace surface {
@@ -130,17 +131,27 @@ double squaredDistance(const Vector3& a, const Vector3& b, const Vector3& c, con
   return least;
 }
 
+/// A triangle with the normal that filters of pairs use.
+struct Facet {
+  explicit Facet(const Corners& t)
+      : corners(t),
+        normal((t[1] - t[0]).cross(t[2] - t[0])),
+        squaredSides((t[1] - t[0]).squaredNorm() * (t[2] - t[0]).squaredNorm()) {}
+
+  Corners corners;
+  Vector3 normal;       ///< not of unit length: twice the area
+  double squaredSides;  ///< product of the squared lengths of the sides at the first corner
+};
+
 /// Returns true only if all points certainly lie on one side of the triangle's plane, farther from it than the margin.
-bool lieFarOnOneSide(const Corners& t, std::span<const Vector3> points, double margin) {
+bool lieFarOnOneSide(const Facet& t, std::span<const Vector3> points, double margin) {
   // A bound of the rounding errors of the heights below, relative to the lengths of two sides, for coordinates of
   // magnitudes of about 1.
   constexpr double kRounding = 2e-14;
-  const Vector3 left = t[1] - t[0], right = t[2] - t[0];
-  const Vector3 normal = left.cross(right);
-  const double least = margin * normal.norm() + kRounding * std::sqrt(left.squaredNorm() * right.squaredNorm());
+  const double least = margin * t.normal.norm() + kRounding * std::sqrt(t.squaredSides);
   int above = 0, below = 0;
   for (const Vector3& point : points) {
-    const double height = normal.dot(point - t[0]);
+    const double height = t.normal.dot(point - t.corners[0]);
     above += height > least;
     below += height < -least;
   }
@@ -150,7 +161,7 @@ bool lieFarOnOneSide(const Corners& t, std::span<const Vector3> points, double m
 /// Returns true if the distance between `corners` and the triangle t is less than `margin`. One corner stands for
 /// a point, two for a segment, three for the boundary of a triangle.
 bool isNear(const Corners& t, std::span<const Vector3> corners, double margin) {
-  if (lieFarOnOneSide(t, corners, margin)) return false;
+  if (lieFarOnOneSide(Facet(t), corners, margin)) return false;
   const bvh::TriangleFrame frame = bvh::makeFrame(t, 0);
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (bvh::squaredDistance(frame, corners[i]) < margin * margin) return true;
@@ -176,13 +187,13 @@ bool areNear(const Corners& one, const Corners& other, int shared, double margin
 /// Returns true only if a line along an edge of the triangle t, in its plane, certainly has all points on its outer
 /// side, farther from t than the margin. Only edges between the first `shared` corners count, or edges at the first
 /// corner if that alone is shared.
-bool lieFarBeyondEdge(const Corners& t, std::span<const Vector3> points, int shared, double margin) {
+bool lieFarBeyondEdge(const Facet& facet, std::span<const Vector3> points, int shared, double margin) {
   // A bound of the rounding errors of the products below, for unit axes and coordinates of magnitudes of about 1. It is
   // so large that it also covers the rounding of an axis that should be perpendicular to an edge at a shared corner.
   constexpr double kRounding = 1e-11;
-  const Vector3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const Corners& t = facet.corners;
   const auto isBeyond = [&](std::size_t k) {
-    const Vector3 outward = (t[(k + 1) % 3] - t[k]).cross(normal);
+    const Vector3 outward = (t[(k + 1) % 3] - t[k]).cross(facet.normal);
     const auto height = [&](const Vector3& x) { return outward.dot(x - t[k]); };
     const double inner = std::max({height(t[0]), height(t[1]), height(t[2])});
     const double least = inner + (margin + kRounding) * outward.norm();
@@ -192,39 +203,49 @@ bool lieFarBeyondEdge(const Corners& t, std::span<const Vector3> points, int sha
 }
 
 /// Returns true if the sine of the angle at the triangle's first corner is below 1/1000.
-bool isThinAtFirstCorner(const Corners& t) {
-  const Vector3 left = t[1] - t[0], right = t[2] - t[0];
-  return !(left.cross(right).squaredNorm() > 1e-6 * left.squaredNorm() * right.squaredNorm());
-}
+bool isThinAtFirstCorner(const Facet& t) { return !(t.normal.squaredNorm() > 1e-6 * t.squaredSides); }
 
 /// Returns true only if two triangles certainly have no points in common but their first `shared` corners, at most two,
 /// and the edge between these, and if either is farther than `margin` from the unshared corners of the other one, and
 /// from the edges between them. Planes along a triangle, or normal to it along an edge, show that for nearly all pairs
 /// of triangles whose boxes overlap. The exact tests take longer, and longest for points in one plane.
 bool areCertainlyApart(const Corners& one, const Corners& other, int shared, double margin) {
-  const auto isApart = [&](const Corners& t, std::span<const Vector3> points) {
+  const auto isApart = [&](const Facet& t, std::span<const Vector3> points) {
     return lieFarOnOneSide(t, points, margin) ||
            ((shared == 0 || !isThinAtFirstCorner(t)) && lieFarBeyondEdge(t, points, shared, margin));
   };
-  if (shared == 0) return isApart(one, other) || isApart(other, one);
-  return isApart(one, unsharedOf(other, shared)) && isApart(other, unsharedOf(one, shared));
+  if (shared == 0) return isApart(Facet(one), other) || isApart(Facet(other), one);
+  return isApart(Facet(one), unsharedOf(other, shared)) && isApart(Facet(other), unsharedOf(one, shared));
+}
+
+/// Triangles in an order in which successive ones are near each other.
+struct OrderedTriangles {
+  std::span<const Vector3> vertices;
+  std::span<const Triangle> triangles;  ///< a position in this list is called a slot
+  std::vector<std::uint32_t> numbers;   ///< by slot: the triangle's index in the mesh
+};
+
+OrderedTriangles inOrderOf(const bvh::Hierarchy& hierarchy) {
+  OrderedTriangles ordered{hierarchy.vertices(), hierarchy.triangles(), {}};
+  for (const bvh::TriangleFrame& frame : hierarchy.frames()) ordered.numbers.push_back(frame.triangle);
+  return ordered;
 }
 
 /// Finds pairs of intersecting triangles by a tree of axis-aligned bounding boxes. Each box contains up to four
-/// boxes of the next lower level; the lowest boxes bound the triangles in the order of the hierarchy.
+/// boxes of the next lower level; the lowest boxes bound the triangles in their order.
 class Finder {
  public:
   /// `margin` is the distance below which triangles count as intersecting, as in `findCrossings`.
-  Finder(const bvh::Hierarchy& hierarchy, double margin)
-      : hierarchy_(hierarchy), margin_(margin), vertices_(hierarchy.vertices().size()) {
-    const double scale = scaleToOne(hierarchy.vertices());
-    for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v] = scale * hierarchy.vertices()[v];
+  Finder(const OrderedTriangles& ordered, double margin)
+      : ordered_(ordered), margin_(margin), vertices_(ordered.vertices.size()) {
+    const double scale = scaleToOne(ordered.vertices);
+    for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v] = scale * ordered.vertices[v];
     unit_ = 1 / scale;
     makeBoxes();
   }
 
-  /// Returns the crossings of the triangles at the positions (slots) [begin, end) of the hierarchy's order with
-  /// triangles at later positions, sorted by the earlier position. Returns std::nullopt if there are `most`
+  /// Returns the crossings of the triangles at the slots [begin, end) with
+  /// triangles at later slots, sorted by the earlier slot. Returns std::nullopt if there are `most`
   /// crossings or more.
   std::optional<std::vector<Crossing>> findFewer(std::uint32_t begin, std::uint32_t end, std::size_t most,
                                                  const Progress& progress) const {
@@ -244,8 +265,7 @@ class Finder {
     return found;
   }
 
-  /// Returns the first `most` crossings of the triangle at the position `slot` of the hierarchy's order with
-  /// triangles at later positions.
+  /// Returns the first `most` crossings of the triangle at a slot with triangles at later slots.
   std::vector<Crossing> findFirst(std::uint32_t slot, std::size_t most) const {
     std::vector<Crossing> found;
     find(slot, slot + 1, [&](std::uint32_t, const Crossing& crossing) {
@@ -259,8 +279,8 @@ class Finder {
   static constexpr std::uint32_t kWidth = 4;   ///< number of boxes that one box of the next higher level contains
   static constexpr std::uint32_t kGroup = 16;  ///< number of triangles that search the tree together
 
-  /// Calls take(slot, crossing) for each crossing of a triangle at a position `slot` in [begin, end) of the hierarchy's
-  /// order with a triangle at a later position, until `take` returns false.
+  /// Calls take(slot, crossing) for each crossing of a triangle at a slot in [begin, end) with a triangle at a later
+  /// slot, until `take` returns false.
   template <typename Take>
   void find(std::uint32_t begin, std::uint32_t end, const Take& take) const {
     Box box;
@@ -277,10 +297,10 @@ class Finder {
   }
 
   Corners cornersOf(const Indices& t) const { return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]}; }
-  Corners corners(std::uint32_t slot) const { return cornersOf(hierarchy_.triangles()[slot]); }
+  Corners corners(std::uint32_t slot) const { return cornersOf(ordered_.triangles[slot]); }
 
   void makeBoxes() {
-    const auto count = static_cast<std::uint32_t>(hierarchy_.triangles().size());
+    const auto count = static_cast<std::uint32_t>(ordered_.triangles.size());
     levels_.emplace_back(count);
     tbb::parallel_for(std::uint32_t{0}, count, [&](std::uint32_t slot) {
       Box& box = levels_[0][slot];
@@ -295,7 +315,7 @@ class Finder {
     }
   }
 
-  /// Appends to `found` the positions after `slot` of the triangles in a box of the tree whose boxes intersect `query`,
+  /// Appends to `found` the slots after `slot` of the triangles in a box of the tree whose boxes intersect `query`,
   /// in ascending order.
   void collect(int level, std::uint32_t box, std::uint32_t slot, const Box& query,
                std::vector<std::uint32_t>& found) const {
@@ -313,7 +333,7 @@ class Finder {
   }
 
   bool isCrossing(std::uint32_t slot, std::uint32_t otherSlot) const {
-    Indices one = hierarchy_.triangles()[slot], other = hierarchy_.triangles()[otherSlot];
+    Indices one = ordered_.triangles[slot], other = ordered_.triangles[otherSlot];
     const int shared = moveSharedToFront(one, other);
     if (shared == 3) return true;
     const Corners first = cornersOf(one), second = cornersOf(other);
@@ -329,13 +349,13 @@ class Finder {
   }
 
   Crossing crossing(std::uint32_t slot, std::uint32_t other) const {
-    const auto [first, second] = std::minmax(hierarchy_.frames()[slot].triangle, hierarchy_.frames()[other].triangle);
+    const auto [first, second] = std::minmax(ordered_.numbers[slot], ordered_.numbers[other]);
     return {{first, second}, unit_ * levels_[0][slot].intersection(levels_[0][other]).center()};
   }
 
-  const bvh::Hierarchy& hierarchy_;
+  const OrderedTriangles& ordered_;
   double margin_;
-  std::vector<Vector3> vertices_;         ///< vertices of the hierarchy, scaled to magnitudes of about 1
+  std::vector<Vector3> vertices_;         ///< the vertices, scaled to magnitudes of about 1
   double unit_;                           ///< factor that converts `vertices_` to mesh units
   std::vector<std::vector<Box>> levels_;  ///< level n holds the boxes of 4^n consecutive triangles each
 };
@@ -376,9 +396,12 @@ double scaleToOne(std::span<const Vector3> vertices) {
   return greatest > 0 ? std::ldexp(1.0, -std::ilogb(greatest)) : 1;
 }
 
-Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress) {
-  const Finder finder(hierarchy, margin);
-  const auto count = static_cast<std::uint32_t>(hierarchy.triangles().size());
+namespace {
+
+/// Finds at most `limit` crossings of the triangles at the first `count` slots with those at later ones.
+Crossings findOrdered(const OrderedTriangles& ordered, std::uint32_t count, std::size_t limit, double margin,
+                      const Progress& progress) {
+  const Finder finder(ordered, margin);
   Crossings crossings;
   const auto add = [&](const std::vector<Crossing>& found) {
     crossings.found.insert(crossings.found.end(), found.begin(), found.end());
@@ -410,12 +433,52 @@ Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, doub
   return crossings;
 }
 
+/// Returns the numbers of triangles in the order of their middles along a Morton curve.
+std::vector<std::uint32_t> inMortonOrder(const TriangleMesh& mesh, std::span<const std::uint32_t> numbers) {
+  std::vector<Vector3> middles;
+  Box box;
+  for (const std::uint32_t number : numbers) {
+    const auto [a, b, c] = hpsdf::cornersOf(mesh, mesh.triangles[number]);
+    middles.push_back(a / 3 + b / 3 + c / 3);
+    box.extend(middles.back());
+  }
+  std::vector<std::uint32_t> ordered;
+  for (const std::uint32_t i : detail::mortonOrder(middles, box)) ordered.push_back(numbers[i]);
+  return ordered;
+}
+
+}  // namespace
+
+Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress) {
+  const OrderedTriangles ordered = inOrderOf(hierarchy);
+  return findOrdered(ordered, static_cast<std::uint32_t>(ordered.triangles.size()), limit, margin, progress);
+}
+
+Crossings findCrossingsOf(const TriangleMesh& mesh, const std::vector<bool>& chosen, std::size_t limit,
+                          const Progress& progress) {
+  bvh::requireSurface(mesh);
+  std::array<std::vector<std::uint32_t>, 2> numbers;  // those chosen, and the others
+  for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) numbers[chosen[n] ? 0 : 1].push_back(n);
+  const auto count = static_cast<std::uint32_t>(numbers[0].size());
+  // Vertices that no triangle uses may be far away and must not decide how coordinates are scaled.
+  std::vector<Vector3> vertices(mesh.vertices.size(), Vector3::Zero());
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t v : triangle) vertices[v] = mesh.vertices[v];
+  OrderedTriangles ordered{vertices, {}, {}};
+  for (const std::vector<std::uint32_t>& part : numbers) {
+    const std::vector<std::uint32_t> inOrder = inMortonOrder(mesh, part);
+    ordered.numbers.insert(ordered.numbers.end(), inOrder.begin(), inOrder.end());
+  }
+  std::vector<Triangle> triangles;
+  for (const std::uint32_t number : ordered.numbers) triangles.push_back(mesh.triangles[number]);
+  ordered.triangles = triangles;
+  return findOrdered(ordered, count, limit, 0, progress);
+}
+
 }  // namespace surface
 
 Crossings findCrossings(const TriangleMesh& mesh, std::size_t limit, const Progress& progress) {
-  bvh::requireSurface(mesh);
-  const bvh::Hierarchy hierarchy(mesh, boundingBox(mesh));
-  return surface::findCrossings(hierarchy, limit, 0, progress);
+  return surface::findCrossingsOf(mesh, std::vector<bool>(mesh.triangles.size(), true), limit, progress);
 }
 
 }  // namespace hpsdf

@@ -3,10 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "bvh/hierarchy.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_report.h"
+#include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::surface {
 
@@ -32,5 +34,10 @@ double scaleToOne(std::span<const Vector3> vertices);
 /// returns them with the triangles' indices in the mesh. If `margin` is above 0, triangles nearer to each other
 /// than `margin` count too, up to rounding. `margin` is in coordinates scaled by `scaleToOne`.
 Crossings findCrossings(const bvh::Hierarchy& hierarchy, std::size_t limit, double margin, const Progress& progress);
+
+/// Finds at most `limit` crossings of the chosen triangles of a mesh with each other and with the others, as
+/// `hpsdf::findCrossings` does. `chosen` has one entry for each triangle.
+Crossings findCrossingsOf(const TriangleMesh& mesh, const std::vector<bool>& chosen, std::size_t limit,
+                          const Progress& progress);
 
 }  // namespace hpsdf::surface

@@ -1,7 +1,6 @@
 #include "hpsdf/detail/exact_samples.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +12,7 @@
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "util/chunks.h"
+#include "util/morton_order.h"
 
 namespace hpsdf {
 namespace {
@@ -22,33 +22,6 @@ constexpr std::size_t kBatch = 512;
 
 /// Drawing random samples fails if an accepted sample takes more candidate points than this on average.
 constexpr std::size_t kMaxCandidates = 1000;
-
-/// Spreads the low 21 bits of a number to every third bit.
-std::uint64_t spreadBits(std::uint64_t x) {
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffff;
-  x = (x | x << 16) & 0x1f0000ff0000ff;
-  x = (x | x << 8) & 0x100f00f00f00f00f;
-  x = (x | x << 4) & 0x10c30c30c30c30c3;
-  x = (x | x << 2) & 0x1249249249249249;
-  return x;
-}
-
-/// Returns the order of points along a Morton curve through the domain. Exact distances are fastest for points in this
-/// order, because consecutive points are close to each other.
-std::vector<std::uint32_t> mortonOrder(std::span<const Vector3> points, const Box& domain) {
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(points.size());
-  const Vector3 scale = domain.sizes().cwiseInverse() * double(1 << 21);
-  tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
-    const Vector3 at = (points[n] - domain.min()).cwiseProduct(scale).cwiseMax(0).cwiseMin((1 << 21) - 1);
-    const auto bits = [&](int axis) { return spreadBits(static_cast<std::uint64_t>(at[axis])) << axis; };
-    keys[n] = {bits(0) | bits(1) | bits(2), static_cast<std::uint32_t>(n)};
-  });
-  tbb::parallel_sort(keys.begin(), keys.end());
-  std::vector<std::uint32_t> order(points.size());
-  std::ranges::transform(keys, order.begin(), &std::pair<std::uint64_t, std::uint32_t>::second);
-  return order;
-}
 
 template <typename T>
 std::vector<T> permuted(const std::vector<T>& items, const std::vector<std::uint32_t>& order) {
@@ -60,7 +33,7 @@ std::vector<T> permuted(const std::vector<T>& items, const std::vector<std::uint
 /// Computes the exact distances of points, which may come in any order. Throws `Error` if a distance is not finite.
 std::vector<double> distancesAt(const DistanceFunction& distance, const std::vector<Vector3>& points, const Box& domain,
                                 const Progress& progress) {
-  const std::vector<std::uint32_t> order = mortonOrder(points, domain);
+  const std::vector<std::uint32_t> order = detail::mortonOrder(points, domain);
   std::vector<double> distances(points.size());
   const auto computeChunk = [&](std::size_t, std::size_t first, std::size_t count) {
     std::array<Vector3, kBatch> at;
@@ -96,7 +69,7 @@ ExactSamples drawSamples(const DistanceFunction& distance, const Box& domain, do
       samples.distances.push_back(distances[n]);
     }
   }
-  const std::vector<std::uint32_t> order = mortonOrder(samples.points, domain);
+  const std::vector<std::uint32_t> order = detail::mortonOrder(samples.points, domain);
   return {permuted(samples.points, order), permuted(samples.distances, order)};
 }
 
@@ -177,7 +150,7 @@ std::vector<Vector3> sampleSurface(const TriangleMesh& surface, const Box& domai
       points[n] = surfacePoints.draw(random);
     });
     std::erase_if(points, [&](const Vector3& x) { return !domain.contains(x); });
-    return permuted(points, mortonOrder(points, domain));
+    return permuted(points, detail::mortonOrder(points, domain));
   });
 }
 

@@ -47,15 +47,16 @@ RangeIndex& RangeIndex::operator=(RangeIndex&&) noexcept = default;
 
 /// The closest points q of the domain to the points x of a box are those of a box again. The field is f(q) + |x − q|
 /// there, and Φ is 1-Lipschitz.
-FieldRange RangeIndex::range(const Box& box) const {
+FieldRange RangeIndex::range(const Box& box, const std::optional<Interval>& known) const {
   requireBox(box);
   const GridFrame& frame = tree_->frame();
   const Box closest(query::closestInDomain(frame, box.min()), query::closestInDomain(frame, box.max()));
-  const range::Extent extent = tree_->range(closest);
+  const Vector3 below = closest.min() - box.min(), above = box.max() - closest.max();
+  const bool isInDomain = below.isZero(0) && above.isZero(0);
+  const range::Extent extent = tree_->range(closest, isInDomain ? known : std::nullopt);
   FieldRange range{.value = extent.value, .distance = {}};
   if (tree_->hasBounds()) range.distance = extent.distance;
-  const Vector3 below = closest.min() - box.min(), above = box.max() - closest.max();
-  if (below.isZero(0) && above.isZero(0)) return range;
+  if (isInDomain) return range;
   const Vector3 farthest = below.cwiseMax(above).cwiseMax(0);
   const Vector3 nearest = (closest.min() - box.max()).cwiseMax(box.min() - closest.max()).cwiseMax(0);
   const double least = query::length(nearest), greatest = query::length(farthest);

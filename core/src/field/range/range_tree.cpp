@@ -190,7 +190,15 @@ class TreeBuilder {
 /// than a small part of the box's range.
 class RangeSearch {
  public:
-  RangeSearch(const RangeTree& tree, const Box& box) : tree_(tree), frame_(tree.frame_) {
+  /// Cells with values in `known` alone do not matter. Without it, values that the field certainly comes close to
+  /// serve instead.
+  RangeSearch(const RangeTree& tree, const Box& box, const std::optional<Interval>& known)
+      : tree_(tree), frame_(tree.frame_) {
+    if (known) {
+      knownMin_ = roundedUpward(known->min);
+      knownMax_ = roundedDown(known->max);
+      isKnown_ = true;
+    }
     // Rounding of local coordinates has errors of some 2^-53 of the root's edge.
     const double slack = 0x1p-46 * tree.root_.half;
     for (int axis = 0; axis < 3; ++axis) {
@@ -274,6 +282,7 @@ class RangeSearch {
         cut &= ~(1U << number);
         continue;
       }
+      if (isKnown_) continue;
       knownMin_ = std::min(knownMin_, std::max(group.upper[number] + low[number], group.min[number]));
       knownMax_ = std::max(knownMax_, std::min(group.lower[number] + high[number], group.max[number]));
     }
@@ -327,7 +336,7 @@ class RangeSearch {
 
   bool sticksOut(float min, float max) const {
     const double least = std::min(min_, double(knownMin_)), greatest = std::max(max_, double(knownMax_));
-    const double slack = kSlack * std::max(greatest - least, 0.0);
+    const double slack = isKnown_ ? 0 : kSlack * std::max(greatest - least, 0.0);
     return min < least - slack || max > greatest + slack;
   }
 
@@ -412,6 +421,7 @@ class RangeSearch {
   /// Values that the field has in the box or comes close to: an upper bound of the minimum, a lower bound of the
   /// maximum. They decide what is divided, but are no part of the result.
   float knownMin_ = kFloatEndless, knownMax_ = -kFloatEndless;
+  bool isKnown_ = false;  ///< the caller gave these values
   std::size_t size_ = 0;
   std::array<Cell, kMostWaiting> stack_;
 };
@@ -423,7 +433,9 @@ RangeTree::RangeTree(const Field& field)
   TreeBuilder(*this).build();
 }
 
-Extent RangeTree::range(const Box& box) const { return RangeSearch(*this, box).run(); }
+Extent RangeTree::range(const Box& box, const std::optional<Interval>& known) const {
+  return RangeSearch(*this, box, known).run();
+}
 
 std::size_t RangeTree::bytes() const {
   const auto sizeOf = [](const auto& values) { return values.capacity() * sizeof(values[0]); };

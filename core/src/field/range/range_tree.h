@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "field/range/enclosure.h"
@@ -55,8 +56,9 @@ class RangeTree {
 
   bool hasBounds() const { return !errors_.empty(); }
 
-  /// Returns the range over a box of the domain.
-  Extent range(const Box& box) const;
+  /// Returns the range over a box of the domain. With `known`, the range is only tight where it reaches beyond these
+  /// values.
+  Extent range(const Box& box, const std::optional<Interval>& known) const;
 
   std::size_t bytes() const;
 
