@@ -68,7 +68,22 @@ TEST_F(Sampling, contoursAreWrittenAsClosedMeshes) {
   EXPECT_THAT(text.out, AllOf(HasSubstr("vertices"), HasSubstr("a tolerance of 0.05"), Not(HasSubstr("blended"))));
   EXPECT_GT(signedVolume(importMesh(at("grown.obj")).mesh), signedVolume(mesh.mesh));
 
+  const Outcome several = run({{"contour", field(), "-o", at("at{offset}.stl"), "--offset", "0", "--offset", "0.1",
+                                "--resolution", "100", "--json"}});
+  EXPECT_EQ(several.status, 0) << several.err;
+  const Json surfaces = Json::parse(several.out).at("surfaces");
+  ASSERT_EQ(surfaces.size(), 2u);
+  EXPECT_EQ(surfaces[1].at("output"), at("at0.1.stl"));
+  EXPECT_EQ(surfaces[1].at("offset"), 0.1);
+  EXPECT_EQ(surfaces[0].at("tolerance"), json.at("tolerance"));
+  EXPECT_TRUE(importMesh(at("at0.stl")).report.closed());
+  EXPECT_GT(signedVolume(importMesh(at("at0.1.stl")).mesh), signedVolume(importMesh(at("at0.stl")).mesh));
+
   const std::set<std::string> before = namesIn(folder_.path());
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--offset", "0", "--offset", "0.1"}}, "{offset}", before);
+  expectRefused({{"contour", field(), "-o", at("x.stl"), "--tolerance", "1e-5"}}, "single-precision", before);
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--tolerance", "1e-2", "--resolution", "100"}}, "excludes",
+                before);
   expectRefused({{"contour", field(), "-o", at("x.stp")}}, "x.stp", before);
   expectRefused({{"contour", field(), "-o", at("x.ply"), "--tolerance", "0"}}, "--tolerance", before);
   expectRefused({{"contour", field(), "-o", at("x.ply"), "--offset", "-9"}}, "there is no surface", before);

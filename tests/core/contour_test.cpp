@@ -203,6 +203,35 @@ TEST(Contour, hasUnitNormalsWhereThereIsNoGradient) {
   for (const Vector3& normal : found.normals) EXPECT_NEAR(normal.norm(), 1, 1e-12);
 }
 
+TEST(Contour, inSinglePrecisionIsAClosedManifoldOfSuchNumbers) {
+  const Field gear = exactField("gear");
+  for (const Field& field : {gear, sphereField()}) {
+    const double least = leastSinglePrecisionTolerance(field);
+    const double longest = field.domain().sizes().maxCoeff();
+    for (const double tolerance : {0.005 * longest, 20 * least}) {
+      const Contour found = contour(field, {.tolerance = tolerance, .singlePrecision = true});
+      EXPECT_EQ(defectsOf(found.mesh), "");
+      for (const Vector3& vertex : found.mesh.vertices) {
+        for (const double coordinate : vertex) EXPECT_EQ(static_cast<float>(coordinate), coordinate);
+        EXPECT_LE(std::abs(field.value(vertex)), 1e-3 * tolerance + 1e-12);
+      }
+    }
+    EXPECT_THROW(contour(field, {.tolerance = least / 2, .singlePrecision = true}), Error);
+  }
+}
+
+/// A plate that is thinner than the smallest cells, between two solids.
+TEST(Contour, countsCellsThatMayMissParts) {
+  const auto withPlate = [](const Vector3& x) {
+    return std::min(x.norm() - 0.3, std::max(std::abs(x.z() - 0.5) - 0.004, x.head<2>().norm() - 0.3));
+  };
+  const Field field = build(withPlate, cubeOf(), {.targetError = 1e-6});
+  const Contour coarse = contour(field, {.tolerance = 0.05});
+  const Contour sphereContour = contour(sphereField(), {.tolerance = 0.05});
+  EXPECT_GT(coarse.mayMissParts, 10u);
+  EXPECT_EQ(sphereContour.mayMissParts, 0u);
+}
+
 TEST(Contour, doesNotDependOnThreads) {
   const Contour one = contour(torusField(), {.tolerance = 0.01, .threads = 1});
   const Contour two = contour(torusField(), {.tolerance = 0.01, .threads = 2});

@@ -1,10 +1,12 @@
 // Tests that defects of meshes are found, and that repair reverses wrongly oriented faces.
 
+#include <assimp/scene.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
+#include <assimp/Importer.hpp>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -327,15 +329,61 @@ TEST(MeshRepair, keepsTheReportOfCleaning) {
 TEST(MeshExport, isReadBackUnchanged) {
   const support::TemporaryDirectory folder;
   const TriangleMesh mesh = moved(boxOfTwo(), {0.125, -3, 1e-3});
-  for (const char* name : {"box.obj", "box.PLY"}) {
+  const std::vector<Vector3> normals(mesh.vertices.size(), Vector3(0.6, 0, -0.8));
+  const std::vector<std::array<std::uint8_t, 3>> colors(mesh.vertices.size(), {255, 0, 128});
+  for (const VertexData& data :
+       {VertexData{}, VertexData{.normals = normals}, VertexData{.colors = colors}, VertexData{normals, colors}})
+    for (const char* name : {"box.obj", "box.PLY", "box.stl", "box.glb"}) {
+      const std::filesystem::path file = folder.path() / name;
+      saveMesh(mesh, file, data);
+      const ImportedMesh again = importMesh(file);
+      EXPECT_EQ(again.report.faces, 12u);
+      EXPECT_TRUE(again.report.closed());
+      EXPECT_EQ(again.report.box.min().y(), -4) << name;
+      EXPECT_NEAR(signedVolume(again.mesh), signedVolume(mesh), isSinglePrecisionMesh(file) ? 1e-6 : 1e-15) << name;
+      if (isSinglePrecisionMesh(file)) continue;
+      EXPECT_EQ(again.mesh.vertices, mesh.vertices) << name;
+      EXPECT_EQ(again.mesh.triangles, mesh.triangles) << name;
+    }
+}
+
+/// Another reader than ours must find the normals and colours.
+TEST(MeshExport, writesNormalsAndColours) {
+  const support::TemporaryDirectory folder;
+  const TriangleMesh mesh = boxOfTwo();
+  std::vector<Vector3> normals;
+  std::vector<std::array<std::uint8_t, 3>> colors;
+  for (const Vector3& x : mesh.vertices) {
+    normals.push_back(x.normalized());
+    colors.push_back({static_cast<std::uint8_t>(x.x() > 0 ? 255 : 0), 51, 102});
+  }
+  for (const char* name : {"box.obj", "box.ply", "box.glb"}) {
     const std::filesystem::path file = folder.path() / name;
-    saveMesh(mesh, file);
-    const ImportedMesh again = importMesh(file);
-    EXPECT_EQ(again.report.faces, 12u);
-    EXPECT_TRUE(again.report.closed());
-    EXPECT_EQ(again.report.box.min().y(), -4) << name;
-    EXPECT_EQ(again.mesh.vertices, mesh.vertices) << name;
-    EXPECT_EQ(again.mesh.triangles, mesh.triangles) << name;
+    saveMesh(mesh, file, {normals, colors});
+    Assimp::Importer importer;
+    const aiScene* const scene = importer.ReadFile(file.string(), 0);
+    ASSERT_NE(scene, nullptr) << name << ": " << importer.GetErrorString();
+    const aiMesh& read = *scene->mMeshes[0];
+    ASSERT_TRUE(read.HasNormals() && read.HasVertexColors(0)) << name;
+    EXPECT_EQ(read.mNumFaces, mesh.triangles.size());
+    for (unsigned i = 0; i < read.mNumVertices; ++i) {
+      const aiVector3D &x = read.mVertices[i], &normal = read.mNormals[i];
+      EXPECT_LT((Vector3(normal.x, normal.y, normal.z) - Vector3(x.x, x.y, x.z).normalized()).norm(), 1e-6) << name;
+      const aiColor4D& color = read.mColors[0][i];
+      EXPECT_NEAR(color.r, x.x > 0 ? 1 : 0, 1e-6) << name;
+      EXPECT_NEAR(color.g, 0.2, 1e-6);
+      EXPECT_NEAR(color.b, 0.4, 1e-6);
+    }
+  }
+}
+
+TEST(MeshExport, refusesVerticesThatSinglePrecisionCannotTellApart) {
+  const support::TemporaryDirectory folder;
+  const TriangleMesh mesh = moved(boxOfTwo(), Vector3::Constant(1e9));
+  saveMesh(mesh, folder.path() / "far.ply");
+  for (const char* name : {"far.stl", "far.glb"}) {
+    EXPECT_THROW(saveMesh(mesh, folder.path() / name), Error);
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / name));
   }
 }
 

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string_view>
 
 #include "commands/commands.h"
 #include "console/failed.h"
@@ -11,6 +13,7 @@
 #include "construction/build_arguments.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/threads.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/output/contour.h"
 #include "session/field_argument.h"
@@ -21,102 +24,162 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr double kDefaultTolerance = 0.001;  ///< of the longest side of the domain
+constexpr std::string_view kOffsetMark = "{offset}";  ///< stands for the offset in the name of a file
 
-void checkContour(const Arguments& arguments) { checkMeshWritable(arguments.text("output")); }
+/// Returns the file for a surface with this offset.
+std::string fileOf(const std::string& output, double offset) {
+  std::string file = output;
+  if (const std::size_t mark = file.find(kOffsetMark); mark != std::string::npos)
+    file.replace(mark, kOffsetMark.size(), fmt::format("{}", offset));
+  return file;
+}
+
+void checkContour(const Arguments& arguments) {
+  if (arguments.given("tolerance") && arguments.given("resolution"))
+    throw Error("resolution excludes tolerance: give one of them");
+  const std::string output = arguments.text("output");
+  const std::vector<double> offsets = arguments.numbers("offset");
+  if (offsets.size() > 1 && output.find(kOffsetMark) == std::string::npos)
+    throw Error(fmt::format("output: {} surfaces need a file each; write {} in the name, such as surface-{}.ply",
+                            offsets.size(), kOffsetMark, kOffsetMark));
+  for (const double offset : offsets) checkMeshWritable(fileOf(output, offset));
+}
 
 double toleranceOf(const Arguments& arguments, const Field& field) {
   const double longest = field.domain().sizes().maxCoeff();
-  if (!arguments.given("tolerance")) return kDefaultTolerance * longest;
-  return arguments.number("tolerance") * (arguments.isShare("tolerance") ? longest : 1);
+  double tolerance = kDefaultContourTolerance * longest;
+  if (arguments.given("resolution")) tolerance = longest / arguments.number("resolution");
+  if (arguments.given("tolerance"))
+    tolerance = arguments.number("tolerance") * (arguments.isShare("tolerance") ? longest : 1);
+  const double least = leastSinglePrecisionTolerance(field);
+  if (isSinglePrecisionMesh(arguments.text("output")) && tolerance < least)
+    throw Error(
+        fmt::format("tolerance: {} is too small for the single-precision numbers of this format; allow at "
+                    "least {}, or write .ply or .obj",
+                    shortNumber(tolerance), shortNumber(least)));
+  return tolerance;
 }
 
-struct MadeContour {
-  Contour contour;
+/// A surface that was written.
+struct WrittenContour {
+  std::string file;
+  double offset;
   double tolerance;
   bool isBlended;  ///< the field was blended for the contour
+  Contour contour;
 };
 
-MadeContour makeContour(const Session& session, const Arguments& arguments) {
-  const Field& field = session.current().field;
-  MadeContour made{.contour = {},
-                   .tolerance = toleranceOf(arguments, field),
-                   .isBlended = field.data().blend == 0 && !arguments.flag("keep-jumps")};
-  const ContourOptions options{
-      .offset = arguments.number("offset"),
-      .tolerance = made.tolerance,
-      .domainCut = arguments.text("cut") == "open" ? DomainCut::open : DomainCut::wall,
-      .threads = arguments.whole("threads"),
-  };
-  made.contour = withProgress(session.console(), [&](const Progress& progress) {
-    return made.isBlended ? contour(blended(field), options, progress) : contour(field, options, progress);
-  });
-  return made;
+Json contourJson(const WrittenContour& written) {
+  const Contour& made = written.contour;
+  return {{"output", written.file},
+          {"file_bytes", std::filesystem::file_size(written.file)},
+          {"offset", written.offset},
+          {"vertices", made.mesh.vertices.size()},
+          {"triangles", made.mesh.triangles.size()},
+          {"area", surfaceArea(made.mesh)},
+          {"volume", signedVolume(made.mesh)},
+          {"tolerance", written.tolerance},
+          {"greatest_value", made.greatestValue},
+          {"blended", written.isBlended},
+          {"missed", made.unresolved},
+          {"cells_that_may_miss_parts", made.mayMissParts},
+          {"cells_with_multiple_sheets", made.multipleSheets},
+          {"divided_polygons", made.fans},
+          {"crossing", made.flawed}};
 }
 
-Json contourJson(const MadeContour& made, const std::string& file) {
-  const TriangleMesh& mesh = made.contour.mesh;
-  return {{"output", file},
-          {"file_bytes", std::filesystem::file_size(file)},
-          {"vertices", mesh.vertices.size()},
-          {"triangles", mesh.triangles.size()},
-          {"area", surfaceArea(mesh)},
-          {"volume", signedVolume(mesh)},
-          {"tolerance", made.tolerance},
-          {"greatest_value", made.contour.greatestValue},
-          {"blended", made.isBlended},
-          {"missed", made.contour.unresolved},
-          {"crossing", made.contour.flawed}};
-}
-
-std::string contourText(const MadeContour& made, const std::string& file) {
-  const TriangleMesh& mesh = made.contour.mesh;
-  std::string text =
-      fmt::format("{}: {} vertices, {} triangles, {}\n", file, grouped(mesh.vertices.size()),
-                  grouped(mesh.triangles.size()), bytesText(static_cast<double>(std::filesystem::file_size(file))));
-  text +=
-      summaryRow("from the surface", fmt::format("the field is {} there at most, for a tolerance of {}",
-                                                 shortNumber(made.contour.greatestValue), shortNumber(made.tolerance)));
-  if (made.isBlended) text += summaryRow("field", "blended first, so that the mesh has no steps between cells");
+std::string contourText(const WrittenContour& written) {
+  const Contour& made = written.contour;
+  std::string text = fmt::format("{}: {} vertices, {} triangles, {}\n", written.file,
+                                 grouped(made.mesh.vertices.size()), grouped(made.mesh.triangles.size()),
+                                 bytesText(static_cast<double>(std::filesystem::file_size(written.file))));
+  text += summaryRow("from the surface", fmt::format("the field is {} there at most, for a tolerance of {}",
+                                                     shortNumber(made.greatestValue), shortNumber(written.tolerance)));
+  if (written.isBlended) text += summaryRow("field", "blended first, so that the mesh has no steps between cells");
+  if (made.mayMissParts > 0)
+    text +=
+        summaryRow("may be lost", fmt::format("parts or gaps thinner than the tolerance, in {} of the smallest cells",
+                                              grouped(made.mayMissParts)));
+  if (made.multipleSheets > 0)
+    text +=
+        summaryRow("kept apart", fmt::format("sheets that come closer than the tolerance, in {} of the smallest cells",
+                                             grouped(made.multipleSheets)));
   return text;
 }
 
 /// Returns what the mesh misses, in one line, or "".
-std::string missedBy(const MadeContour& made) {
-  if (made.contour.flawed > 0)
-    return fmt::format("{} polygons of the mesh cross others: try another tolerance", grouped(made.contour.flawed));
-  if (made.contour.unresolved > 0)
+std::string missedBy(const Contour& made) {
+  if (made.flawed > 0)
+    return fmt::format("{} polygons of the mesh cross others: try another tolerance", grouped(made.flawed));
+  if (made.unresolved > 0)
     return fmt::format(
         "{} triangles are farther from the surface than the tolerance, where it bends within the smallest cells or is "
         "torn: allow a greater tolerance, or build the field more accurately",
-        grouped(made.contour.unresolved));
+        grouped(made.unresolved));
   return "";
 }
 
+VertexData vertexDataOf(const Arguments& arguments, const Contour& made) {
+  return {.normals = arguments.flag("no-normals") ? std::span<const Vector3>{} : std::span(made.normals)};
+}
+
+/// Makes and writes the surface of each offset.
+std::vector<WrittenContour> writeContours(const Session& session, const Arguments& arguments) {
+  const Field& current = session.current().field;
+  const int threads = arguments.whole("threads");
+  const double tolerance = toleranceOf(arguments, current);
+  std::optional<Field> blendedField;
+  if (current.data().blend == 0 && !arguments.flag("keep-jumps"))
+    blendedField = withThreads(threads, [&] { return blended(current); });
+  std::vector<WrittenContour> all;
+  for (const double offset : arguments.numbers("offset")) {
+    const std::string file = fileOf(arguments.text("output"), offset);
+    const ContourOptions options{.offset = offset,
+                                 .tolerance = tolerance,
+                                 .domainCut = arguments.text("cut") == "open" ? DomainCut::open : DomainCut::wall,
+                                 .singlePrecision = isSinglePrecisionMesh(file),
+                                 .threads = threads};
+    Contour made = withProgress(session.console(), [&](const Progress& progress) {
+      return contour(blendedField ? *blendedField : current, options, progress);
+    });
+    if (made.mesh.triangles.empty())
+      throw Error(
+          fmt::format("offset: the field is above {} everywhere in its domain, so that there is no surface", offset));
+    saveMesh(made.mesh, file, vertexDataOf(arguments, made));
+    all.push_back({file, offset, tolerance, blendedField.has_value(), std::move(made)});
+  }
+  return all;
+}
+
 void runContour(Session& session, const Arguments& arguments) {
-  const std::string file = arguments.text("output");
-  const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
+  const InterruptGuard guard;  // on Ctrl-C, a file is written completely or not at all
   useField(session, arguments);
-  const MadeContour made = makeContour(session, arguments);
-  if (made.contour.mesh.triangles.empty())
-    throw Error(fmt::format("offset: the field is above {} everywhere in its domain, so that there is no surface",
-                            arguments.number("offset")));
-  saveMesh(made.contour.mesh, file);
+  const std::vector<WrittenContour> all = writeContours(session, arguments);
   std::ostream& result = session.console().out;
-  if (session.wantsJson(arguments))
-    printJson(result, contourJson(made, file));
-  else
-    result << contourText(made, file);
-  if (const std::string missed = missedBy(made); !missed.empty()) throw Failed(missed);
+  if (session.wantsJson(arguments)) {
+    Json surfaces = Json::array();
+    for (const WrittenContour& written : all) surfaces.push_back(contourJson(written));
+    printJson(result, all.size() == 1 ? surfaces[0] : Json{{"surfaces", surfaces}});
+  } else {
+    for (const WrittenContour& written : all) result << contourText(written);
+  }
+  for (const WrittenContour& written : all)
+    if (const std::string missed = missedBy(written.contour); !missed.empty()) throw Failed(missed);
 }
 
 const std::vector<Parameter> kContourParameters = {
-    {"output", outputFile().as('o').required(), "File of the mesh, *.ply or *.obj."},
-    {"offset", number().byDefault("0").in("field units"),
-     "Value of the field on the surface: above 0 for a surface around the solid, below 0 for one within."},
+    {"output", outputFile().as('o').required(),
+     "File of the mesh: *.stl, *.ply, *.obj or *.glb. STL and GLB hold single-precision numbers."},
+    {"offset", number().repeatable().byDefault("0").in("field units"),
+     "Value of the field on the surface: above 0 for a surface around the solid, below 0 for one within. If it is "
+     "given "
+     "several times, each surface gets a file, and {offset} in the name of the file stands for the value."},
     {"tolerance", number().above(0).orShare().in("field units"),
      "Greatest distance between the mesh and the field's surface, e.g. 0.002 or 0.1%, a percentage of the longest side "
      "of the domain; 0.1% by default. Parts and gaps thinner than twice this may be lost."},
+    {"resolution", wholeNumber("N").atLeast(8),
+     "The tolerance as the N-th part of the longest side of the domain, e.g. 500 instead of 0.2%."},
+    {"no-normals", flag(), "Leave the normals of vertices out of the file. They are the field's gradients."},
     {"cut", choice({"wall", "open"}).byDefault("wall"),
      "What happens where the domain cuts the solid: a wall closes the mesh, or the mesh stays open there."},
     {"keep-jumps", flag(),
@@ -140,7 +203,7 @@ half a tolerance within the domain.
 The mesh is measured in the middle of each triangle and of its edges. The exit status is 1 where the tolerance is missed; the
 mesh is written all the same.)"),
       .examples = {"hpsdf contour bunny.hpsdf -o bunny.ply", "hpsdf contour bunny.hpsdf -o coarse.obj --tolerance 1%",
-                   "hpsdf contour gear.hpsdf -o grown.ply --offset 0.05 --tolerance 0.01"},
+                   "hpsdf contour bunny.hpsdf -o bunny{offset}.stl --offset 0 --offset 0.02"},
       .parameters = joined({{fieldParameter()}, kContourParameters, {threadsParameter("The mesh is")}}),
       .action = runContour,
       .check = checkContour,

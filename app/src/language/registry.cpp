@@ -415,7 +415,11 @@ std::string Arguments::textOr(std::string_view name, std::string fallback) const
 double Arguments::number(std::string_view name) const { return single(name).numbers.at(0); }
 bool Arguments::isShare(std::string_view name) const { return has(name) && single(name).isShare; }
 int Arguments::whole(std::string_view name) const { return static_cast<int>(number(name)); }
-std::vector<double> Arguments::numbers(std::string_view name) const { return single(name).numbers; }
+std::vector<double> Arguments::numbers(std::string_view name) const {
+  std::vector<double> all;
+  for (const Value& value : entry(name).values) all.insert(all.end(), value.numbers.begin(), value.numbers.end());
+  return all;
+}
 bool Arguments::flag(std::string_view name) const { return number(name) != 0; }
 
 std::array<int, 2> Arguments::size(std::string_view name) const {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <span>
@@ -59,13 +61,25 @@ bool isMeshFileName(const std::filesystem::path& file);
 /// with this name (`importMesh`).
 TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress = {});
 
-/// Writes a mesh as OBJ or binary PLY, depending on the file's extension, with coordinates in full double precision.
-/// The file appears whole or not at all. Throws `Error` (of the kind `file`) for another extension, and as `OutputFile`
-/// does.
-void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file);
+/// Data of vertices that is written with a mesh. Each list is empty or has one entry for each vertex.
+struct VertexData {
+  std::span<const Vector3> normals = {};                     ///< unit vectors
+  std::span<const std::array<std::uint8_t, 3>> colors = {};  ///< red, green, blue (sRGB)
+};
+
+/// Writes a mesh as OBJ, binary PLY, binary STL or GLB (binary glTF 2.0), depending on the file's extension. OBJ and
+/// PLY keep coordinates in full double precision; STL and GLB hold single-precision numbers, and STL no data of
+/// vertices. Coordinates keep their axes, also in GLB, where other programs take y for upward.
+///
+/// The file appears whole or not at all. Throws `Error` (of the kind `file`) for another extension, for vertices of
+/// different positions that single precision cannot tell apart, and as `OutputFile` does.
+void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file, const VertexData& data = {});
 
 /// Passes the bytes of a binary PLY file with this mesh to `write`, in pieces. Allocates less than 100 kB.
 void writePly(const TriangleMesh& mesh, const std::function<void(std::span<const std::byte>)>& write);
+
+/// Tells whether a mesh file with this name would hold single-precision numbers: STL and GLB.
+bool isSinglePrecisionMesh(const std::filesystem::path& file);
 
 /// Throws the `Error` that `saveMesh` would throw for this file, as far as it can be foreseen. A caller thus learns
 /// before long work that it could not write the file.

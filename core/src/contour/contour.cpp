@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -31,6 +32,22 @@ namespace {
 
 constexpr double kRootsAlongLongest = 8;  ///< number of root cells along the longest side of the domain, about
 constexpr double kAccuracy = 1e-3;        ///< greatest |f| at vertices, in tolerances
+/// What |f| at vertices may be before these are rounded to single precision, and how much the rounding may add, as
+/// parts of the accuracy. The position changes by √3/2 of the numbers' spacing.
+constexpr double kBeforeRounding = 0.25, kSpacing = 0.75;
+
+/// Returns the single-precision number nearest to x. GCC 12 leaves out conversions to float and back where it handles
+/// two numbers at a time; `volatile` prevents this.
+double inSinglePrecision(double x) {
+  const volatile float single = static_cast<float>(x);
+  return single;
+}
+
+/// Returns the spacing of single-precision numbers at the domain's farthest corner.
+double singleSpacing(const Box& domain) {
+  const double farthest = domain.min().cwiseAbs().cwiseMax(domain.max().cwiseAbs()).maxCoeff();
+  return std::ldexp(1.0, std::ilogb(farthest) - (std::numeric_limits<float>::digits - 1));
+}
 
 /// Makes a contour in rounds: makes the mesh in the octree so far, measures it, and divides the leaves where it is too
 /// far from the surface.
@@ -41,6 +58,8 @@ class Contouring {
         octree_(field.domain(), field.domain().sizes().maxCoeff() / kRootsAlongLongest),
         tolerance_(tolerance),
         isOpen_(options.domainCut == DomainCut::open),
+        isSingle_(options.singlePrecision),
+        accuracy_(kAccuracy * tolerance * (options.singlePrecision ? kBeforeRounding : 1)),
         progress_(progress) {
     // The smallest cells have edges of one to two tolerances.
     const double smallest = std::exp2(std::floor(std::log2(tolerance / octree_.smallestEdge())) + 1);
@@ -142,7 +161,7 @@ class Contouring {
   /// Finds the crossed edges, and divides leaves until none beside them is more than twice as large as another.
   void findEdges() {
     do {
-      updateCrossedEdges(surface_, octree_, cellsOfEdges_, samples_, kAccuracy * tolerance_, progress_, edges_);
+      updateCrossedEdges(surface_, octree_, cellsOfEdges_, samples_, accuracy_, progress_, edges_);
       cellsOfEdges_ = octree_.cells().size();
       wantWhereUneven();
     } while (divideAsWanted());
@@ -151,7 +170,8 @@ class Contouring {
   /// Connects the edges to the mesh's polygons.
   void connect() {
     sheets_.emplace(octree_, edges_);
-    vertices_ = placeVertices(surface_, octree_, edges_, *sheets_, kAccuracy * tolerance_, progress_);
+    vertices_ = placeVertices(surface_, octree_, edges_, *sheets_, accuracy_, progress_);
+    roundIfSingle(vertices_);
     mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {});
   }
 
@@ -166,6 +186,13 @@ class Contouring {
         vertices[sheet] = middleOf(*sheets_, sheet, edges_);
     }
     mesh_ = makeDualMesh(surface_, edges_, *sheets_, std::move(vertices), fans);
+    roundIfSingle(mesh_.vertices);
+  }
+
+  void roundIfSingle(std::vector<Vector3>& vertices) const {
+    if (!isSingle_) return;
+    for (Vector3& vertex : vertices)
+      for (double& coordinate : vertex) coordinate = inSinglePrecision(coordinate);
   }
 
   /// Asks that leaves be divided through which more than one sheet passes.
@@ -283,7 +310,19 @@ class Contouring {
     removeTriangles(isKept, mesh_.vertices, mesh_.triangles);
   }
 
+  /// Counts the smallest cells that hold more than the mesh can show.
+  void countLosses() {
+    for (std::size_t i = 0; i < samples_.size(); ++i)
+      if (octree_.cells()[i].isLeaf() && samples_[i].hides) ++result_.mayMissParts;
+    for (std::uint32_t sheet = 1; sheet < sheets_->size(); ++sheet) {
+      const std::int32_t cell = sheets_->cellOf(sheet);
+      const bool isFirst = sheet == 1 || sheets_->cellOf(sheet - 2) != cell;
+      if (cell == sheets_->cellOf(sheet - 1) && isFirst) ++result_.multipleSheets;
+    }
+  }
+
   Contour finish() {
+    countLosses();
     if (isOpen_) removeWall();
     result_.mesh.vertices = std::move(mesh_.vertices);
     result_.mesh.triangles = std::move(mesh_.triangles);
@@ -295,6 +334,8 @@ class Contouring {
   ContourOctree octree_;
   double tolerance_;
   bool isOpen_;
+  bool isSingle_;
+  double accuracy_;  ///< greatest |f| at vertices before they are rounded
   std::int32_t smallest_;
   const Progress& progress_;
   std::vector<CellSamples> samples_;
@@ -313,15 +354,21 @@ class Contouring {
 }  // namespace
 }  // namespace contouring
 
+double leastSinglePrecisionTolerance(const Field& field) {
+  return contouring::singleSpacing(field.domain()) / (contouring::kSpacing * contouring::kAccuracy);
+}
+
 Contour contour(const Field& field, const ContourOptions& options, const Progress& progress) {
   if (!std::isfinite(options.offset)) throw Error(ErrorKind::option, "offset", "must be a finite number");
   if (!(options.tolerance >= 0) || !std::isfinite(options.tolerance))
     throw Error(ErrorKind::option, "tolerance", "must be a finite number of at least 0");
   const double longest = field.domain().sizes().maxCoeff();
-  const double tolerance = options.tolerance > 0 ? options.tolerance : 1e-3 * longest;
+  const double tolerance = options.tolerance > 0 ? options.tolerance : kDefaultContourTolerance * longest;
   if (tolerance < kLeastContourTolerance * longest)
     throw Error(ErrorKind::option, "tolerance",
                 "must be at least 1/4,000,000 of the longest side of the domain; allow a greater tolerance");
+  if (options.singlePrecision && tolerance < leastSinglePrecisionTolerance(field))
+    throw Error(ErrorKind::option, "tolerance", "is too small for vertices in single precision");
   return withThreads(options.threads,
                      [&] { return contouring::Contouring(field, options, tolerance, progress).make(); });
 }

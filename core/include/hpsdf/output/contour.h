@@ -17,17 +17,20 @@ enum class DomainCut : unsigned char {
   open,  ///< the mesh ends there
 };
 
-/// The least tolerance of a contour, as a share of the longest side of the field's domain.
-constexpr double kLeastContourTolerance = 0x1p-22;
+/// The least and the default tolerance of a contour, as shares of the longest side of the field's domain.
+constexpr double kLeastContourTolerance = 0x1p-22, kDefaultContourTolerance = 1e-3;
 
 struct ContourOptions {
   /// The value of the field on the surface, in the field's units: above 0 for a surface around the solid.
   double offset = 0;
   /// Greatest distance between the mesh and the surface on which the field has this value, in the field's units; 0 for
-  /// a thousandth of the longest side of the field's domain. It must be at least `kLeastContourTolerance` of that side.
+  /// `kDefaultContourTolerance`. It must be at least `kLeastContourTolerance` of the longest side of the domain.
   /// Parts of the solid and gaps that are thinner than twice the tolerance may be lost.
   double tolerance = 0;
   DomainCut domainCut = DomainCut::wall;
+  /// The coordinates of vertices are single-precision numbers, for files that hold only these, such as STL. The
+  /// tolerance must then be at least `leastSinglePrecisionTolerance`.
+  bool singlePrecision = false;
   int threads = 0;  ///< greatest number of threads, 0 for all; the mesh does not depend on it
 };
 
@@ -39,9 +42,17 @@ struct Contour {
   std::vector<Vector3> normals;
   double greatestValue = 0;    ///< greatest |f − offset| found at edges and in triangles: the measured error
   std::size_t unresolved = 0;  ///< triangles that miss the tolerance although their cells are the smallest ones
-  std::size_t fans = 0;        ///< polygons that were divided more finely because they would have crossed others
+  /// Smallest cells in which the field may have a part of the solid, or a gap, that the mesh does not have: it is
+  /// thinner than the cell.
+  std::size_t mayMissParts = 0;
+  std::size_t multipleSheets = 0;  ///< smallest cells through which several sheets of the surface pass
+  std::size_t fans = 0;            ///< polygons that were divided more finely because they would have crossed others
   std::size_t flawed = 0;  ///< polygons that still cross others, or share an edge with more than one: none are known
 };
+
+/// Returns the least tolerance of a contour of this field with vertices in single precision: about 1,000 times the
+/// spacing of these numbers at the domain's farthest corner.
+double leastSinglePrecisionTolerance(const Field& field);
 
 /// Returns the mesh of the surface on which the field has the value `options.offset`, by dual contouring (Ju et al.
 /// 2002) on an octree of its own, whose cells are divided until the mesh is within the tolerance. Each cell has one

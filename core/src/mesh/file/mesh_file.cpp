@@ -1,8 +1,7 @@
 #include "hpsdf/mesh_file.h"
 
+#include <algorithm>
 #include <array>
-#include <bit>
-#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -18,51 +17,53 @@
 #include "mesh/read/ply_reader.h"
 #include "mesh/read/read_mesh.h"
 #include "mesh/scan/input.h"
+#include "mesh/write/mesh_writer.h"
 
 namespace hpsdf {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Returns true for a PLY file and false for an OBJ file; throws `Error` for other extensions.
-bool isPly(const std::filesystem::path& file) {
+/// A format in which meshes are written.
+struct Format {
+  const char* extension;
+  bool isSingle;  ///< coordinates are single-precision numbers
+  void (*write)(const TriangleMesh& mesh, const VertexData& data, const mesh::WriteBytes& write);
+};
+
+constexpr std::array kFormats = {
+    Format{".obj", false, mesh::writeObj},
+    Format{".ply", false, mesh::writePly},
+    Format{".stl", true,
+           [](const TriangleMesh& surface, const VertexData&, const mesh::WriteBytes& write) {
+             mesh::writeStl(surface, write);
+           }},
+    Format{".glb", true, mesh::writeGlb},
+};
+
+const Format& formatOf(const fs::path& file) {
   const std::string extension = lowerExtension(file);
-  if (extension != ".obj" && extension != ".ply")
-    throw Error(ErrorKind::file, file.string(), "meshes are written as .obj or .ply; give a name that ends so");
-  return extension == ".ply";
+  for (const Format& format : kFormats)
+    if (format.extension == extension) return format;
+  throw Error(ErrorKind::file, file.string(),
+              "meshes are written as .obj, .ply, .stl or .glb; give a name that ends so");
 }
 
-static_assert(std::endian::native == std::endian::little, "a PLY file is written as its numbers are in memory");
-
-constexpr std::size_t kPiece = 1 << 16;  ///< bytes written at a time
-
-/// Appends the shortest decimal text from which the same number is read back.
-void append(std::string& text, double number) {
-  std::array<char, 32> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
-  text.append(digits.data(), end);
-}
-
-void writeObj(const TriangleMesh& mesh, OutputFile& out) {
-  std::string text;
-  const auto writeIf = [&](bool full) {
-    if (!full) return;
-    out.write(text);
-    text.clear();
-  };
-  for (const Vector3& v : mesh.vertices) {
-    text += 'v';
-    for (const double x : v) append(text += ' ', x);
-    text += '\n';
-    writeIf(text.size() >= kPiece);
+/// Throws `Error` if two vertices have different positions, but the same in single precision.
+void requireDifferentInSinglePrecision(const TriangleMesh& mesh, const fs::path& file) {
+  using Position = std::array<float, 3>;
+  std::vector<std::pair<Position, std::uint32_t>> sorted(mesh.vertices.size());
+  for (std::uint32_t v = 0; v < sorted.size(); ++v) {
+    const Vector3& x = mesh.vertices[v];
+    sorted[v] = {{static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])}, v};
   }
-  for (const auto& triangle : mesh.triangles) {
-    text += 'f';
-    for (const std::uint32_t v : triangle) text += ' ' + std::to_string(std::uint64_t{v} + 1);
-    text += '\n';
-    writeIf(text.size() >= kPiece);
-  }
-  writeIf(!text.empty());
+  std::ranges::sort(sorted);
+  for (std::size_t i = 1; i < sorted.size(); ++i)
+    if (sorted[i - 1].first == sorted[i].first &&
+        mesh.vertices[sorted[i - 1].second] != mesh.vertices[sorted[i].second])
+      throw Error(ErrorKind::file, file.string(),
+                  "vertices are so close to each other that the single-precision numbers of this format cannot tell "
+                  "them apart; write .ply or .obj");
 }
 
 }  // namespace
@@ -83,15 +84,18 @@ TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress) 
   return importMesh(fileOrShape, progress).mesh;
 }
 
-void checkMeshWritable(const std::filesystem::path& file) {
-  isPly(file);
+void checkMeshWritable(const fs::path& file) {
+  formatOf(file);
   checkWritable(file);
 }
 
-void saveMesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
-  const bool ply = isPly(file);
+bool isSinglePrecisionMesh(const fs::path& file) { return formatOf(file).isSingle; }
+
+void saveMesh(const TriangleMesh& mesh, const fs::path& file, const VertexData& data) {
+  const Format& format = formatOf(file);
+  if (format.isSingle) requireDifferentInSinglePrecision(mesh, file);
   OutputFile out(file);
-  ply ? writePly(mesh, [&](std::span<const std::byte> bytes) { out.write(bytes); }) : writeObj(mesh, out);
+  format.write(mesh, data, [&](std::span<const std::byte> bytes) { out.write(bytes); });
   out.commit();
 }
 
@@ -105,24 +109,7 @@ TriangleMesh readPly(std::string_view bytes, const std::string& name, const Prog
 }
 
 void writePly(const TriangleMesh& mesh, const std::function<void(std::span<const std::byte>)>& write) {
-  static_assert(sizeof(Vector3) == 3 * sizeof(double));
-  const std::string header =
-      "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) +
-      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-      std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\nend_header\n";
-  write(std::as_bytes(std::span(header)));
-  write(std::as_bytes(std::span(mesh.vertices)));
-  std::vector<std::byte> faces;
-  faces.reserve(kPiece);
-  for (const auto& triangle : mesh.triangles) {
-    const auto corners = std::as_bytes(std::span(triangle));
-    faces.push_back(std::byte{3});
-    faces.insert(faces.end(), corners.begin(), corners.end());
-    if (faces.size() + sizeof(triangle) < kPiece) continue;
-    write(faces);
-    faces.clear();
-  }
-  write(faces);
+  mesh::writePly(mesh, {}, write);
 }
 
 }  // namespace hpsdf
