@@ -140,6 +140,7 @@ TEST(Contour, ofPartsWithSharpEdgesIsAClosedManifoldWithinTheTolerance) {
     EXPECT_EQ(defectsOf(found.mesh), "") << tolerance;
     EXPECT_LE(greatestAt(found.mesh, [&](const Vector3& x) { return distance(x); }), 1.01 * tolerance);
     EXPECT_EQ(found.unresolved, 0u);
+    for (const Vector3& vertex : found.mesh.vertices) EXPECT_LE(std::abs(gear.value(vertex)), 1e-3 * tolerance);
   }
 }
 

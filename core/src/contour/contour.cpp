@@ -172,7 +172,7 @@ class Contouring {
     sheets_.emplace(octree_, edges_);
     vertices_ = placeVertices(surface_, octree_, edges_, *sheets_, accuracy_, progress_);
     roundIfSingle(vertices_);
-    mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {});
+    mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {}, accuracy_);
   }
 
   /// Makes the mesh with fans around the marked edges. Where sheets share a leaf, those of fans have their vertices in
@@ -185,7 +185,7 @@ class Contouring {
       if (!alone && std::ranges::any_of(sheets_->edgesOf(sheet), [&](std::uint32_t edge) { return fans[edge]; }))
         vertices[sheet] = middleOf(*sheets_, sheet, edges_);
     }
-    mesh_ = makeDualMesh(surface_, edges_, *sheets_, std::move(vertices), fans);
+    mesh_ = makeDualMesh(surface_, edges_, *sheets_, std::move(vertices), fans, accuracy_);
     roundIfSingle(mesh_.vertices);
   }
 

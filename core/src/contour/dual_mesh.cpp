@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "contour/bisection.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
@@ -15,8 +16,8 @@ constexpr std::uint32_t kNoPoint = 0xffffffff;
 class Polygons {
  public:
   Polygons(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
-           std::vector<Vector3> vertices, const std::vector<bool>& fans)
-      : surface_(surface), edges_(edges), sheets_(sheets), fans_(fans) {
+           std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy)
+      : surface_(surface), edges_(edges), sheets_(sheets), fans_(fans), accuracy_(accuracy) {
     mesh_.vertices = std::move(vertices);
     if (!fans_.empty()) addFacePoints();
   }
@@ -76,7 +77,7 @@ class Polygons {
       Vector3 meeting = point;
       meeting[u] = (right * d - otherRight * b) / determinant;
       meeting[v] = (otherRight * a - right * c) / determinant;
-      if (link.face.contains(meeting)) return meeting;
+      if (link.face.contains(meeting)) return bisected(surface_, link.face, meeting, accuracy_);
     }
     for (int step = 0; step < 4; ++step) {
       ValueAndGradient at;
@@ -86,7 +87,7 @@ class Polygons {
       if (!(squared > 0.01)) break;
       point = (point - at.gradient * (at.value / squared)).cwiseMax(link.face.min()).cwiseMin(link.face.max());
     }
-    return point;
+    return bisected(surface_, link.face, point, accuracy_);
   }
 
   /// Returns the corners of an edge's polygon, counter-clockwise as seen from outside.
@@ -141,6 +142,7 @@ class Polygons {
   std::span<const CrossedEdge> edges_;
   const Sheets& sheets_;
   const std::vector<bool>& fans_;
+  double accuracy_;
   DualMesh mesh_;
   std::vector<std::uint32_t> facePoints_;  ///< by link: a vertex, or kNoPoint
   std::vector<std::uint32_t> ring_;
@@ -150,8 +152,8 @@ class Polygons {
 }  // namespace
 
 DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
-                      std::vector<Vector3> vertices, const std::vector<bool>& fans) {
-  return Polygons(surface, edges, sheets, std::move(vertices), fans).make();
+                      std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy) {
+  return Polygons(surface, edges, sheets, std::move(vertices), fans, accuracy).make();
 }
 
 }  // namespace hpsdf::contouring

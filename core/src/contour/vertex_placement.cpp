@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "contour/bisection.h"
 #include "contour/meeting_point.h"
 #include "util/chunks.h"
 
@@ -29,8 +30,9 @@ void listPlanes(const Sheets& sheets, std::uint32_t sheet, std::span<const Cross
   for (const std::uint32_t e : sheets.edgesOf(sheet)) planes.push_back({edges[e].point, edges[e].normal});
 }
 
-/// Moves points along the gradient towards the zero set, within their rooms.
-void project(const ImplicitSurface& surface, std::span<Vector3> points, std::span<const Box> rooms, double accuracy) {
+/// Moves points along the gradient towards the zero set, within their rooms, and returns the values there.
+std::array<double, kSheetsAtOnce> project(const ImplicitSurface& surface, std::span<Vector3> points,
+                                          std::span<const Box> rooms, double accuracy) {
   constexpr int kMostSteps = 6;
   std::array<Vector3, kSheetsAtOnce> tried, best;
   std::array<double, kSheetsAtOnce> bestValue;
@@ -43,18 +45,19 @@ void project(const ImplicitSurface& surface, std::span<Vector3> points, std::spa
     bool moves = false;
     for (std::size_t i = 0; i < count; ++i) {
       const auto& [value, gradient] = found[i];
-      if (std::abs(value) < bestValue[i]) {
-        bestValue[i] = std::abs(value);
+      if (std::abs(value) < std::abs(bestValue[i])) {
+        bestValue[i] = value;
         best[i] = tried[i];
       }
       const double squared = gradient.squaredNorm();
-      if (bestValue[i] <= accuracy || !(squared > 0.01)) continue;
+      if (std::abs(bestValue[i]) <= accuracy || !(squared > 0.01)) continue;
       moves = true;
       tried[i] = (tried[i] - gradient * (value / squared)).cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
     }
     if (!moves) break;
   }
   std::copy_n(best.begin(), count, points.begin());
+  return bestValue;
 }
 
 }  // namespace
@@ -81,7 +84,10 @@ std::vector<Vector3> placeVertices(const ImplicitSurface& surface, const Contour
       const Vector3 start = rooms[i].contains(meeting) ? meeting : middleOf(planes);
       vertices[sheet] = start.cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
     }
-    project(surface, std::span(vertices).subspan(first, count), std::span(rooms).first(count), accuracy);
+    const std::span placed = std::span(vertices).subspan(first, count);
+    const std::array<double, kSheetsAtOnce> values = project(surface, placed, std::span(rooms).first(count), accuracy);
+    for (std::size_t i = 0; i < count; ++i)
+      if (std::abs(values[i]) > accuracy) placed[i] = bisected(surface, rooms[i], placed[i], accuracy);
   });
   return vertices;
 }

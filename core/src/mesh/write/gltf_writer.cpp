@@ -49,10 +49,8 @@ class Document {
   int addAccessor(int type, const char* shape, std::size_t count, std::size_t bytesOfEach, int target) {
     json_["bufferViews"].push_back(
         {{"buffer", 0}, {"byteOffset", bytes_}, {"byteLength", count * bytesOfEach}, {"target", target}});
-    json_["accessors"].push_back({{"bufferView", json_["bufferViews"].size() - 1},
-                                  {"componentType", type},
-                                  {"count", count},
-                                  {"type", shape}});
+    json_["accessors"].push_back(
+        {{"bufferView", json_["bufferViews"].size() - 1}, {"componentType", type}, {"count", count}, {"type", shape}});
     bytes_ += count * bytesOfEach;
     return static_cast<int>(json_["accessors"].size() - 1);
   }
@@ -79,8 +77,8 @@ void writeGlb(const TriangleMesh& mesh, const VertexData& data, const WriteBytes
   if (size > std::numeric_limits<std::uint32_t>::max())
     throw Error(ErrorKind::limit, "", "a .glb file holds at most 4 GB; write .ply, or allow a greater tolerance");
   ByteStream out(write);
-  for (const std::uint32_t number : {kMagic, kVersion, static_cast<std::uint32_t>(size),
-                                     static_cast<std::uint32_t>(text.size()), kJsonChunk})
+  for (const std::uint32_t number :
+       {kMagic, kVersion, static_cast<std::uint32_t>(size), static_cast<std::uint32_t>(text.size()), kJsonChunk})
     out.addBytesOf(number);
   out.add(text);
   out.addBytesOf(static_cast<std::uint32_t>(document.bytes()));

@@ -45,8 +45,8 @@ class ByteStream {
   std::string bytes_;
 };
 
-// Each of these functions passes the bytes of one file to `write`. STL and glTF hold positions as float; STL has no data
-// of vertices.
+// Each of these functions passes the bytes of one file to `write`. STL and glTF hold positions as float; STL has no
+// data of vertices.
 void writeObj(const TriangleMesh& mesh, const VertexData& data, const WriteBytes& write);
 void writePly(const TriangleMesh& mesh, const VertexData& data, const WriteBytes& write);
 void writeStl(const TriangleMesh& mesh, const WriteBytes& write);
