@@ -224,7 +224,7 @@ TEST(Contour, inSinglePrecisionIsAClosedManifoldOfSuchNumbers) {
 /// A plate that is thinner than the smallest cells, between two solids.
 TEST(Contour, countsCellsThatMayMissParts) {
   const auto withPlate = [](const Vector3& x) {
-    return std::min(x.norm() - 0.3, std::max(std::abs(x.z() - 0.5) - 0.004, x.head<2>().norm() - 0.3));
+    return std::min(x.norm() - 0.3, std::max(std::abs(x.z() - 0.5) - 0.01, x.head<2>().norm() - 0.3));
   };
   const Field field = build(withPlate, cubeOf(), {.targetError = 1e-6});
   const Contour coarse = contour(field, {.tolerance = 0.05});

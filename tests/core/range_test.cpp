@@ -274,6 +274,28 @@ TEST(Range, besideKnownValuesContainsAllOthers) {
   }
 }
 
+/// An index for relevant values must contain all values of boxes too, and must be tight where it matters.
+TEST(Range, ofAnIndexForRelevantValuesContainsAllValues) {
+  const Interval relevant{-0.05, 0.05};
+  const ExactDistance box(shapes::mesh("box"));
+  for (const Field& field : {build(torus, cube(), {.targetError = 1e-6}), blended(randomField(33), 0.1),
+                             build(box, cube(), {.targetError = 1e-5, .strategy = Strategy::hpx})}) {
+    const RangeIndex all(field), index(field, 0, relevant);
+    EXPECT_LE(index.bytes(), all.bytes());
+    EXPECT_EQ(countOutside(
+                  field.domain(), [&](const Box& part) { return index.range(part).value; },
+                  [&](const Vector3& x) { return field.value(x); }),
+              0);
+    RandomBoxes random(19);
+    for (int n = 0; n < 2000; ++n) {
+      const Box part = random.within(field.domain(), 0.1);
+      const Interval tight = all.range(part).value, found = index.range(part).value;
+      if (tight.max < relevant.min || tight.min > relevant.max) continue;
+      EXPECT_LE(std::max(found.min, relevant.min), std::max(tight.min, relevant.min) + 0.1);
+    }
+  }
+}
+
 /// A range made for known values must not reach beyond them where the tight one does not.
 TEST(Range, besideKnownValuesTellsWhetherThereAreOthers) {
   const Field field = build(torus, cube(), {.targetError = 1e-6});

@@ -1,6 +1,7 @@
 #include "contour/cell_samples.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "contour/meeting_point.h"
 #include "util/chunks.h"
@@ -16,8 +17,9 @@ using Lattice = std::array<double, kPoints>;
 
 constexpr int latticeIndex(int x, int y, int z) { return (z * kLattice + y) * kLattice + x; }
 
-/// Returns true if the middle one of three points in a row along an axis differs in sign from both others.
-bool hidesSheet(const Lattice& values) {
+/// Returns true if the middle one of three points in a row along an axis differs in sign from both others, and its
+/// value is above `bulge` in magnitude.
+bool hidesSheet(const Lattice& values, double bulge) {
   constexpr std::array<int, 3> kStride{1, kLattice, kLattice * kLattice};
   for (int axis = 0; axis < 3; ++axis)
     for (int v = 0; v < kLattice; ++v)
@@ -25,7 +27,7 @@ bool hidesSheet(const Lattice& values) {
         const int first = u * kStride[(axis + 1) % 3] + v * kStride[(axis + 2) % 3];
         const bool before = isInside(values[first]), middle = isInside(values[first + kStride[axis]]),
                    after = isInside(values[first + 2 * kStride[axis]]);
-        if (before == after && middle != before) return true;
+        if (before == after && middle != before && std::abs(values[first + kStride[axis]]) > bulge) return true;
       }
   return false;
 }
@@ -85,7 +87,7 @@ void sampleCorners(const ImplicitSurface& surface, const ContourOctree& octree, 
 
 /// Finds out which of the cells whose corners have different signs hide a sheet.
 void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
-                      std::span<CellSamples> samples) {
+                      double bulge, std::span<CellSamples> samples) {
   std::array<Vector3, kCellsAtOnce * kPoints> points;
   std::array<double, kCellsAtOnce * kPoints> values;
   std::size_t count = 0;
@@ -112,30 +114,30 @@ void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octre
       lattice[latticeIndex(at[0], at[1], at[2])] =
           isCorner ? cell.corners[at[0] / 2 + at[1] / 2 * 2 + at[2] / 2 * 4] : values[count++];
     });
-    cell.hides = hidesSheet(lattice);
+    cell.hides = hidesSheet(lattice, bulge);
   }
 }
 
 /// Samples at most kCellsAtOnce cells.
 void sampleChunk(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
-                 double thin, std::span<CellSamples> out) {
+                 double bulge, std::span<CellSamples> out) {
   sampleCorners(surface, octree, cells, out);
   for (std::size_t i = 0; i < cells.size(); ++i)
     if (!out[i].changesSign)
-      out[i].hides = surface.mayChangeSign(octree.box(octree[cells[i]]), isInside(out[i].corners[0]), thin);
-  findHiddenSheets(surface, octree, cells, out);
+      out[i].hides = surface.mayChangeSign(octree.box(octree[cells[i]]), isInside(out[i].corners[0]));
+  findHiddenSheets(surface, octree, cells, bulge, out);
   findMisfits(surface, octree, cells, out);
 }
 
 }  // namespace
 
 void sampleCells(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
-                 double thin, const Progress& progress, std::vector<CellSamples>& samples) {
+                 double bulge, const Progress& progress, std::vector<CellSamples>& samples) {
   samples.resize(octree.cells().size());
   detail::forEachChunk(cells.size(), kCellsAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
     progress.throwIfCancelled();
     std::array<CellSamples, kCellsAtOnce> found;
-    sampleChunk(surface, octree, cells.subspan(first, count), thin, std::span(found).first(count));
+    sampleChunk(surface, octree, cells.subspan(first, count), bulge, std::span(found).first(count));
     for (std::size_t i = 0; i < count; ++i) samples[static_cast<std::size_t>(cells[first + i])] = found[i];
   });
 }

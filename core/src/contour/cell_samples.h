@@ -17,8 +17,8 @@ struct CellSamples {
   std::array<double, 8> corners = {};  ///< values at the corners, in the order of children
   bool changesSign = false;            ///< the corners have different signs
   /// A sheet of the surface may pass through the cell that its corners do not see. If the corners have different signs,
-  /// then somewhere in the lattice a point lies between two points of the other sign. If they do not, the function may
-  /// clearly have the other sign in the cell.
+  /// then somewhere in the lattice a point with a clear value lies between two points of the other sign. If they do
+  /// not, the function may clearly have the other sign in the cell.
   bool hides = false;
   /// The greatest distance between the tangent planes where the surface crosses the cell's edges and the point where
   /// they meet best, about the error of a mesh with a vertex there; 0 if the corners have the same sign.
@@ -27,8 +27,9 @@ struct CellSamples {
 
 inline bool isInside(double value) { return value < 0; }
 
-/// Samples the function in cells. Values of a magnitude up to `thin` do not count as clearly negative or positive.
+/// Samples the function in cells. In cells whose corners have different signs, values of a magnitude up to `bulge` do
+/// not count as clear; in others, those up to the surface's own limit.
 void sampleCells(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
-                 double thin, const Progress& progress, std::vector<CellSamples>& samples);
+                 double bulge, const Progress& progress, std::vector<CellSamples>& samples);
 
 }  // namespace hpsdf::contouring

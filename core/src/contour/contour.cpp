@@ -13,35 +13,25 @@
 
 #include "contour/cell_samples.h"
 #include "contour/contour_octree.h"
-#include "contour/crossed_edges.h"
-#include "contour/dual_mesh.h"
 #include "contour/implicit_surface.h"
 #include "contour/open_mesh.h"
-#include "contour/sheets.h"
-#include "contour/triangle_errors.h"
-#include "contour/vertex_placement.h"
+#include "contour/surface_mesh.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
-#include "mesh/connectivity.h"
-#include "surface/crossings.h"
 #include "util/chunks.h"
 
 namespace hpsdf {
 namespace contouring {
 namespace {
 
-constexpr double kRootsAlongLongest = 8;  ///< number of root cells along the longest side of the domain, about
-constexpr double kAccuracy = 1e-3;        ///< greatest |f| at vertices, in tolerances
+constexpr std::int32_t kSmallestOfAll = 2;  ///< size of cells whose middles still have integer coordinates
+constexpr double kRootsAlongLongest = 8;    ///< number of root cells along the longest side of the domain, about
+constexpr double kAccuracy = 1e-3;          ///< greatest |f| at vertices, in tolerances
+constexpr double kThin = 0.1;               ///< greatest |f| in parts and gaps that need not be found, in tolerances
+constexpr double kBulge = 0.5;              ///< greatest |f| where a surface may bulge across an edge, in tolerances
 /// What |f| at vertices may be before these are rounded to single precision, and how much the rounding may add, as
 /// parts of the accuracy. The position changes by √3/2 of the numbers' spacing.
 constexpr double kBeforeRounding = 0.25, kSpacing = 0.75;
-
-/// Returns the single-precision number nearest to x. GCC 12 leaves out conversions to float and back where it handles
-/// two numbers at a time; `volatile` prevents this.
-double inSinglePrecision(double x) {
-  const volatile float single = static_cast<float>(x);
-  return single;
-}
 
 /// Returns the spacing of single-precision numbers at the domain's farthest corner.
 double singleSpacing(const Box& domain) {
@@ -54,16 +44,21 @@ double singleSpacing(const Box& domain) {
 class Contouring {
  public:
   Contouring(const Field& field, const ContourOptions& options, double tolerance, const Progress& progress)
-      : surface_(field, options.offset, tolerance / 2, options.threads),
+      : surface_(field, options.offset, kThin * tolerance, tolerance / 2, options.threads),
         octree_(field.domain(), field.domain().sizes().maxCoeff() / kRootsAlongLongest),
         tolerance_(tolerance),
         isOpen_(options.domainCut == DomainCut::open),
-        isSingle_(options.singlePrecision),
-        accuracy_(kAccuracy * tolerance * (options.singlePrecision ? kBeforeRounding : 1)),
-        progress_(progress) {
-    // The smallest cells have edges of one to two tolerances.
+        progress_(progress),
+        mesh_(surface_, octree_, samples_,
+              {.accuracy = kAccuracy * tolerance * (options.singlePrecision ? kBeforeRounding : 1),
+               .isOpen = isOpen_,
+               .isSinglePrecision = options.singlePrecision},
+              progress) {
+    // Cells have edges of one to two tolerances at least, and a quarter of this where the mesh misses the tolerance.
     const double smallest = std::exp2(std::floor(std::log2(tolerance / octree_.smallestEdge())) + 1);
-    smallest_ = static_cast<std::int32_t>(std::clamp(smallest, 2.0, std::ldexp(1.0, ContourOctree::kDepth)));
+    smallest_ =
+        static_cast<std::int32_t>(std::clamp(smallest, double(kSmallestOfAll), std::ldexp(1.0, ContourOctree::kDepth)));
+    finest_ = std::max(smallest_ / 4, kSmallestOfAll);
   }
 
   Contour make() {
@@ -73,15 +68,14 @@ class Contouring {
     divideUnfit();
     for (;;) {
       findEdges();
-      connect();
+      mesh_.connect();
       wantAtMultipleSheets();
       wantWhereTooFar();
+      if (wanted_.empty()) wantWhereSurfaceIsMissed();
       if (divideAsWanted()) continue;
-      const std::vector<std::uint32_t> wrong = wrongPolygons(std::vector<bool>(mesh_.triangles.size(), true));
-      result_.fans = result_.flawed = 0;
-      if (wrong.empty()) break;
-      mendByFans(wrong);
+      mesh_.mend();
       wantWhereTooFar();
+      wantWhereWrong();
       if (!divideAsWanted()) break;
     }
     return finish();
@@ -90,16 +84,18 @@ class Contouring {
  private:
   void sample(std::span<const std::int32_t> cells) {
     progress_.update("meshing", 1 - missedShare_);
-    sampleCells(surface_, octree_, cells, 0.1 * tolerance_, progress_, samples_);
+    sampleCells(surface_, octree_, cells, kBulge * tolerance_, progress_, samples_);
   }
 
   const CellSamples& samplesOf(std::int32_t cell) const { return samples_[static_cast<std::size_t>(cell)]; }
 
-  bool canDivide(std::int32_t cell) const { return octree_[cell].isLeaf() && octree_[cell].size > smallest_; }
+  bool canDivide(std::int32_t cell, std::int32_t smallest) const {
+    return octree_[cell].isLeaf() && octree_[cell].size > smallest;
+  }
 
-  /// Asks that a leaf be divided into leaves of this size, or of the smallest one.
-  void want(std::int32_t cell, std::int32_t size) {
-    if (canDivide(cell)) wanted_.push_back({cell, std::max(size, smallest_)});
+  /// Asks that a leaf be divided into leaves of this size, or of the smallest one that is allowed.
+  void want(std::int32_t cell, std::int32_t size, std::int32_t smallest) {
+    if (canDivide(cell, smallest)) wanted_.push_back({cell, std::max(size, smallest)});
   }
 
   /// Divides leaves as wanted, and those of their descendants that hold the surface. Returns false if nothing was
@@ -120,7 +116,7 @@ class Contouring {
       for (std::size_t i = 0; i < cells.size(); ++i)
         for (std::int32_t n = 0; n < 8; ++n) {
           const std::int32_t child = octree_[cells[i]].child + n;
-          if (samplesOf(child).changesSign && octree_[child].size > sizes[i]) want(child, sizes[i]);
+          if (samplesOf(child).changesSign && octree_[child].size > sizes[i]) wanted_.push_back({child, sizes[i]});
         }
     }
     divideUnfit();
@@ -140,7 +136,7 @@ class Contouring {
   /// between triangles.
   void requireMemoryFor(std::size_t cells) const {
     constexpr double kBytesOfEdge = 1500;
-    const double edges = double(edges_.size()) / double(octree_.cells().size());
+    const double edges = double(mesh_.edges().size()) / double(octree_.cells().size());
     const double bytes = double(cells) * (sizeof(ContourCell) + sizeof(CellSamples) + kBytesOfEdge * edges);
     requireMemory("a contour of " + std::to_string(cells) + " cells", bytes, "allow a greater tolerance");
   }
@@ -152,7 +148,8 @@ class Contouring {
       const std::size_t end = octree_.cells().size();
       for (; first < end; ++first) {
         const auto cell = static_cast<std::int32_t>(first);
-        if ((samplesOf(cell).hides || samplesOf(cell).misfit > tolerance_) && canDivide(cell)) unfit.push_back(cell);
+        if ((samplesOf(cell).hides || samplesOf(cell).misfit > tolerance_) && canDivide(cell, smallest_))
+          unfit.push_back(cell);
       }
       if (!unfit.empty()) divide(unfit);
     }
@@ -161,59 +158,51 @@ class Contouring {
   /// Finds the crossed edges, and divides leaves until none beside them is more than twice as large as another.
   void findEdges() {
     do {
-      updateCrossedEdges(surface_, octree_, cellsOfEdges_, samples_, accuracy_, progress_, edges_);
-      cellsOfEdges_ = octree_.cells().size();
+      mesh_.updateEdges();
       wantWhereUneven();
     } while (divideAsWanted());
   }
 
-  /// Connects the edges to the mesh's polygons.
-  void connect() {
-    sheets_.emplace(octree_, edges_);
-    vertices_ = placeVertices(surface_, octree_, edges_, *sheets_, accuracy_, progress_);
-    roundIfSingle(vertices_);
-    mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {}, accuracy_);
-  }
-
-  /// Makes the mesh with fans around the marked edges. Where sheets share a leaf, those of fans have their vertices in
-  /// the middle.
-  void makeFans(const std::vector<bool>& fans) {
-    std::vector<Vector3> vertices = vertices_;
-    for (std::uint32_t sheet = 0; sheet < sheets_->size(); ++sheet) {
-      const bool alone = (sheet == 0 || sheets_->cellOf(sheet - 1) != sheets_->cellOf(sheet)) &&
-                         (sheet + 1 == sheets_->size() || sheets_->cellOf(sheet + 1) != sheets_->cellOf(sheet));
-      if (!alone && std::ranges::any_of(sheets_->edgesOf(sheet), [&](std::uint32_t edge) { return fans[edge]; }))
-        vertices[sheet] = middleOf(*sheets_, sheet, edges_);
+  /// Asks that leaves be divided at polygons that are too far from the surface.
+  void wantWhereTooFar() {
+    result_.greatestValue = 0;
+    missedPolygons_ = 0;
+    for (const CrossedEdge& edge : mesh_.edges()) {
+      result_.greatestValue = std::max(result_.greatestValue, edge.polygon.error);
+      if (edge.polygon.error <= tolerance_) continue;
+      ++missedPolygons_;
+      wantAround(edge, edge.polygon.error);
     }
-    mesh_ = makeDualMesh(surface_, edges_, *sheets_, std::move(vertices), fans, accuracy_);
-    roundIfSingle(mesh_.vertices);
+    missedShare_ = double(missedPolygons_) / double(std::max<std::size_t>(mesh_.edges().size(), 1));
   }
 
-  void roundIfSingle(std::vector<Vector3>& vertices) const {
-    if (!isSingle_) return;
-    for (Vector3& vertex : vertices)
-      for (double& coordinate : vertex) coordinate = inSinglePrecision(coordinate);
+  /// Asks that leaves be divided around polygons that cross others even as fans.
+  void wantWhereWrong() {
+    for (const std::uint32_t edge : mesh_.wrong())
+      for (const std::int32_t cell : mesh_.edges()[edge].cells) want(cell, octree_[cell].size / 2, kSmallestOfAll);
+  }
+
+  /// Asks that leaves be divided that hold points of the surface too far from the mesh.
+  void wantWhereSurfaceIsMissed() {
+    const std::vector<double>& gaps = mesh_.findGaps();
+    result_.greatestGap = 0;
+    missedCells_ = 0;
+    for (std::size_t i = 0; i < gaps.size(); ++i) {
+      if (!octree_.cells()[i].isLeaf()) continue;
+      result_.greatestGap = std::max(result_.greatestGap, gaps[i]);
+      if (gaps[i] <= tolerance_) continue;
+      ++missedCells_;
+      want(static_cast<std::int32_t>(i), octree_.cells()[i].size / 2, finest_);
+    }
   }
 
   /// Asks that leaves be divided through which more than one sheet passes.
   void wantAtMultipleSheets() {
-    for (std::uint32_t sheet = 1; sheet < sheets_->size(); ++sheet) {
-      const std::int32_t cell = sheets_->cellOf(sheet);
-      if (cell == sheets_->cellOf(sheet - 1)) want(cell, octree_[cell].size / 2);
+    const Sheets& sheets = mesh_.sheets();
+    for (std::uint32_t sheet = 1; sheet < sheets.size(); ++sheet) {
+      const std::int32_t cell = sheets.cellOf(sheet);
+      if (cell == sheets.cellOf(sheet - 1)) want(cell, octree_[cell].size / 2, smallest_);
     }
-  }
-
-  /// Measures the triangles, and asks that leaves be divided at those that are too far from the surface.
-  void wantWhereTooFar() {
-    const std::vector<double> errors = findTriangleErrors(surface_, mesh_, edges_, isOpen_, progress_);
-    result_.greatestValue = errors.empty() ? 0 : *std::ranges::max_element(errors);
-    result_.unresolved = 0;
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-      if (errors[i] <= tolerance_) continue;
-      ++result_.unresolved;
-      wantAround(edges_[mesh_.edgeOfTriangle[i]], errors[i]);
-    }
-    missedShare_ = double(result_.unresolved) / double(std::max<std::size_t>(errors.size(), 1));
   }
 
   /// Asks that the largest leaves around an edge be divided, as far as its polygon's error asks for.
@@ -223,60 +212,14 @@ class Contouring {
     std::int32_t largest = 0;
     for (const std::int32_t cell : edge.cells) largest = std::max(largest, octree_[cell].size);
     for (const std::int32_t cell : edge.cells)
-      if (octree_[cell].size == largest) want(cell, largest >> halvings);
+      if (octree_[cell].size == largest) want(cell, largest >> halvings, finest_);
   }
 
   /// Asks that leaves be divided that are more than twice as large as one beside them at a crossed edge.
   void wantWhereUneven() {
-    for (const CrossedEdge& edge : edges_)
+    for (const CrossedEdge& edge : mesh_.edges())
       for (const std::int32_t cell : edge.cells)
-        if (octree_[cell].size > 2 * edge.size) want(cell, 2 * edge.size);
-  }
-
-  /// Returns the crossed edges whose polygons cross others, or share an edge with more than one other. Two triangles
-  /// are tested for crossing if one of them is `chosen`.
-  std::vector<std::uint32_t> wrongPolygons(const std::vector<bool>& chosen) {
-    std::vector<std::uint32_t> wrong;
-    const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(mesh_.triangles);
-    mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> side) {
-      if (side.size() == 2) return;
-      for (const mesh::DirectedEdge& one : side) wrong.push_back(mesh_.edgeOfTriangle[one.face]);
-    });
-    if (!mesh_.triangles.empty()) {
-      const Crossings crossings = surface::findCrossingsOf({mesh_.vertices, mesh_.triangles, "contour"}, chosen,
-                                                           kMaxCrossings, Progress{.cancelled = progress_.cancelled});
-      knowsAllCrossings_ = crossings.complete;
-      for (const Crossing& crossing : crossings.found)
-        for (const std::uint32_t triangle : crossing.triangles) wrong.push_back(mesh_.edgeOfTriangle[triangle]);
-    }
-    std::ranges::sort(wrong);
-    wrong.erase(std::unique(wrong.begin(), wrong.end()), wrong.end());
-    return wrong;
-  }
-
-  /// Returns, for each triangle, whether it has a vertex that is not where it was before there were fans. Others do not
-  /// cross each other, as those that did have become fans, unless not all crossings are known.
-  std::vector<bool> changedTriangles() const {
-    std::vector<bool> changed(mesh_.triangles.size());
-    for (std::size_t i = 0; i < changed.size(); ++i)
-      changed[i] = !knowsAllCrossings_ || std::ranges::any_of(mesh_.triangles[i], [&](std::uint32_t vertex) {
-        return vertex >= vertices_.size() || mesh_.vertices[vertex] != vertices_[vertex];
-      });
-    return changed;
-  }
-
-  /// Turns polygons into fans until none is wrong.
-  void mendByFans(std::vector<std::uint32_t> wrong) {
-    std::vector<bool> fans(edges_.size());
-    while (!wrong.empty()) {
-      const auto marked = std::ranges::count(fans, true);
-      for (const std::uint32_t edge : wrong) fans[edge] = true;
-      if (std::ranges::count(fans, true) == marked) break;
-      makeFans(fans);
-      wrong = wrongPolygons(changedTriangles());
-    }
-    result_.fans = static_cast<std::size_t>(std::ranges::count(fans, true));
-    result_.flawed = wrong.size();
+        if (octree_[cell].size > 2 * edge.size) want(cell, 2 * edge.size, finest_);
   }
 
   /// Sets the normals of the finished mesh.
@@ -303,29 +246,32 @@ class Contouring {
       if (!(result_.normals[i].squaredNorm() > 0.5)) result_.normals[i] = means[i].stableNormalized();
   }
 
-  void removeWall() {
-    std::vector<bool> isKept(mesh_.triangles.size());
-    for (std::size_t i = 0; i < isKept.size(); ++i)
-      isKept[i] = !surface_.isAtWall(edges_[mesh_.edgeOfTriangle[i]].point);
-    removeTriangles(isKept, mesh_.vertices, mesh_.triangles);
-  }
-
   /// Counts the smallest cells that hold more than the mesh can show.
   void countLosses() {
     for (std::size_t i = 0; i < samples_.size(); ++i)
       if (octree_.cells()[i].isLeaf() && samples_[i].hides) ++result_.mayMissParts;
-    for (std::uint32_t sheet = 1; sheet < sheets_->size(); ++sheet) {
-      const std::int32_t cell = sheets_->cellOf(sheet);
-      const bool isFirst = sheet == 1 || sheets_->cellOf(sheet - 2) != cell;
-      if (cell == sheets_->cellOf(sheet - 1) && isFirst) ++result_.multipleSheets;
+    const Sheets& sheets = mesh_.sheets();
+    for (std::uint32_t sheet = 1; sheet < sheets.size(); ++sheet) {
+      const std::int32_t cell = sheets.cellOf(sheet);
+      const bool isFirst = sheet == 1 || sheets.cellOf(sheet - 2) != cell;
+      if (cell == sheets.cellOf(sheet - 1) && isFirst) ++result_.multipleSheets;
     }
   }
 
   Contour finish() {
     countLosses();
-    if (isOpen_) removeWall();
-    result_.mesh.vertices = std::move(mesh_.vertices);
-    result_.mesh.triangles = std::move(mesh_.triangles);
+    result_.unresolved = missedPolygons_ + missedCells_;
+    result_.fans = mesh_.fans();
+    result_.flawed = mesh_.wrong().size();
+    const DualMesh& made = mesh_.mesh();
+    result_.mesh.vertices = made.vertices;
+    result_.mesh.triangles = made.triangles;
+    if (isOpen_) {
+      std::vector<bool> isKept(made.triangles.size());
+      for (std::size_t i = 0; i < isKept.size(); ++i)
+        isKept[i] = !surface_.isAtWall(mesh_.edges()[made.edgeOfTriangle[i]].point);
+      removeTriangles(isKept, result_.mesh.vertices, result_.mesh.triangles);
+    }
     findNormals();
     return std::move(result_);
   }
@@ -334,20 +280,16 @@ class Contouring {
   ContourOctree octree_;
   double tolerance_;
   bool isOpen_;
-  bool isSingle_;
-  double accuracy_;  ///< greatest |f| at vertices before they are rounded
   std::int32_t smallest_;
+  std::int32_t finest_;  ///< size of the smallest cells where the mesh misses the tolerance
   const Progress& progress_;
   std::vector<CellSamples> samples_;
-  double missedShare_ = 1;  ///< share of the triangles that missed the tolerance when they were last measured
+  double missedShare_ = 1;  ///< share of the polygons that missed the tolerance when they were last measured
   std::vector<std::int32_t> fresh_;
   std::vector<std::pair<std::int32_t, std::int32_t>> wanted_;  ///< leaves to be divided, and into which size
-  std::size_t cellsOfEdges_ = 0;  ///< number of the octree's cells when `edges_` was brought up to date
-  std::vector<CrossedEdge> edges_;
-  std::optional<Sheets> sheets_;
-  std::vector<Vector3> vertices_;  ///< one for each sheet
-  bool knowsAllCrossings_ = true;  ///< the last search for crossings found all
-  DualMesh mesh_;
+  SurfaceMesh mesh_;
+  std::size_t missedPolygons_ = 0;  ///< polygons that miss the tolerance
+  std::size_t missedCells_ = 0;     ///< cells with points of the surface that miss it
   Contour result_;
 };
 

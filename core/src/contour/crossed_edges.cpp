@@ -51,7 +51,8 @@ void appendEdges(const ContourOctree& octree, std::int32_t leaf, const std::arra
                        around,
                        {corners[corner], corners[upper]},
                        Vector3::Zero(),
-                       Vector3::Zero()});
+                       Vector3::Zero(),
+                       {}});
     }
 }
 
@@ -128,6 +129,7 @@ bool keepsEdge(const ContourOctree& octree, CrossedEdge& edge) {
   const auto isDivided = [&](std::int32_t cell) { return cell >= 0 && !octree[cell].isLeaf(); };
   if (!std::ranges::any_of(edge.cells, isDivided)) return true;
   edge.cells = leavesAround(octree, edge.lower, edge.axis);
+  edge.polygon.isChanged = true;
   return std::ranges::all_of(edge.cells, [&](std::int32_t cell) { return cell < 0 || octree[cell].size >= edge.size; });
 }
 

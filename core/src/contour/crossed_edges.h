@@ -13,6 +13,14 @@
 
 namespace hpsdf::contouring {
 
+/// What is known about the polygon around a crossed edge from the last time when polygons were made.
+struct PolygonState {
+  bool isChanged = true;           ///< it has to be made and measured again
+  bool isUntested = true;          ///< it was made after crossings were searched for the last time
+  bool hasSecondDiagonal = false;  ///< if it has four corners: it is divided between the second and the fourth
+  double error = 0;                ///< greatest magnitude of the function in it
+};
+
 /// An edge of the octree's smallest leaves around it, which the surface crosses: its ends have different signs.
 struct CrossedEdge {
   GridPoint lower;    ///< the end with the lower coordinate
@@ -26,6 +34,7 @@ struct CrossedEdge {
   std::array<double, 2> values;  ///< the function at the lower and the upper end
   Vector3 point;                 ///< where the surface crosses the edge
   Vector3 normal;                ///< unit vector along the gradient there
+  PolygonState polygon;
 };
 
 /// Brings a list of all crossed edges up to date after the octree's leaves were divided into cells from number

@@ -15,7 +15,7 @@ constexpr std::uint32_t kNoPoint = 0xffffffff;
 /// Makes the polygons of a dual mesh and divides them into triangles.
 class Polygons {
  public:
-  Polygons(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
+  Polygons(const ImplicitSurface& surface, std::span<CrossedEdge> edges, const Sheets& sheets,
            std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy)
       : surface_(surface), edges_(edges), sheets_(sheets), fans_(fans), accuracy_(accuracy) {
     mesh_.vertices = std::move(vertices);
@@ -113,22 +113,12 @@ class Polygons {
 
   /// Divides quadrilaterals along the diagonal whose middle is nearer to the surface.
   void addQuads() {
-    constexpr std::size_t kAtOnce = 256;
-    std::vector<char> second(quads_.size());
-    detail::forEachChunk(quads_.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
-      std::array<Vector3, 2 * kAtOnce> points;
-      std::array<double, 2 * kAtOnce> values;
-      for (std::size_t i = 0; i < count; ++i)
-        for (std::size_t k = 0; k < 2; ++k) {
-          const auto& corners = quads_[first + i].corners;
-          points[2 * i + k] = (mesh_.vertices[corners[k]] + mesh_.vertices[corners[k + 2]]) / 2;
-        }
-      surface_.values(std::span(points).first(2 * count), std::span(values).first(2 * count));
-      for (std::size_t i = 0; i < count; ++i) second[first + i] = std::abs(values[2 * i + 1]) < std::abs(values[2 * i]);
-    });
-    for (std::size_t i = 0; i < quads_.size(); ++i) {
-      const auto& [edge, c] = quads_[i];
-      if (second[i]) {
+    std::vector<std::uint32_t> changed;
+    for (std::uint32_t i = 0; i < quads_.size(); ++i)
+      if (edges_[quads_[i].edge].polygon.isChanged) changed.push_back(i);
+    chooseDiagonals(changed);
+    for (const auto& [edge, c] : quads_) {
+      if (edges_[edge].polygon.hasSecondDiagonal) {
         add(edge, {c[0], c[1], c[3]});
         add(edge, {c[1], c[2], c[3]});
       } else {
@@ -138,8 +128,25 @@ class Polygons {
     }
   }
 
+  void chooseDiagonals(std::span<const std::uint32_t> quads) {
+    constexpr std::size_t kAtOnce = 256;
+    detail::forEachChunk(quads.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      std::array<Vector3, 2 * kAtOnce> points;
+      std::array<double, 2 * kAtOnce> values;
+      for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t k = 0; k < 2; ++k) {
+          const auto& corners = quads_[quads[first + i]].corners;
+          points[2 * i + k] = (mesh_.vertices[corners[k]] + mesh_.vertices[corners[k + 2]]) / 2;
+        }
+      surface_.values(std::span(points).first(2 * count), std::span(values).first(2 * count));
+      for (std::size_t i = 0; i < count; ++i)
+        edges_[quads_[quads[first + i]].edge].polygon.hasSecondDiagonal =
+            std::abs(values[2 * i + 1]) < std::abs(values[2 * i]);
+    });
+  }
+
   const ImplicitSurface& surface_;
-  std::span<const CrossedEdge> edges_;
+  std::span<CrossedEdge> edges_;
   const Sheets& sheets_;
   const std::vector<bool>& fans_;
   double accuracy_;
@@ -151,7 +158,7 @@ class Polygons {
 
 }  // namespace
 
-DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
+DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<CrossedEdge> edges, const Sheets& sheets,
                       std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy) {
   return Polygons(surface, edges, sheets, std::move(vertices), fans, accuracy).make();
 }

@@ -22,9 +22,10 @@ struct DualMesh {
   std::vector<std::uint32_t> edgeOfTriangle;  ///< the crossed edge around which a triangle's polygon lies
 };
 
-/// Makes the mesh. `fans` marks the edges whose polygons become fans; it is empty if there are none. The
-/// function is at most `accuracy` at further corners, unless several sheets run through their face.
-DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<const CrossedEdge> edges, const Sheets& sheets,
+/// Makes the mesh, and chooses the diagonals of the polygons that have changed. `fans` marks the edges whose polygons
+/// become fans; it is empty if there are none. The function is at most `accuracy` at further corners, unless several
+/// sheets run through their face.
+DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<CrossedEdge> edges, const Sheets& sheets,
                       std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy);
 
 }  // namespace hpsdf::contouring

@@ -30,8 +30,9 @@ Interval wallRange(const Box& box, const Box& points) {
 
 }  // namespace
 
-ImplicitSurface::ImplicitSurface(const Field& field, double offset, std::optional<double> wall, int threads)
-    : field_(field), ranges_(field, threads), offset_(offset) {
+ImplicitSurface::ImplicitSurface(const Field& field, double offset, double thin, std::optional<double> wall,
+                                 int threads)
+    : field_(field), ranges_(field, threads, Interval{offset - thin, offset + thin}), offset_(offset), thin_(thin) {
   if (!wall) return;
   const Vector3 inset = Vector3::Constant(*wall).cwiseMin(field.domain().sizes() / 4);
   wall_ = Box(Vector3(field.domain().min() + inset), Vector3(field.domain().max() - inset));
@@ -61,12 +62,12 @@ bool ImplicitSurface::isAtWall(const Vector3& x) const {
   return wall_ && toWall(*wall_, x).value > field_.value(x) - offset_;
 }
 
-bool ImplicitSurface::mayChangeSign(const Box& box, bool isInside, double thin) const {
+bool ImplicitSurface::mayChangeSign(const Box& box, bool isInside) const {
   // The margin makes the faces belong to the box, because values there may be those of leaves beside it.
   const Vector3 margin = 1e-9 * box.sizes();
   const Box wider(Vector3(box.min() - margin), Vector3(box.max() + margin));
   constexpr double kEndless = std::numeric_limits<double>::infinity();
-  const Interval harmless = isInside ? Interval{-kEndless, thin} : Interval{-thin, kEndless};
+  const Interval harmless = isInside ? Interval{-kEndless, thin_} : Interval{-thin_, kEndless};
   const Interval known{harmless.min + offset_, harmless.max + offset_};
   const Interval value = ranges_.range(wider, known).value;
   Interval range{value.min - offset_, value.max - offset_};

@@ -13,8 +13,9 @@ namespace hpsdf::contouring {
 /// and the distance to a box. It is negative inside.
 class ImplicitSurface {
  public:
-  /// With `wall`, the solid ends at this distance within the field's domain.
-  ImplicitSurface(const Field& field, double offset, std::optional<double> wall, int threads);
+  /// Values of a magnitude up to `thin` do not count as a change of sign. With `wall`, the solid ends at this distance
+  /// within the field's domain.
+  ImplicitSurface(const Field& field, double offset, double thin, std::optional<double> wall, int threads);
 
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
@@ -29,13 +30,14 @@ class ImplicitSurface {
   bool isAtWall(const Vector3& x) const;
 
   /// Returns false if no value in a box can have another sign than its corners, which are inside or outside, and a
-  /// magnitude above `thin`.
-  bool mayChangeSign(const Box& box, bool isInside, double thin) const;
+  /// magnitude above that of thin parts.
+  bool mayChangeSign(const Box& box, bool isInside) const;
 
  private:
   const Field& field_;
   RangeIndex ranges_;
   double offset_;
+  double thin_;
   std::optional<Box> wall_;
 };
 

@@ -68,28 +68,28 @@ Vector3 middleOf(const Sheets& sheets, std::uint32_t sheet, std::span<const Cros
   return middleOf(planes);
 }
 
-std::vector<Vector3> placeVertices(const ImplicitSurface& surface, const ContourOctree& octree,
-                                   std::span<const CrossedEdge> edges, const Sheets& sheets, double accuracy,
-                                   const Progress& progress) {
-  std::vector<Vector3> vertices(sheets.size());
-  detail::forEachChunk(sheets.size(), kSheetsAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+void placeVertices(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const CrossedEdge> edges,
+                   const Sheets& sheets, std::span<const std::uint32_t> chosen, double accuracy,
+                   const Progress& progress, std::vector<Vector3>& vertices) {
+  detail::forEachChunk(chosen.size(), kSheetsAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
     progress.throwIfCancelled();
     std::array<Box, kSheetsAtOnce> rooms;
+    std::array<Vector3, kSheetsAtOnce> memory;
+    const std::span placed = std::span(memory).first(count);
     std::vector<TangentPlane> planes;
     for (std::size_t i = 0; i < count; ++i) {
-      const auto sheet = static_cast<std::uint32_t>(first + i);
+      const std::uint32_t sheet = chosen[first + i];
       rooms[i] = roomOf(octree, sheets.cellOf(sheet), accuracy);
       listPlanes(sheets, sheet, edges, planes);
       const Vector3 meeting = meetingPointOf(planes);
       const Vector3 start = rooms[i].contains(meeting) ? meeting : middleOf(planes);
-      vertices[sheet] = start.cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
+      placed[i] = start.cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
     }
-    const std::span placed = std::span(vertices).subspan(first, count);
     const std::array<double, kSheetsAtOnce> values = project(surface, placed, std::span(rooms).first(count), accuracy);
     for (std::size_t i = 0; i < count; ++i)
-      if (std::abs(values[i]) > accuracy) placed[i] = bisected(surface, rooms[i], placed[i], accuracy);
+      vertices[chosen[first + i]] =
+          std::abs(values[i]) > accuracy ? bisected(surface, rooms[i], placed[i], accuracy) : placed[i];
   });
-  return vertices;
 }
 
 }  // namespace hpsdf::contouring

@@ -40,8 +40,10 @@ struct Contour {
   /// A unit vector for each vertex: along the field's gradient, normal to the wall at the wall, and the mean of the
   /// triangles' normals where there is no gradient.
   std::vector<Vector3> normals;
-  double greatestValue = 0;    ///< greatest |f − offset| found at edges and in triangles: the measured error
-  std::size_t unresolved = 0;  ///< triangles that miss the tolerance although their cells are the smallest ones
+  double greatestValue = 0;  ///< greatest |f − offset| found at edges and in triangles: the distance from the surface
+  double greatestGap = 0;    ///< greatest distance of points of the surface, some in each cell, from the mesh
+  /// Triangles, and cells with points of the surface, that miss the tolerance although the cells are the smallest ones.
+  std::size_t unresolved = 0;
   /// Smallest cells in which the field may have a part of the solid, or a gap, that the mesh does not have: it is
   /// thinner than the cell.
   std::size_t mayMissParts = 0;

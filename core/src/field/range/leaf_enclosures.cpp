@@ -82,9 +82,10 @@ void setAround(Enclosure& enclosure, const KnownDistance& known, double radius) 
   }
 }
 
-LeafEnclosures::LeafEnclosures(const FieldData& field, const GridFrame& frame)
+LeafEnclosures::LeafEnclosures(const FieldData& field, const GridFrame& frame, const std::optional<Interval>& relevant)
     : field_(field),
       frame_(frame),
+      relevant_(relevant),
       reach_(reachOf(field)),
       below_(detail::legendreOfPart(-0.5, 0.5, kMaxDegree)),
       above_(detail::legendreOfPart(0.5, 0.5, kMaxDegree)) {
@@ -106,26 +107,51 @@ LeafEnclosure LeafEnclosures::operator()(const query::OctreeNode& leaf) const {
   return found;
 }
 
-/// The recurrences of the Legendre polynomials up to degree p have errors of about p² times the machine epsilon.
-double LeafEnclosures::noiseOfPolynomial(const double* coefficients, int degree) const {
+namespace {
+
+/// The range of a polynomial by the magnitudes of its terms.
+struct TermRange {
+  double middle;  ///< the constant term
+  double spread;  ///< sum of the greatest magnitudes of all other terms
+  double noise;   ///< greatest rounding error of a value
+};
+
+/// Returns the range over [−reach, reach]³. The recurrences of the Legendre polynomials up to degree p have errors of
+/// about p² times the machine epsilon.
+TermRange termRange(const double* coefficients, int degree, double reach) {
   std::array<double, kMaxDegree + 1> greatest;
-  basis::legendreValues(reach_, degree, greatest.data());
+  basis::legendreValues(reach, degree, greatest.data());
   double magnitude = 0;
   basis::forEachCoefficient(degree, [&](int i, int j, int k, int index) {
     magnitude += std::abs(coefficients[index]) * greatest[i] * greatest[j] * greatest[k];
   });
-  return 256 * kEpsilon * (degree + 1) * (degree + 1) * magnitude;
+  const double middle = coefficients[0] * greatest[0] * greatest[0] * greatest[0];
+  return {middle, magnitude - std::abs(middle), 256 * kEpsilon * (degree + 1) * (degree + 1) * magnitude};
 }
+
+/// Returns an enclosure by the terms' magnitudes alone, which says nothing of how the polynomial bends.
+Enclosure wideEnclosure(const TermRange& range) {
+  Enclosure wide;
+  wide.min = wide.lower = range.middle - range.spread;
+  wide.max = wide.upper = range.middle + range.spread;
+  wide.bend = std::numeric_limits<double>::infinity();
+  wide.noise = range.noise;
+  return wide;
+}
+
+}  // namespace
 
 LeafEnclosure LeafEnclosures::ofPolynomial(const query::OctreeNode& leaf) const {
   const std::uint64_t bits = field_.nodes[leaf.node];
   const int degree = node::degree(bits);
-  double noise = 0;
-  std::vector<double> cube = withCoefficients(field_, bits, [&](const auto* c) {
-    const std::vector<double> coefficients(c, c + coefficientCount(degree));
-    noise = noiseOfPolynomial(coefficients.data(), degree);
-    return basis::cubeFrom(c, degree, degree);
-  });
+  std::array<double, coefficientCount(kMaxDegree)> coefficients;
+  withCoefficients(field_, bits,
+                   [&](const auto* c) { std::copy_n(c, coefficientCount(degree), coefficients.begin()); });
+  const TermRange terms = termRange(coefficients.data(), degree, reach_);
+  const double noise = terms.noise;
+  const double farthest = terms.spread + noise;
+  if (!isRelevant(terms.middle - farthest, terms.middle + farthest)) return {wideEnclosure(terms), {}};
+  std::vector<double> cube = basis::cubeFrom(coefficients.data(), degree, degree);
   if (reach_ > 1) {
     const detail::LegendreRows rows = detail::legendreOfPart(0, reach_, degree);
     cube = basis::partCoefficients(std::move(cube), degree, {&rows, &rows, &rows});
@@ -147,7 +173,8 @@ Enclosure LeafEnclosures::ofPart(const std::vector<double>& cube, int degree, in
                                  LeafEnclosure& found) const {
   Enclosure whole = enclosureOf(cube, degree);
   const double flat = share > kLargePart ? kLargeFlat : kFlat;
-  if (levels == 0 || whole.upper - whole.lower <= flat * (whole.max - whole.min)) return whole;
+  if (levels == 0 || !isRelevant(whole.min, whole.max) || whole.upper - whole.lower <= flat * (whole.max - whole.min))
+    return whole;
   const std::size_t index = found.groups.size();
   found.groups.emplace_back();
   for (int number = 0; number < 8; ++number) {

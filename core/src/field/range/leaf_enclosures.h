@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "field/query/leaves.h"
@@ -43,8 +44,8 @@ void setAround(Enclosure& enclosure, const KnownDistance& known, double radius);
 /// Finds enclosures of leaves wherever the leaves have a weight. Thread-safe.
 class LeafEnclosures {
  public:
-  /// Keeps references to both arguments.
-  LeafEnclosures(const FieldData& field, const GridFrame& frame);
+  /// Keeps references to the field and the frame. Leaves without values in `relevant` get wide enclosures at less cost.
+  LeafEnclosures(const FieldData& field, const GridFrame& frame, const std::optional<Interval>& relevant);
 
   LeafEnclosure operator()(const query::OctreeNode& leaf) const;
 
@@ -58,12 +59,15 @@ class LeafEnclosures {
                           LeafEnclosure& found) const;
   Enclosure ofExactPart(const ExactLeaf& leaf, const Vector3& centre, double half, int levels,
                         LeafEnclosure& found) const;
-  double noiseOfPolynomial(const double* coefficients, int degree) const;
+  bool isRelevant(double min, double max) const {
+    return !relevant_ || (max >= relevant_->min && min <= relevant_->max);
+  }
   double share(const query::OctreeNode& leaf) const;
   int levelsOfExact(const query::OctreeNode& leaf) const;
 
   const FieldData& field_;
   const GridFrame& frame_;
+  std::optional<Interval> relevant_;
   double reach_;
   double coordinateNoise_ = 0;  ///< greatest rounding error of the coordinates of a query point
   double farthest_ = 0;         ///< greatest distance between a point of the domain and a vertex

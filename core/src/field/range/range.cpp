@@ -39,8 +39,8 @@ Interval continued(const Interval& interval, double least, double greatest, bool
 
 }  // namespace
 
-RangeIndex::RangeIndex(const Field& field, int threads)
-    : tree_(withThreads(threads, [&] { return std::make_unique<const range::RangeTree>(field); })) {}
+RangeIndex::RangeIndex(const Field& field, int threads, const std::optional<Interval>& relevant)
+    : tree_(withThreads(threads, [&] { return std::make_unique<const range::RangeTree>(field, relevant); })) {}
 RangeIndex::~RangeIndex() = default;
 RangeIndex::RangeIndex(RangeIndex&&) noexcept = default;
 RangeIndex& RangeIndex::operator=(RangeIndex&&) noexcept = default;

@@ -46,9 +46,9 @@ class TreeBuilder {
  public:
   explicit TreeBuilder(RangeTree& tree) : tree_(tree), field_(tree.field_) {}
 
-  void build() {
+  void build(const std::optional<Interval>& relevant) {
     const std::vector<query::OctreeNode> leaves = query::allLeaves(field_);
-    const LeafEnclosures enclosureOfLeaf(field_, tree_.frame_);
+    const LeafEnclosures enclosureOfLeaf(field_, tree_.frame_, relevant);
     leaves_.resize(leaves.size());
     tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) { leaves_[n] = enclosureOfLeaf(leaves[n]); });
     order_.resize(field_.nodes.size());
@@ -426,11 +426,11 @@ class RangeSearch {
   std::array<Cell, kMostWaiting> stack_;
 };
 
-RangeTree::RangeTree(const Field& field)
+RangeTree::RangeTree(const Field& field, const std::optional<Interval>& relevant)
     : field_(field.data()), frame_(field.lookupGrid().frame), reach_(reachOf(field.data())), root_{} {
   if (field_.nodes.size() >= Group::kTerminalBit)
     throw Error(ErrorKind::limit, "", "the field has too many cells for ranges over boxes: 2^31 or more");
-  TreeBuilder(*this).build();
+  TreeBuilder(*this).build(relevant);
 }
 
 Extent RangeTree::range(const Box& box, const std::optional<Interval>& known) const {

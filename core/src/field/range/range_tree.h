@@ -49,8 +49,9 @@ struct Extent {
 /// Below a leaf that is far from linear, there are parts of the leaf.
 class RangeTree {
  public:
-  /// Keeps a reference to the field. Uses the threads of the calling TBB arena.
-  explicit RangeTree(const Field& field);
+  /// Keeps a reference to the field. Uses the threads of the calling TBB arena. With `relevant`, ranges without such
+  /// values may be wide.
+  RangeTree(const Field& field, const std::optional<Interval>& relevant);
 
   const GridFrame& frame() const { return frame_; }
 

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "contour/contour_octree.h"
+#include "contour/crossed_edges.h"
+#include "contour/dual_mesh.h"
+#include "contour/implicit_surface.h"
+#include "contour/sheets.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::contouring {
+
+/// Measures the mesh from the surface: finds points of the surface in each leaf with sheets, and their distances to the
+/// triangles around the leaf's crossed edges. Middles of triangles do not see a notch that the mesh bridges; these points
+/// do. Points of the surface are within `accuracy` of it. Sets `gaps`, by leaf, to the greatest distances; entries that
+/// are not negative are known already.
+void findSurfaceGaps(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const CrossedEdge> edges,
+                     const Sheets& sheets, const DualMesh& mesh, double accuracy, const Progress& progress,
+                     std::vector<double>& gaps);
+
+}  // namespace hpsdf::contouring
