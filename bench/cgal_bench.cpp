@@ -3,11 +3,15 @@
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Simple_cartesian.h>
+#include <CGAL/Surface_mesh.h>
 
 #include <cmath>
 #include <vector>
 
+#include "contour_scene.h"
 #include "peer_points.h"
 
 namespace hpsdf::bench {
@@ -40,6 +44,21 @@ void uniform(benchmark::State& state) {
     if (std::abs(std::abs(bunnyDistance()(points[i])) - out[i]) > 1e-9) state.SkipWithError("wrong distances");
 }
 
+/// CGAL's own test of whether our contour intersects itself, with exact predicates.
+void crossingsOfContour(benchmark::State& state) {
+  using Exact = CGAL::Exact_predicates_inexact_constructions_kernel;
+  const TriangleMesh made = contour(contourField(), kContourOptions).mesh;
+  CGAL::Surface_mesh<Exact::Point_3> mesh;
+  std::vector<CGAL::Surface_mesh<Exact::Point_3>::Vertex_index> vertices;
+  for (const Vector3& x : made.vertices) vertices.push_back(mesh.add_vertex({x.x(), x.y(), x.z()}));
+  for (const auto& [a, b, c] : made.triangles) mesh.add_face(vertices[a], vertices[b], vertices[c]);
+  bool intersects = true;
+  for ([[maybe_unused]] auto _ : state) intersects = CGAL::Polygon_mesh_processing::does_self_intersect(mesh);
+  const bool isClosed = CGAL::is_closed(mesh) && mesh.number_of_faces() == made.triangles.size();
+  state.counters["defects"] = int(intersects) + int(!isClosed);
+}
+
+BENCHMARK(crossingsOfContour)->Name("contour/crossings/cgal")->Iterations(1);
 BENCHMARK(uniform)->Name("distance/uniform/cgal");
 
 }  // namespace

@@ -4,7 +4,9 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/MeshToVolume.h>
+#include <openvdb/tools/VolumeToMesh.h>
 
+#include "contour_scene.h"
 #include "scene.h"
 
 namespace hpsdf::bench {
@@ -66,6 +68,26 @@ void nearSurface(benchmark::State& state) {
   state.counters["rms"] = rmsError(points, values);
 }
 
+/// The mesh of the level set. The adaptivity is that at which the mesh has fewest triangles before its Hausdorff
+/// distance grows.
+void contourOfBunny(benchmark::State& state) {
+  constexpr double kAdaptivity = 0.1;
+  const openvdb::FloatGrid& grid = bunnyLevelSet();
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec3I> triangles;
+  std::vector<openvdb::Vec4I> quads;
+  for ([[maybe_unused]] auto _ : state) openvdb::tools::volumeToMesh(grid, points, triangles, quads, 0.0, kAdaptivity);
+  TriangleMesh mesh{.vertices = {}, .triangles = {}, .name = "OpenVDB"};
+  for (const openvdb::Vec3s& x : points) mesh.vertices.emplace_back(x.x(), x.y(), x.z());
+  for (const openvdb::Vec3I& t : triangles) mesh.triangles.push_back({t[0], t[1], t[2]});
+  for (const openvdb::Vec4I& q : quads) {
+    mesh.triangles.push_back({q[0], q[1], q[2]});
+    mesh.triangles.push_back({q[0], q[2], q[3]});
+  }
+  countMesh(state, mesh);
+}
+
+BENCHMARK(contourOfBunny)->Name("contour/openvdb")->MeasureProcessCPUTime()->UseRealTime()->Iterations(1);
 BENCHMARK(bunnyValue)->Name("query/bunny/openvdb");
 BENCHMARK(nearSurface)->Name("near/openvdb")->MeasureProcessCPUTime()->UseRealTime()->Iterations(1);
 

@@ -26,7 +26,8 @@ std::vector<LeafSheets> leavesOf(const Sheets& sheets, const std::vector<double>
   std::vector<LeafSheets> leaves;
   for (std::uint32_t sheet = 0; sheet < sheets.size(); ++sheet) {
     if (gaps[static_cast<std::size_t>(sheets.cellOf(sheet))] >= 0) continue;
-    if (leaves.empty() || leaves.back().cell != sheets.cellOf(sheet)) leaves.push_back({sheets.cellOf(sheet), sheet, sheet});
+    if (leaves.empty() || leaves.back().cell != sheets.cellOf(sheet))
+      leaves.push_back({sheets.cellOf(sheet), sheet, sheet});
     ++leaves.back().end;
   }
   return leaves;

@@ -14,9 +14,9 @@
 namespace hpsdf::contouring {
 
 /// Measures the mesh from the surface: finds points of the surface in each leaf with sheets, and their distances to the
-/// triangles around the leaf's crossed edges. Middles of triangles do not see a notch that the mesh bridges; these points
-/// do. Points of the surface are within `accuracy` of it. Sets `gaps`, by leaf, to the greatest distances; entries that
-/// are not negative are known already.
+/// triangles around the leaf's crossed edges. Middles of triangles do not see a notch that the mesh bridges; these
+/// points do. Points of the surface are within `accuracy` of it. Sets `gaps`, by leaf, to the greatest distances;
+/// entries that are not negative are known already.
 void findSurfaceGaps(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const CrossedEdge> edges,
                      const Sheets& sheets, const DualMesh& mesh, double accuracy, const Progress& progress,
                      std::vector<double>& gaps);

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kUnknownGap = -1;
 
-/// Returns the single-precision number nearest to x. GCC 12 leaves out conversions to float and back where it handles two
-/// numbers at a time; `volatile` prevents this.
+/// Returns the single-precision number nearest to x. GCC 12 leaves out conversions to float and back where it handles
+/// two numbers at a time; `volatile` prevents this.
 double inSinglePrecision(double x) {
   const volatile float single = static_cast<float>(x);
   return single;
@@ -95,14 +95,15 @@ void SurfaceMesh::mend() {
   measurePolygons(surface_, mesh_, options_.isOpen, progress_, edges_);
 }
 
-/// Makes the mesh with fans around the marked edges. Where sheets share a leaf, those of fans have their vertices in the
-/// middle. Polygons that become fans, or have such vertices, are changed.
+/// Makes the mesh with fans around the marked edges. Where sheets share a leaf, those of fans have their vertices in
+/// the middle. Polygons that become fans, or have such vertices, are changed.
 void SurfaceMesh::makeFans(const std::vector<bool>& fans) {
   std::vector<Vector3> vertices = vertices_;
   for (std::uint32_t sheet = 0; sheet < sheets_->size(); ++sheet) {
     const bool alone = (sheet == 0 || sheets_->cellOf(sheet - 1) != sheets_->cellOf(sheet)) &&
                        (sheet + 1 == sheets_->size() || sheets_->cellOf(sheet + 1) != sheets_->cellOf(sheet));
-    if (alone || std::ranges::none_of(sheets_->edgesOf(sheet), [&](std::uint32_t edge) { return fans[edge]; })) continue;
+    if (alone || std::ranges::none_of(sheets_->edgesOf(sheet), [&](std::uint32_t edge) { return fans[edge]; }))
+      continue;
     vertices[sheet] = middleOf(*sheets_, sheet, edges_);
     for (const std::uint32_t edge : sheets_->edgesOf(sheet)) edges_[edge].polygon.isChanged = true;
   }
