@@ -56,22 +56,46 @@ ConstructionPoints thinned(const ConstructionPoints& all, std::size_t count) {
   return result;
 }
 
-void construction(benchmark::State& state) {
+/// Times evaluate(batch, its first point, its points) for all batches of the construction.
+template <typename Evaluate>
+void timeBatches(benchmark::State& state, const Evaluate& evaluate) {
   const auto& [points, batches] = constructionPoints();
-  const ExactDistance& distance = bunnyDistance();
-  std::vector<double> out(points.size());
-  std::vector<Vector3> gradients(points.size());
   timeEach(state, points.size(), [&, &points = points, &batches = batches] {
     std::size_t first = 0;
-    for (const auto& [size, withGradients] : batches) {
-      const std::span at = std::span(points).subspan(first, size);
-      const std::span values = std::span(out).subspan(first, size);
-      if (withGradients)
-        distance.withGradients(at, values, std::span(gradients).subspan(first, size));
-      else
-        distance(at, values);
-      first += size;
+    for (const Batch& batch : batches) {
+      evaluate(batch, first, std::span(points).subspan(first, batch.size));
+      first += batch.size;
     }
+  });
+}
+
+void construction(benchmark::State& state) {
+  const ExactDistance& distance = bunnyDistance();
+  std::vector<double> out(constructionPoints().points.size());
+  std::vector<Vector3> gradients(out.size());
+  timeBatches(state, [&](const Batch& batch, std::size_t first, std::span<const Vector3> at) {
+    const std::span values = std::span(out).subspan(first, batch.size);
+    if (batch.withGradients)
+      distance.withGradients(at, values, std::span(gradients).subspan(first, batch.size));
+    else
+      distance(at, values);
+  });
+}
+
+/// The distances alone at the construction's points, with which the row of closest points is compared.
+void distancesAlone(benchmark::State& state) {
+  const ExactDistance& distance = bunnyDistance();
+  std::vector<double> out(constructionPoints().points.size());
+  timeBatches(state, [&](const Batch& batch, std::size_t first, std::span<const Vector3> at) {
+    distance(at, std::span(out).subspan(first, batch.size));
+  });
+}
+
+void closestPoints(benchmark::State& state) {
+  const ExactDistance& distance = bunnyDistance();
+  std::vector<ClosestPoint> out(constructionPoints().points.size());
+  timeBatches(state, [&](const Batch& batch, std::size_t first, std::span<const Vector3> at) {
+    distance.closestPoints(at, std::span(out).subspan(first, batch.size));
   });
 }
 
@@ -85,6 +109,8 @@ void uniform(benchmark::State& state) {
 }
 
 BENCHMARK(construction)->Name("distance/construction/ours");
+BENCHMARK(distancesAlone)->Name("distance/construction/distances_alone");
+BENCHMARK(closestPoints)->Name("distance/construction/closest_points");
 BENCHMARK(uniform)->Name("distance/uniform/ours");
 
 }  // namespace

@@ -10,9 +10,10 @@ Registry makeRegistry();
 // Each of the following functions adds the commands that are defined in the source file of the same name.
 void addContourCommand(Registry& registry);
 void addExportCommand(Registry& registry);
-void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, info, query, load and save
+void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, info, load and save; query too
 void addJumpsCommand(Registry& registry);
 void addProbeCommand(Registry& registry);
+void addQueryCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, shapes, doctor, set, include, help and docs
 void addVerifyCommand(Registry& registry);
 void addWhyCommand(Registry& registry);

@@ -2,12 +2,9 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "batch/batch.h"
 #include "commands/commands.h"
-#include "commands/point_query.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
@@ -160,63 +157,6 @@ void runInfo(Session& session, const Arguments& arguments) {
   useField(session, arguments);
   if (session.wantsJson(arguments)) return printJson(session.console().out, fieldJson(session.current()));
   session.console().out << fieldText(session.current());
-}
-
-/// Returns true for a text that is meant as a point X,Y,Z or a box. It may still be none, such as 1,2.
-bool looksLikePoint(const std::string& text) {
-  return text.find(',') != std::string::npos && text.front() != 'e' && text.front() != 'E' &&
-         text.find_first_not_of("0123456789+-.eE,") == std::string::npos;
-}
-
-/// Opens the points or boxes of a query: a single one, such as X,Y,Z, a file, or the given stream if the name is "-". A
-/// file whose name looks like a point is read as a file. `what` tells what the file should hold.
-class PointSource {
- public:
-  PointSource(const std::string& points, const char* what, std::istream& in) : name_(points) {
-    if (points == "-") {
-      name_ = "stdin";
-      in_ = &in;
-    } else if (std::error_code unknown; looksLikePoint(points) && !std::filesystem::exists(points, unknown)) {
-      point_.str(points);
-      in_ = &point_;
-    } else {
-      file_ = openFile(points, what);
-      in_ = &file_;
-    }
-  }
-
-  std::istream& in() const { return *in_; }
-  const std::string& name() const { return name_; }
-
- private:
-  std::string name_;
-  std::istringstream point_;
-  std::ifstream file_;
-  std::istream* in_ = nullptr;
-};
-
-void runQuery(Session& session, const Arguments& arguments) {
-  const bool ofBoxes = arguments.has("boxes");
-  if (ofBoxes && arguments.has("points")) throw Error("boxes excludes points: give one of them");
-  useField(session, arguments);
-  const PointSource source =
-      ofBoxes ? PointSource(arguments.text("boxes"), "a file of boxes", session.console().in)
-              : PointSource(arguments.textOr("points", "-"), "a file of points", session.console().in);
-  const PointFormat format = session.wantsJson(arguments) ? PointFormat::json : PointFormat::csv;
-  const Field& field = session.current().field;
-  std::optional<OutputFile> output;
-  if (arguments.has("output")) output.emplace(arguments.text("output"));
-  const auto answer = ofBoxes ? queryBoxes : queryPoints;
-  const std::size_t count = answer(field, source.in(), source.name(), format, [&](std::string_view text) {
-    if (output) return output->write(text);
-    std::ostream& out = session.console().out;
-    out << text << std::flush;
-    requireWritten(out);
-  });
-  if (!output) return;
-  output->commit();
-  session.console().err << fmt::format("{}: {}\n", arguments.text("output"),
-                                       ofBoxes ? countOf(count, "box", "boxes") : countOf(count, "point", "points"));
 }
 
 void runSmooth(Session& session, const Arguments& arguments) {
@@ -418,33 +358,7 @@ void addReadingCommands(Registry& registry) {
       .parameters = {fieldParameter()},
       .action = runInfo,
   });
-  registry.add({
-      .name = "query",
-      .summary = "Compute distances and gradients at points, or ranges over boxes.",
-      .help = paragraphs(R"(
-Takes one point, or reads points from a file or standard input, one a line as x,y,z or x y z; empty lines, # comments
-and a header line are ignored. In a script that leaves FIELD out, a point is given as points=X,Y,Z. Writes CSV with the
-header x,y,z,distance,gx,gy,gz and numbers in full precision, or with --json an array of objects.
-
-Distances are negative inside. Outside the domain the field is continued continuously.
-
---boxes asks for ranges instead: the interval from min to max contains every value of the field in the box, rounding
-included. Where min is above 0, the whole box is outside; where max is below 0, it is inside. For boxes of an eighth of
-the domain's edge, the interval is typically 20 % wider than necessary, and up to twice as wide where cells are exact or
-blended. A box takes about a microsecond; the preparations before grow with the field. If the field has bounds ('build --bounds'), exact_min and exact_max contain the exact distance
-too.)"),
-      .examples = {"hpsdf query bunny.hpsdf 0.1,0.2,0.3", "echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
-                   "hpsdf query bunny.hpsdf points.csv -o distances.csv",
-                   "hpsdf query bunny.hpsdf --boxes 0,0,0,0.1,0.1,0.2"},
-      .parameters = {fieldParameter(),
-                     {"points", file("POINTS").positional(),
-                      "A point X,Y,Z, or a file of points; - or nothing for standard input."},
-                     {"boxes", file("BOXES"),
-                      "Write certified ranges of the field over boxes: a box X0,Y0,Z0,X1,Y1,Z1, or a file with a box a "
-                      "line, the lower corner first; - for standard input. Excludes POINTS."},
-                     {"output", outputFile().as('o'), "File to write; standard output when left out."}},
-      .action = runQuery,
-  });
+  addQueryCommand(registry);
   registry.addForScripts({
       .name = "load",
       .summary = "Load a field, which becomes the current one.",

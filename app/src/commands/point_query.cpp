@@ -145,12 +145,61 @@ class BoxAnswers {
   std::vector<FieldRange> ranges_;
 };
 
-/// Reads questions, one a line, and writes the answers. `Answers` is `PointAnswers` or `BoxAnswers`.
+/// Points as questions to a mesh, which answers with closest points and winding numbers.
+class ClosestAnswers {
+ public:
+  static constexpr std::size_t kNumbers = PointAnswers::kNumbers;
+  static constexpr std::string_view kExpected = PointAnswers::kExpected;
+
+  explicit ClosestAnswers(const ExactDistance& distance) : distance_(distance) {}
+
+  static std::string header() { return "x,y,z,distance,px,py,pz,face,feature,k,b0,b1,b2,winding\n"; }
+  static std::string problem(const std::array<double, kNumbers>& /*numbers*/) { return {}; }
+
+  std::size_t size() const { return points_.size(); }
+  void take(const std::array<double, kNumbers>& numbers) { points_.emplace_back(numbers[0], numbers[1], numbers[2]); }
+  void clear() { points_.clear(); }
+
+  void answer() {
+    closest_.resize(points_.size());
+    windings_.resize(points_.size());
+    distance_.closestPoints(points_, closest_);
+    distance_.windingNumbers(points_, windings_);
+  }
+
+  void write(std::size_t i, PointFormat format, Text out) const {
+    constexpr std::array<std::string_view, 3> kFeatures = {"face", "edge", "vertex"};
+    const Vector3& x = points_[i];
+    const ClosestPoint& closest = closest_[i];
+    const Vector3 &p = closest.point, &b = closest.barycentric;
+    const std::string_view feature = kFeatures[static_cast<std::size_t>(closest.feature)];
+    if (format == PointFormat::csv)
+      fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), closest.signedDistance,
+                     p.x(), p.y(), p.z(), closest.triangle, feature, closest.featureIndex, b.x(), b.y(), b.z(),
+                     windings_[i]);
+    else
+      fmt::format_to(
+          out,
+          R"({{"x":{},"y":{},"z":{},"distance":{},"px":{},"py":{},"pz":{},"face":{},"feature":"{}","k":{},"b0":{},"b1":{},"b2":{},"winding":{}}})",
+          x.x(), x.y(), x.z(), jsonNumber(closest.signedDistance), jsonNumber(p.x()), jsonNumber(p.y()),
+          jsonNumber(p.z()), closest.triangle, feature, closest.featureIndex, jsonNumber(b.x()), jsonNumber(b.y()),
+          jsonNumber(b.z()), jsonNumber(windings_[i]));
+  }
+
+ private:
+  const ExactDistance& distance_;
+  std::vector<Vector3> points_;
+  std::vector<ClosestPoint> closest_;
+  std::vector<double> windings_;
+};
+
+/// Reads questions, one a line, and writes the answers. `Answers` is one of the classes above, which asks `asked`.
 template <typename Answers>
 class Query {
  public:
-  Query(const Field& field, std::string name, PointFormat format, const std::function<void(std::string_view)>& write)
-      : answers_(field), name_(std::move(name)), format_(format), write_(write) {}
+  template <typename Asked>
+  Query(const Asked& asked, std::string name, PointFormat format, const std::function<void(std::string_view)>& write)
+      : answers_(asked), name_(std::move(name)), format_(format), write_(write) {}
 
   std::size_t run(std::istream& in) {
     text_ = format_ == PointFormat::csv ? answers_.header() : "[";
@@ -222,6 +271,11 @@ std::size_t queryPoints(const Field& field, std::istream& in, const std::string&
 std::size_t queryBoxes(const Field& field, std::istream& in, const std::string& name, PointFormat format,
                        const std::function<void(std::string_view)>& write) {
   return Query<BoxAnswers>(field, name, format, write).run(in);
+}
+
+std::size_t queryClosestPoints(const ExactDistance& distance, std::istream& in, const std::string& name,
+                               PointFormat format, const std::function<void(std::string_view)>& write) {
+  return Query<ClosestAnswers>(distance, name, format, write).run(in);
 }
 
 }  // namespace hpsdf::app

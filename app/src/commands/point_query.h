@@ -1,6 +1,6 @@
 #pragma once
-// Evaluates a field at points or finds its range over boxes, which are given as text, and writes the answers as text.
-// They are processed in batches, so that millions of them need little memory.
+// Evaluates a field at points, finds its range over boxes or the closest points of a mesh. Points and boxes are given
+// as text, and so are the answers. They are processed in batches, so that millions of them need little memory.
 
 #include <cstdint>
 #include <functional>
@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "hpsdf/exact_distance.h"
 #include "hpsdf/field.h"
 
 namespace hpsdf::app {
@@ -23,5 +24,9 @@ std::size_t queryPoints(const Field& field, std::istream& in, const std::string&
 /// of the exact distance are there too if the field has bounds.
 std::size_t queryBoxes(const Field& field, std::istream& in, const std::string& name, PointFormat format,
                        const std::function<void(std::string_view)>& write);
+
+/// Reads points and passes the closest points of a mesh and its winding numbers to `write`, like `queryPoints`.
+std::size_t queryClosestPoints(const ExactDistance& distance, std::istream& in, const std::string& name,
+                               PointFormat format, const std::function<void(std::string_view)>& write);
 
 }  // namespace hpsdf::app

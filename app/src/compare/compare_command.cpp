@@ -10,6 +10,7 @@
 #include "compare/comparison.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
+#include "construction/mesh_summary.h"
 #include "construction/surface.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/output_file.h"

@@ -195,7 +195,9 @@ BuildOptions buildOptions(const Arguments& arguments, double longestSide) {
   return options;
 }
 
-DistanceOptions distanceOptions(const Arguments& arguments) {
+std::vector<Parameter> insideParameters() { return kInside; }
+
+DistanceOptions insideOptions(const Arguments& arguments) {
   DistanceOptions options{.insideTest = insideTestOf(arguments.text("sign")),
                           .threads = int(arguments.whole("threads"))};
   if (arguments.flag("hull")) {
@@ -203,14 +205,19 @@ DistanceOptions distanceOptions(const Arguments& arguments) {
       throw Error(fmt::format("hull: goes by winding number: leave out sign {}", arguments.text("sign")));
     options.insideTest = InsideTest::outerHull;
   }
-  if (options.insideTest == InsideTest::pseudonormal && arguments.flag("certified"))
-    throw Error(
-        "certified: nothing is proven where sign pseudonormal is forced upon a mesh: leave out sign; auto takes "
-        "pseudonormals wherever they are certain to be right");
   if (options.insideTest == InsideTest::shell && !arguments.given("thickness"))
     throw Error("sign unsigned-shell: give the wall a thickness, such as a hundredth of the mesh's size");
   requireOwner(arguments, "thickness", "sign unsigned-shell", options.insideTest == InsideTest::shell);
   if (options.insideTest == InsideTest::shell) options.thickness = arguments.number("thickness");
+  return options;
+}
+
+DistanceOptions distanceOptions(const Arguments& arguments) {
+  const DistanceOptions options = insideOptions(arguments);
+  if (options.insideTest == InsideTest::pseudonormal && arguments.flag("certified"))
+    throw Error(
+        "certified: nothing is proven where sign pseudonormal is forced upon a mesh: leave out sign; auto takes "
+        "pseudonormals wherever they are certain to be right");
   return options;
 }
 

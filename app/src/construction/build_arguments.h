@@ -48,7 +48,11 @@ Parameter seedParameter(std::string help = "Which points.");
 /// box in world units.
 BuildOptions buildOptions(const Arguments& arguments, double longestSide);
 
-/// Returns the options of the distance function, among them the method that tells inside from outside.
+/// Returns the parameters that tell inside from outside. `insideOptions` reads them and the parameter `threads`.
+std::vector<Parameter> insideParameters();
+DistanceOptions insideOptions(const Arguments& arguments);
+
+/// Returns the options of a construction's distance function, among them the method that tells inside from outside.
 DistanceOptions distanceOptions(const Arguments& arguments);
 
 /// Returns true if the arguments ask for the mesh to be scaled and centred.

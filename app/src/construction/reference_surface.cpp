@@ -103,6 +103,18 @@ std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, co
   });
 }
 
+MeshDistance meshDistance(const Console& console, const std::string& surface, const std::optional<Source>& source,
+                          const DistanceOptions& options) {
+  return namingSurface(surface, [&] {
+    PreparedSurface prepared = prepareSurface(console, surface, source && !source->normalization.isIdentity());
+    if (prepared.analytic)
+      throw Error("an analytic shape has no faces; take builtin:" + surface.substr(kAnalytic.size()));
+    auto distance = distanceToMesh(console, surface, prepared, source ? distanceOptions(*source) : options);
+    if (source) warnIfForeign(console, surface, distance->source(), *source);
+    return MeshDistance{std::move(prepared.mesh), std::move(distance)};
+  });
+}
+
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {
     const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());

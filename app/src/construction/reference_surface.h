@@ -36,6 +36,18 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source);
 
+/// A mesh and the exact distance to it.
+struct MeshDistance {
+  TriangleMesh mesh;
+  std::shared_ptr<const ExactDistance> distance;
+};
+
+/// Loads a mesh file or a built-in shape and sets up its exact distance: in the units and with the inside test of a
+/// field that was made from `source`, or in its own units with the options. Warns if the field was made from another
+/// surface. Throws `Error` naming `surface`, also for an analytic shape.
+MeshDistance meshDistance(const Console& console, const std::string& surface, const std::optional<Source>& source,
+                          const DistanceOptions& options = {});
+
 /// Returns the defects of a mesh file or a built-in shape, in the units of a field that was made from
 /// `source`. Warns if the field was made from another surface. Throws `Error` naming `surface`.
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source);

@@ -123,12 +123,17 @@ std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<
   return std::make_shared<const DistanceFunction>(SharedDistance{exact}, std::move(source));
 }
 
+std::shared_ptr<const ExactDistance> distanceToMesh(const Console& console, const std::string& surface,
+                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
+  auto exact = distanceTo(console, prepared.mesh, options);
+  tellInsideTest(console, surface, *prepared.report, exact->insideTestChoice(), prepared.normalization);
+  return exact;
+}
+
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
   if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
-  const auto exact = distanceTo(console, prepared.mesh, options);
-  tellInsideTest(console, surface, *prepared.report, exact->insideTestChoice(), prepared.normalization);
-  return withNormalization(exact, prepared.normalization);
+  return withNormalization(distanceToMesh(console, surface, prepared, options), prepared.normalization);
 }
 
 }  // namespace hpsdf::app

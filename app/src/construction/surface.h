@@ -52,6 +52,10 @@ std::shared_ptr<const ExactDistance> distanceTo(const Console& console, const Tr
 std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<const ExactDistance>& exact,
                                                           const Normalization& normalization);
 
+/// Sets up the exact distance function of a prepared mesh. If the choice of the inside test is not evident, reports it.
+std::shared_ptr<const ExactDistance> distanceToMesh(const Console& console, const std::string& surface,
+                                                    const PreparedSurface& prepared, const DistanceOptions& options);
+
 /// Sets up the distance function of a prepared surface. If the choice of the inside test is not evident, reports it.
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options);

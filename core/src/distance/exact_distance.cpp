@@ -1,5 +1,6 @@
 #include "hpsdf/exact_distance.h"
 
+#include <tbb/collaborative_call_once.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
@@ -199,13 +200,26 @@ struct ExactDistance::Data {
     inside.winding = WindingSign(wholeMesh, mesh, BoundaryEdges(wholeMesh));
     surface::OuterHull hull = surface::makeOuterHull(wholeMesh, mesh, inside.winding, progress);
     hierarchy = Hierarchy(hull.mesh, source.box);
-    hullSources = std::move(hull.sourceTriangles);
+    std::vector<std::uint32_t> slotOf(wholeMesh.frames().size());
+    for (std::uint32_t slot = 0; slot < slotOf.size(); ++slot) slotOf[wholeMesh.frames()[slot].triangle] = slot;
+    hullSlots = std::move(hull.sourceTriangles);
+    for (std::uint32_t& slot : hullSlots) slot = slotOf[slot];  // until now, the number of the mesh's triangle
   }
+
+  /// The closest point on the nearest triangle.
+  struct Foot {
+    Vector3 point;
+    double signedDistance;
+    std::uint32_t slot;  ///< the triangle, in the order of its hierarchy
+    Feature feature;
+    std::uint8_t index = 0;  ///< as in `ClosestPoint::featureIndex`
+    double along = 0;        ///< on an edge, the weight of its second end
+  };
 
   /// Returns the closest point on the nearest triangle. The point is computed from the vertices of the mesh, so
   /// that a query point on a vertex has distance 0. If the inside test is by pseudonormals, the distance has the
   /// pseudonormal's sign.
-  ClosestPoint resolve(const Hierarchy& triangles, const Vector3& x, const bvh::Nearest& nearest) const {
+  Foot resolve(const Hierarchy& triangles, const Vector3& x, const bvh::Nearest& nearest) const {
     const std::uint32_t slot = triangles.slotAt(nearest.triangleRef);
     const bvh::TriangleFrame& frame = triangles.frames()[slot];
     const bvh::FramePoint& point = nearest.point;
@@ -215,22 +229,78 @@ struct ExactDistance::Data {
     // face.
     const double rounding = bvh::kFlat * bvh::kFlat * (frame.length * frame.length + point.height * point.height);
     if (point.inside && point.side[side] > rounding)  // adding 0 turns -0 into 0
-      return {x - frame.normal * point.height, point.height + 0.0, frame.triangle, Feature::face};
+      return {x - frame.normal * point.height, point.height + 0.0, slot, Feature::face};
 
-    const std::uint32_t from = (frame.firstCorner + side) % 3;
-    const std::uint32_t va = triangles.triangles()[slot][from], vb = triangles.triangles()[slot][(from + 1) % 3];
+    const std::uint32_t from = (frame.firstCorner + side) % 3, to = (from + 1) % 3;
+    const std::uint32_t va = triangles.triangles()[slot][from], vb = triangles.triangles()[slot][to];
     const Vector3& a = triangles.vertices()[va];
     const Vector3& b = triangles.vertices()[vb];
     const double t = bvh::closestParameter(x, a, b);
-    if (t <= 0) return signedAt(a, x - a, normalOfVertex(va), frame.triangle, Feature::vertex);
-    if (t >= 1) return signedAt(b, x - b, normalOfVertex(vb), frame.triangle, Feature::vertex);
-    const Vector3 normal = normalOfEdge(slot, from);
-    return signedAt(a + (b - a) * t, x - a - (b - a) * t, normal, frame.triangle, Feature::edge);
+    const auto footAt = [&](const Vector3& foot, const Vector3& difference, const Vector3& normal, Feature feature,
+                            std::uint32_t index) {
+      // `difference` is x − foot, computed without the rounding error of the foot, which is large far from the origin.
+      const double length = difference.norm();
+      return Foot{
+          foot, (difference.dot(normal) < 0 ? -length : length) + 0.0, slot, feature, static_cast<std::uint8_t>(index),
+          t};
+    };
+    if (t <= 0) return footAt(a, x - a, normalOfVertex(va), Feature::vertex, from);
+    if (t >= 1) return footAt(b, x - b, normalOfVertex(vb), Feature::vertex, to);
+    return footAt(a + (b - a) * t, x - a - (b - a) * t, normalOfEdge(slot, from), Feature::edge, from);
+  }
+
+  /// Returns the barycentric coordinates of the projection of x onto a triangle's plane, in the order of the corners of
+  /// the mesh's triangle. Weights that rounding makes negative become 0.
+  static Vector3 barycentric(const bvh::TriangleFrame& frame, const Vector3& x) {
+    const Vector3 fromA = x - frame.origin;
+    const double apex = bvh::hasArea(frame) ? std::clamp(fromA.dot(frame.across) / frame.apexAcross, 0.0, 1.0) : 0;
+    const double end = frame.length > 0
+                           ? std::clamp((fromA.dot(frame.along) - apex * frame.apexAlong) / frame.length, 0.0, 1 - apex)
+                           : 0;
+    Vector3 weights;
+    weights[frame.firstCorner] = 1 - apex - end;
+    weights[(frame.firstCorner + 1) % 3] = end;
+    weights[(frame.firstCorner + 2) % 3] = apex;
+    return weights;
+  }
+
+  /// Returns the closest point with everything that is known of it, but for the inside tests other than pseudonormals.
+  ClosestPoint closestOf(const Vector3& x, const bvh::Nearest& nearest) const {
+    const Foot foot = resolve(hierarchy, x, nearest);
+    const bvh::TriangleFrame& frame = hierarchy.frames()[foot.slot];
+    ClosestPoint closest{foot.point, foot.signedDistance, frame.triangle, foot.feature, foot.index};
+    if (!hullSlots.empty()) {
+      describeInMesh(closest, wholeMesh.frames()[hullSlots[frame.triangle]]);
+    } else if (foot.feature == Feature::face) {
+      closest.barycentric = barycentric(frame, x);
+    } else if (foot.feature == Feature::edge) {
+      closest.barycentric[foot.index] = 1 - foot.along;
+      closest.barycentric[(foot.index + 1) % 3] = foot.along;
+    } else {
+      closest.barycentric[foot.index] = 1;
+    }
+    return closest;
+  }
+
+  /// Describes a closest point on a triangle of an outer hull, which may be a piece of the mesh's triangle, by the
+  /// mesh's triangle with this frame.
+  static void describeInMesh(ClosestPoint& closest, const bvh::TriangleFrame& frame) {
+    constexpr double kWithinRounding = 1e-12;
+    closest.triangle = frame.triangle;
+    Vector3 weights = barycentric(frame, closest.point);
+    weights = (weights.array() < kWithinRounding).select(0, weights);
+    closest.barycentric = weights / weights.sum();
+    const auto zeros = (weights.array() == 0).count();
+    int corner = 0;
+    if (zeros == 2) weights.maxCoeff(&corner);
+    if (zeros == 1) weights.minCoeff(&corner);
+    closest.feature = zeros == 0 ? Feature::face : zeros == 1 ? Feature::edge : Feature::vertex;
+    closest.featureIndex = static_cast<std::uint8_t>(zeros == 1 ? (corner + 1) % 3 : corner);
   }
 
   /// Returns the unit vector from the closest point on the nearest triangle to x. If x is so close to the triangle that
   /// rounding decides about this direction, returns the triangle's normal, on the side of x.
-  static Vector3 directionFrom(const ClosestPoint& closest, const Hierarchy& triangles, const Vector3& x,
+  static Vector3 directionFrom(const Foot& closest, const Hierarchy& triangles, const Vector3& x,
                                const bvh::Nearest& nearest) {
     constexpr double kRounding = 1e-8;  // far more than the relative rounding error of a closest point
     const Vector3 difference = x - closest.point;
@@ -240,21 +310,28 @@ struct ExactDistance::Data {
     return nearest.point.height < 0 ? Vector3(-normal) : normal;
   }
 
-  /// Computes the distances of points to the nearest triangles of a hierarchy. `resolve` determines the signs. If
-  /// `directions` is not empty, also computes the unit vectors from the nearest points of the triangles.
-  void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out,
-                   std::span<Vector3> directions = {}) const {
+  /// Finds the nearest triangles of points in a hierarchy, packet by packet, and calls visit(index of the point,
+  /// nearest triangle) for each point.
+  template <typename Visit>
+  static void forEachNearest(const Hierarchy& triangles, std::span<const Vector3> points, const Visit& visit) {
     using bvh::kPacket;
     std::array<bvh::Nearest, kPacket> nearest{};  // nearest triangles of the previous points; they bound the search
     for (std::size_t first = 0; first < points.size(); first += kPacket) {
       const auto packet = points.subspan(first, std::min<std::size_t>(kPacket, points.size() - first));
       nearestTriangles(triangles, packet, std::span(nearest).first(packet.size()));
-      for (std::size_t i = 0; i < packet.size(); ++i) {
-        const ClosestPoint closest = resolve(triangles, packet[i], nearest[i]);
-        out[first + i] = closest.signedDistance;
-        if (!directions.empty()) directions[first + i] = directionFrom(closest, triangles, packet[i], nearest[i]);
-      }
+      for (std::size_t i = 0; i < packet.size(); ++i) visit(first + i, nearest[i]);
     }
+  }
+
+  /// Computes the distances of points to the nearest triangles of a hierarchy. `resolve` determines the signs. If
+  /// `directions` is not empty, also computes the unit vectors from the nearest points of the triangles.
+  void toTriangles(const Hierarchy& triangles, std::span<const Vector3> points, std::span<double> out,
+                   std::span<Vector3> directions = {}) const {
+    forEachNearest(triangles, points, [&](std::size_t i, const bvh::Nearest& nearest) {
+      const Foot closest = resolve(triangles, points[i], nearest);
+      out[i] = closest.signedDistance;
+      if (!directions.empty()) directions[i] = directionFrom(closest, triangles, points[i], nearest);
+    });
   }
 
   /// Turns the distances from `toTriangles` into signed distances according to the chosen inside test.
@@ -273,17 +350,28 @@ struct ExactDistance::Data {
     }
   }
 
-  std::uint32_t meshTriangle(std::uint32_t triangle) const {
-    return hullSources.empty() ? triangle : hullSources[triangle];
+  /// Returns the winding numbers of the mesh. Where the inside test does not need them, prepares them at the first
+  /// call.
+  const WindingSign& windingNumbers() const {
+    if (inside.choice.insideTest == InsideTest::winding || inside.choice.insideTest == InsideTest::outerHull)
+      return inside.winding;
+    // A thread that waits for another one to prepare them helps it. With a mutex it could wait for itself: a thread may
+    // run another caller's task while it waits for its own parallel loop.
+    tbb::collaborative_call_once(preparesWinding, [&] {
+      preparedWinding = std::make_unique<const WindingSign>(hierarchy, BoundaryEdges(hierarchy));
+      winding = preparedWinding.get();
+    });
+    return *preparedWinding;
   }
 
   Source source;
-  Hierarchy hierarchy;                     ///< the triangles to which distances are measured
-  Hierarchy wholeMesh;                     ///< all triangles; only for an outer hull
-  std::vector<std::uint32_t> hullSources;  ///< mesh triangle that each hull triangle comes from; only for an outer hull
+  Hierarchy hierarchy;                   ///< the triangles to which distances are measured
+  Hierarchy wholeMesh;                   ///< all triangles; only for an outer hull
+  std::vector<std::uint32_t> hullSlots;  ///< slot in `wholeMesh` of each hull triangle's source; only for an outer hull
   ChosenInsideTest inside;
   std::optional<distance::ExactLeafSigns> signs;
   std::optional<distance::CandidateSearch> candidates;
+  mutable std::atomic<const WindingSign*> winding = nullptr;  ///< is `preparedWinding` once this is complete
 
  private:
   Vector3 normalOfVertex(std::uint32_t vertex) const {
@@ -294,13 +382,8 @@ struct ExactDistance::Data {
                                                                 : Vector3::Zero();
   }
 
-  /// Returns the closest point with its signed distance. `difference` is x − closest. The caller computes it without
-  /// the rounding error of `closest`, which is large far from the origin.
-  static ClosestPoint signedAt(const Vector3& closest, const Vector3& difference, const Vector3& normal,
-                               std::uint32_t triangle, Feature feature) {
-    const double length = difference.norm();
-    return {closest, (difference.dot(normal) < 0 ? -length : length) + 0.0, triangle, feature};
-  }
+  mutable tbb::collaborative_once_flag preparesWinding;
+  mutable std::unique_ptr<const WindingSign> preparedWinding;
 };
 
 ExactDistance::ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options, const Progress& progress) {
@@ -313,7 +396,11 @@ ExactDistance::~ExactDistance() = default;
 ExactDistance::ExactDistance(ExactDistance&&) noexcept = default;
 ExactDistance& ExactDistance::operator=(ExactDistance&&) noexcept = default;
 
-double ExactDistance::operator()(const Vector3& x) const { return closestPoint(x).signedDistance; }
+double ExactDistance::operator()(const Vector3& x) const {
+  double distance = data_->resolve(data_->hierarchy, x, nearestTriangle(data_->hierarchy, x)).signedDistance;
+  data_->applyInsideTest({&x, 1}, {&distance, 1});
+  return distance;
+}
 
 void ExactDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
@@ -344,10 +431,35 @@ void ExactDistance::withGradients(std::span<const Vector3> points, std::span<dou
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
-  ClosestPoint closest = data_->resolve(data_->hierarchy, x, nearestTriangle(data_->hierarchy, x));
+  ClosestPoint closest = data_->closestOf(x, nearestTriangle(data_->hierarchy, x));
   data_->applyInsideTest({&x, 1}, {&closest.signedDistance, 1});
-  closest.triangle = data_->meshTriangle(closest.triangle);
   return closest;
+}
+
+void ExactDistance::closestPoints(std::span<const Vector3> points, std::span<ClosestPoint> out) const {
+  assert(points.size() == out.size());
+  constexpr std::size_t kPointsAtOnce = 512;  // enough for the inside test to derive signs from each other
+  std::array<double, kPointsAtOnce> distances;
+  Data::forEachNearest(data_->hierarchy, points, [&](std::size_t i, const bvh::Nearest& nearest) {
+    out[i] = data_->closestOf(points[i], nearest);
+  });
+  if (data_->inside.choice.insideTest == InsideTest::pseudonormal) return;
+  for (std::size_t first = 0; first < points.size(); first += kPointsAtOnce) {
+    const std::size_t count = std::min(kPointsAtOnce, points.size() - first);
+    for (std::size_t i = 0; i < count; ++i) distances[i] = out[first + i].signedDistance;
+    data_->applyInsideTest(points.subspan(first, count), std::span(distances).first(count));
+    for (std::size_t i = 0; i < count; ++i) out[first + i].signedDistance = distances[i];
+  }
+}
+
+double ExactDistance::windingNumber(const Vector3& x) const {
+  return data_->windingNumbers().numberAt(x, kWindingError);
+}
+
+void ExactDistance::windingNumbers(std::span<const Vector3> points, std::span<double> out) const {
+  assert(points.size() == out.size());
+  const WindingSign& winding = data_->windingNumbers();
+  for (std::size_t i = 0; i < points.size(); ++i) out[i] = winding.numberAt(points[i], kWindingError);
 }
 
 const InsideTestChoice& ExactDistance::insideTestChoice() const { return data_->inside.choice; }
@@ -359,7 +471,7 @@ TriangleMesh ExactDistance::surface() const {
 }
 
 Crossings ExactDistance::crossings(std::size_t limit, const Progress& progress) const {
-  return surface::findCrossings(data_->hullSources.empty() ? data_->hierarchy : data_->wholeMesh, limit, 0, progress);
+  return surface::findCrossings(data_->hullSlots.empty() ? data_->hierarchy : data_->wholeMesh, limit, 0, progress);
 }
 
 std::string_view instructionSet() { return bvh::instructionSet(); }
@@ -369,8 +481,9 @@ const TriangleSearch& ExactDistance::triangleSearch() const { return *data_->can
 const Source& ExactDistance::source() const { return data_->source; }
 
 std::size_t ExactDistance::bytes() const {
-  return data_->hierarchy.bytes() + data_->wholeMesh.bytes() + data_->hullSources.size() * sizeof(std::uint32_t) +
-         data_->inside.normals.bytes() + data_->inside.winding.bytes();
+  const WindingSign* const prepared = data_->winding;
+  return data_->hierarchy.bytes() + data_->wholeMesh.bytes() + data_->hullSlots.size() * sizeof(std::uint32_t) +
+         data_->inside.normals.bytes() + data_->inside.winding.bytes() + (prepared ? prepared->bytes() : 0);
 }
 
 }  // namespace hpsdf

@@ -22,6 +22,7 @@ constexpr double kRoughChange = 0.1, kExactChange = kExact / 4;
 /// The surface that closes a hole is at the distance |w − ½|/|∇w| to first order. The triangles count as nearer only if
 /// they are nearer by this factor.
 constexpr double kMargin = 1.01;
+constexpr double kTellsWhole = 0.4;  ///< error of an estimate from which the exact winding number follows
 
 /// Returns the indices of the distances, sorted from the greatest to the least distance. Infinities and NaNs come last.
 std::vector<std::uint32_t> farthestFirst(std::span<const double> distances) {
@@ -104,20 +105,30 @@ struct WindingSign::Sample {
 };
 
 WindingSign::WindingSign(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, BoundaryEdges edges)
-    : hierarchy_(&hierarchy), winding_(hierarchy), edges_(std::move(edges)) {
+    : WindingSign(hierarchy, std::move(edges)) {
   if (edges_.empty() && signedVolume(mesh) < 0) level_ = -0.5;
 }
 
-/// Returns the first estimate of the winding number that satisfies `isEnough`, or one whose error is at most `kExact`.
+WindingSign::WindingSign(const bvh::Hierarchy& hierarchy, BoundaryEdges edges)
+    : hierarchy_(&hierarchy), winding_(hierarchy), edges_(std::move(edges)) {}
+
+/// Returns the first estimate of the winding number that satisfies `isEnough`, or one whose error is at most `error`.
 template <typename Enough>
-WindingNumber::Estimate WindingSign::windingNumber(const Vector3& x, Enough isEnough) const {
-  constexpr double kTellsWhole = 0.4;  // error of an estimate from which the exact winding number follows
-  if (!edges_.haveFans()) return winding_.estimateWithin(x, kExact, isEnough);
+WindingNumber::Estimate WindingSign::windingNumber(const Vector3& x, double error, Enough isEnough) const {
+  if (!edges_.haveFans()) return winding_.estimateWithin(x, error, isEnough);
   const WindingNumber::Estimate found = winding_.estimateWithin(x, kTellsWhole, isEnough);
   if (isEnough(found)) return found;
   if (const auto exact = edges_.exactWinding(hierarchy_->local(x), found.value, found.error))
     return {*exact, WindingNumber::kRounding};
-  return winding_.estimateWithin(x, kExact, isEnough);
+  return winding_.estimateWithin(x, error, isEnough);
+}
+
+double WindingSign::numberAt(const Vector3& x, double error) const {
+  constexpr double kFar = 1e15;  // in local coordinates; squares of greater ones may overflow, and w is 0 to rounding
+  if (!(hierarchy_->local(x).cwiseAbs().maxCoeff() < kFar) || !x.allFinite()) return 0;
+  const auto needsAll = [](const WindingNumber::Estimate&) { return false; };
+  if (!edges_.empty()) return windingNumber(x, error, needsAll).value;
+  return std::round(winding_.estimateWithin(x, kTellsWhole, needsAll).value) + 0.0;  // adding 0 turns -0 into 0
 }
 
 WindingSign::Sample WindingSign::sampleAt(const Vector3& x, double clearance, double distance) const {
@@ -132,7 +143,7 @@ WindingSign::Sample WindingSign::sampleAt(const Vector3& x, double clearance, do
   const auto isFarFromLevel = [&](const WindingNumber::Estimate& found) {
     return fromLevel(found) - found.error > kMargin * (gradient.value.norm() + gradient.error) * scale * distance;
   };
-  const WindingNumber::Estimate found = windingNumber(x, isFarFromLevel);
+  const WindingNumber::Estimate found = windingNumber(x, kExact, isFarFromLevel);
   if (!isFarFromLevel(found) && gradient.error > 0) gradient = gradientWithin(kExactChange);
   const bool inside = fromLevel(found) > found.error ? found.value > level_ : winding_.isAbove(x, level_);
   const double toClosingSurface = fromLevel(found) / (gradient.value.norm() * scale);
@@ -194,7 +205,7 @@ bool WindingSign::isFarFromHoles(const Vector3& x, double radius, double distanc
     sample.margin = toHalf(found.value) - found.error;
     return sample.isCertainWithin(radius, farthest);
   };
-  return isCertain(windingNumber(x, isCertain));
+  return isCertain(windingNumber(x, kExact, isCertain));
 }
 
 WindingSign::Sides WindingSign::sidesOf(std::uint32_t slot) const {
@@ -225,7 +236,7 @@ bool WindingSign::isInside(const Vector3& x) const { return sampleAt(x, 0, 0).in
 
 std::int32_t WindingSign::windingAt(const Vector3& x) const {
   const auto isEnough = [](const WindingNumber::Estimate& found) { return toHalf(found.value) > found.error; };
-  return static_cast<std::int32_t>(std::lround(windingNumber(x, isEnough).value + 0.5 - level_));
+  return static_cast<std::int32_t>(std::lround(windingNumber(x, kExact, isEnough).value + 0.5 - level_));
 }
 
 bool WindingSign::isSameSideWithin(const Vector3& x, double radius) const {

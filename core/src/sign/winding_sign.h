@@ -27,6 +27,9 @@ class WindingSign {
   /// the mesh counts as inside.
   WindingSign(const bvh::Hierarchy& hierarchy, const TriangleMesh& mesh, BoundaryEdges edges);
 
+  /// Like the constructor above, but for a mesh whose winding numbers alone are needed (`numberAt`).
+  WindingSign(const bvh::Hierarchy& hierarchy, BoundaryEdges edges);
+
   /// Replaces unsigned distances to the triangles by signed distances. The closer the points lie together,
   /// the fewer winding numbers are computed. The result for a point does not depend on the other points.
   void applyTo(std::span<double> distances, std::span<const Vector3> points) const {
@@ -71,6 +74,10 @@ class WindingSign {
   /// far from them (`isFarFromHoles`).
   std::int32_t windingAt(const Vector3& x) const;
 
+  /// Returns the winding number at x: a whole number for a mesh without holes, and on its surface that of one of the
+  /// two sides. In a mesh with holes the number is wrong by at most `error`. Returns 0 for a point that is not finite.
+  double numberAt(const Vector3& x, double error) const;
+
   /// Returns true if all points within `radius` of x are certainly on the same side (inside or outside) as x, except
   /// points that a triangle separates from x.
   bool isSameSideWithin(const Vector3& x, double radius) const;
@@ -80,7 +87,7 @@ class WindingSign {
  private:
   struct Sample;
   template <typename Enough>
-  WindingNumber::Estimate windingNumber(const Vector3& x, Enough isEnough) const;
+  WindingNumber::Estimate windingNumber(const Vector3& x, double error, Enough isEnough) const;
   Sample sampleOf(const Vector3& x, double distance, const BoundaryEdges::Gradient& gradient) const;
   Sample sampleAt(const Vector3& x, double clearance, double distance) const;
   void applyToBatch(std::span<double> distances, std::span<const Vector3> points, std::span<const double> clearances,
