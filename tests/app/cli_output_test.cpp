@@ -62,6 +62,7 @@ TEST_F(Outputs, outputsThatDoNotFitLeaveOlderFiles) {
       {"bounds", field(), "-o"},
       {"contour", field(), "--tolerance", "5%", "-o"},
       {"export", field(), "--resolution", "9", "-o"},
+      {"sample", "builtin:torus", "-o"},
       {"jumps", field(), "-o"},
       {"slice", field(), "--cpu", "--size", "64x64", "-o"},
       {"render", field(), "--cpu", "--size", "64x64", "-o"},
@@ -71,6 +72,7 @@ TEST_F(Outputs, outputsThatDoNotFitLeaveOlderFiles) {
                                   : words[0] == "export"                        ? "old.cdf"
                                   : words[0] == "slice" || words[0] == "render" ? "old.png"
                                   : words[0] == "jumps"                         ? "old.csv"
+                                  : words[0] == "sample"                        ? "old.npz"
                                                                                 : "old.hpsdf");
     words.push_back(output);
     SCOPED_TRACE(words[0]);

@@ -89,6 +89,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"probe", "probe from=-0.9,0,0.24 to=0.9,0,0.24 samples=50 size=320x240 output=$out/line.png"},
     {"contour", "contour output=$out/surface.ply tolerance=1%"},
     {"export", "export resolution=4 points=100 output=$out/grid.cdf"},
+    {"sample", "sample surface=100 near=100 uniform=100 output=$out/samples.csv"},
     {"show", "show slice; shot output=$out/shot.png"},
     {"camera", "camera 120,10,0.9; shot output=$out/shot.png"},
     {"surface", "surface offset=0.02 clip=z cracks=true; shot output=$out/shot.png"},

@@ -23,6 +23,7 @@ Registry makeRegistry() {
   addWhyCommand(registry);
   addContourCommand(registry);
   addExportCommand(registry);
+  addSampleCommand(registry);
   addExplorerCommands(registry);
   addUiCommand(registry);
   addWindowCommand(registry);

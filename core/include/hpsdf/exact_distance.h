@@ -118,7 +118,7 @@ class ExactDistance {
   /// that of the whole mesh. A point that is not finite has the winding number 0.
   ///
   /// Inside tests other than `winding` and `outerHull` need no winding numbers. With such a test, the first call
-  /// prepares them: from then on, the object holds some 250 bytes more for each triangle, which `bytes` counts.
+  /// prepares them: from then on, the object holds some 200 bytes more for each triangle, which `bytes` counts.
   double windingNumber(const Vector3& x) const;
 
   /// Computes the winding numbers of many points, as `windingNumber` does and with the same results to the bit. Both

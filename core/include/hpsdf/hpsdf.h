@@ -16,6 +16,8 @@
 #include "hpsdf/mesh_repair.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/output/contour.h"
+#include "hpsdf/output/sample_file.h"
+#include "hpsdf/output/sample_points.h"
 #include "hpsdf/range.h"
 #include "hpsdf/safe_distance.h"
 #include "hpsdf/shapes.h"

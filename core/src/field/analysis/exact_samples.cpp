@@ -11,6 +11,7 @@
 #include "hpsdf/detail/random_points.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
+#include "mesh/area_points.h"
 #include "util/chunks.h"
 #include "util/morton_order.h"
 
@@ -94,34 +95,6 @@ std::vector<Box> blocksInBand(const DistanceFunction& distance, const Box& domai
   return inBand;
 }
 
-/// Draws points on a surface, uniformly by area.
-class SurfacePoints {
- public:
-  explicit SurfacePoints(const TriangleMesh& mesh) : mesh_(mesh) {
-    cumulativeAreas_.reserve(mesh.triangles.size());
-    double area = 0;
-    for (const Triangle& triangle : mesh.triangles) {
-      const auto [a, b, c] = cornersOf(mesh, triangle);
-      area += (b - a).cross(c - a).norm() / 2;
-      cumulativeAreas_.push_back(area);
-    }
-    if (!(area > 0)) throw Error("points near the surface: the surface has no area; give a mesh with faces");
-  }
-
-  Vector3 draw(detail::Random& random) const {
-    const auto found =
-        std::upper_bound(cumulativeAreas_.begin(), cumulativeAreas_.end(), random.unit() * cumulativeAreas_.back());
-    const std::size_t triangle = std::min(std::size_t(found - cumulativeAreas_.begin()), cumulativeAreas_.size() - 1);
-    const auto [a, b, c] = cornersOf(mesh_, mesh_.triangles[triangle]);
-    const double side = std::sqrt(random.unit()), along = random.unit();
-    return (1 - side) * a + side * (1 - along) * b + side * along * c;
-  }
-
- private:
-  const TriangleMesh& mesh_;
-  std::vector<double> cumulativeAreas_;  ///< total area of each triangle and all before it
-};
-
 }  // namespace
 
 ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, double band,
@@ -142,7 +115,7 @@ ExactSamples sampleUniform(const DistanceFunction& distance, const Box& domain, 
 }
 
 std::vector<Vector3> sampleSurface(const TriangleMesh& surface, const Box& domain, const SampleOptions& options) {
-  const SurfacePoints surfacePoints(surface);
+  const mesh::AreaPoints surfacePoints(surface);
   return withThreads(options.threads, [&] {
     std::vector<Vector3> points(options.count);
     tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t n) {
@@ -156,7 +129,7 @@ std::vector<Vector3> sampleSurface(const TriangleMesh& surface, const Box& domai
 
 ExactSamples sampleNear(const DistanceFunction& distance, const TriangleMesh& surface, const Box& domain, double radius,
                         const SampleOptions& options, const Progress& progress) {
-  const SurfacePoints points(surface);
+  const mesh::AreaPoints points(surface);
   return withThreads(options.threads, [&] {
     return drawSamples(
         distance, domain, 0, options, progress,

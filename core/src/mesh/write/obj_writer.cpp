@@ -1,19 +1,19 @@
 #include <array>
-#include <charconv>
 #include <cstdint>
+#include <string>
 
 #include "mesh/write/mesh_writer.h"
+#include "util/number_text.h"
 
 namespace hpsdf::mesh {
 namespace {
 
-/// Adds the shortest decimal text from which the same number is read back, after a blank.
-template <typename Number>
-void addDecimal(ByteStream& out, Number number) {
-  std::array<char, 32> digits;
-  digits[0] = ' ';
-  const auto end = std::to_chars(digits.data() + 1, digits.data() + digits.size(), number).ptr;
-  out.add({digits.data(), end});
+/// Returns a line of a word and numbers, without its end.
+template <typename Numbers>
+std::string lineOf(const char* word, const Numbers& numbers) {
+  std::string line = word;
+  for (const auto number : numbers) detail::appendNumber(line += ' ', number);
+  return line;
 }
 
 }  // namespace
@@ -21,26 +21,21 @@ void addDecimal(ByteStream& out, Number number) {
 void writeObj(const TriangleMesh& mesh, const VertexData& data, const WriteBytes& write) {
   ByteStream out(write);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    out.add("v");
-    for (const double x : mesh.vertices[i]) addDecimal(out, x);
+    std::string line = lineOf("v", mesh.vertices[i]);
     // Colours behind the position, 0 to 1, are an extension that MeshLab, Blender and others read.
     if (!data.colors.empty())
-      for (const std::uint8_t channel : data.colors[i]) addDecimal(out, static_cast<float>(channel) / 255);
-    out.add("\n");
+      for (const std::uint8_t channel : data.colors[i]) detail::appendNumber(line += ' ', static_cast<float>(channel) / 255);
+    out.add(line += '\n');
   }
-  for (const Vector3& normal : data.normals) {
-    out.add("vn");
-    for (const double x : normal) addDecimal(out, static_cast<float>(x));
-    out.add("\n");
-  }
+  for (const Vector3& normal : data.normals) out.add(lineOf("vn", std::array{float(normal[0]), float(normal[1]), float(normal[2])}) + '\n');
   for (const Triangle& triangle : mesh.triangles) {
-    out.add("f");
+    std::string line = "f";
     for (const std::uint32_t v : triangle) {
       const std::uint64_t number = std::uint64_t{v} + 1;
-      addDecimal(out, number);
-      if (!data.normals.empty()) out.add("//" + std::to_string(number));
+      detail::appendNumber(line += ' ', number);
+      if (!data.normals.empty()) detail::appendNumber(line += "//", number);
     }
-    out.add("\n");
+    out.add(line += '\n');
   }
   out.finish();
 }
