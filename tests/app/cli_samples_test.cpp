@@ -34,7 +34,8 @@ std::vector<std::vector<double>> rowsOf(const std::string& table) {
 }
 
 std::vector<std::string> withCounts(std::vector<std::string> words) {
-  for (const char* word : {"--surface", "40", "--edge", "30", "--near", "20", "--uniform", "10"}) words.emplace_back(word);
+  for (const char* word : {"--surface", "40", "--edge", "30", "--near", "20", "--uniform", "10"})
+    words.emplace_back(word);
   return words;
 }
 
@@ -62,8 +63,8 @@ TEST_F(Samples, ofAMeshAreItsExactDistances) {
   EXPECT_EQ(json.at("inside"), inside);
 
   const Outcome text = run({withCounts({"sample", "builtin:gear", "-o", at("s.npz"), "--unit-sphere"})});
-  EXPECT_THAT(text.out, AllOf(StartsWith(at("s.npz") + ": 100 points, "), HasSubstr("40 on the surface, 30 on sharp edges"),
-                              HasSubstr("unit sphere")));
+  EXPECT_THAT(text.out, AllOf(StartsWith(at("s.npz") + ": 100 points, "),
+                              HasSubstr("40 on the surface, 30 on sharp edges"), HasSubstr("unit sphere")));
 }
 
 TEST_F(Samples, areTheSameForAnyNumberOfThreads) {
@@ -82,7 +83,8 @@ TEST_F(Samples, ofAFieldAreItsValues) {
   for (const bool withMesh : {false, true}) {
     std::vector<std::string> words = {"sample", field()};
     if (withMesh) words.emplace_back("builtin:torus");
-    for (const char* word : {"--double", "--surface", "50", "--near", "50", "--uniform", "50", "-o"}) words.emplace_back(word);
+    for (const char* word : {"--double", "--surface", "50", "--near", "50", "--uniform", "50", "-o"})
+      words.emplace_back(word);
     words.push_back(at("s.csv"));
     const Outcome outcome = run({words});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
@@ -99,7 +101,8 @@ TEST_F(Samples, ofAFieldAreItsValues) {
 
 TEST_F(Samples, inDeepSdfsLayoutHaveNoSurfacePointsUnlessAskedFor) {
   const auto pointsOf = [&](std::vector<std::string> more) {
-    std::vector<std::string> words = {"sample", "builtin:gear", "-o", at("d.npz"), "--layout", "deepsdf", "--json", "--near", "60"};
+    std::vector<std::string> words = {"sample",  "builtin:gear", "-o",     at("d.npz"), "--layout",
+                                      "deepsdf", "--json",       "--near", "60"};
     words.insert(words.end(), more.begin(), more.end());
     const Outcome outcome = run({words});
     EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -116,7 +119,8 @@ TEST_F(Samples, refuseBadInput) {
   };
   const std::string npz = at("x.npz");
   expectBad({"sample", "builtin:gear", "-o", at("x.txt")}, "samples are written as .npz, .ply or .csv");
-  expectBad({"sample", "builtin:gear", "-o", at("x.ply"), "--layout", "deepsdf"}, "DeepSDF's layout is one of .npz files");
+  expectBad({"sample", "builtin:gear", "-o", at("x.ply"), "--layout", "deepsdf"},
+            "DeepSDF's layout is one of .npz files");
   expectBad({"sample", "builtin:gear", "-o", at("none/x.npz")}, "none/x.npz");
   expectBad({"sample", "builtin:gear"}, "--output is missing");
   expectBad({"sample", "-o", npz}, "source is missing");
@@ -128,7 +132,8 @@ TEST_F(Samples, refuseBadInput) {
     expectBad({"sample", "builtin:gear", "-o", npz, "--widths", widths}, "--widths");
   expectBad({"sample", "builtin:gear", "-o", npz, "--enlargement", "inf"}, "--enlargement");
   expectBad({"sample", "builtin:gear", "-o", npz, "--sharp-angle", "200"}, "--sharp-angle");
-  expectBad({"sample", "builtin:gear", "-o", npz, "--surface", "0", "--near", "0", "--uniform", "0"}, "no points are asked for");
+  expectBad({"sample", "builtin:gear", "-o", npz, "--surface", "0", "--near", "0", "--uniform", "0"},
+            "no points are asked for");
   expectBad({"sample", "builtin:sphere", "-o", npz, "--edge", "5"}, "edge: the surface has no edge");
   expectBad({"sample", "analytic:sphere", "-o", npz}, "an analytic shape has no mesh");
   expectBad({"sample", at("none.obj"), "-o", npz}, "none.obj: no such file");
@@ -181,7 +186,8 @@ TEST_F(Samples, queryTakesPointsBesideAMeshOrAField) {
   EXPECT_EQ(run({{"query", "--closest", "builtin:torus", at("p.txt")}}).out, expected);
   EXPECT_EQ(run({{"query", field(), at("p.txt"), "--closest", "builtin:torus"}}).out, expected);
   EXPECT_EQ(run({{"query", field(), "0.1,0.2,0.3", "--closest", "builtin:torus"}}).out, expected);
-  EXPECT_EQ(run({{"query", "0.1,0.2,0.3", "--closest", "builtin:torus", "-o", at("c.csv")}}).err, at("c.csv") + ": 1 point\n");
+  EXPECT_EQ(run({{"query", "0.1,0.2,0.3", "--closest", "builtin:torus", "-o", at("c.csv")}}).err,
+            at("c.csv") + ": 1 point\n");
   EXPECT_EQ(readFile(at("c.csv")), expected);
   const std::set<std::string> before = {"c.csv", "p.txt"};
   expectRefused({{"query", "--closest", "analytic:torus", "0,0,0"}}, "an analytic shape has no faces", before);

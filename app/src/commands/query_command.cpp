@@ -154,8 +154,8 @@ too.
 --closest asks a mesh instead of a field: for each point, the exact signed distance, the closest point px,py,pz of the
 mesh's triangles, and where it lies. face is the number of the triangle, from 0, in the mesh as it is after its
 clean-up. feature is face, edge or vertex: the edge number k runs from the triangle's corner k to the next one, k is 0 to
-2, and a vertex has its corner's number. b0,b1,b2 are the barycentric coordinates, the weights of the three corners whose
-sum is the point. winding is the generalised winding number: the number of times the mesh surrounds the point. Together
+2, and a vertex has its corner's number. b0,b1,b2 are the barycentric coordinates: the weights with which the triangle's
+corners sum to the closest point. winding is the generalised winding number: the number of times the mesh surrounds the point. Together
 with FIELD, the mesh is taken in the units and with the inside test of the field.)"),
       .examples = {"hpsdf query bunny.hpsdf 0.1,0.2,0.3", "echo 0.1 0.2 0.3 | hpsdf query bunny.hpsdf",
                    "hpsdf query bunny.hpsdf points.csv -o distances.csv",

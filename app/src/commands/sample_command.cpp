@@ -16,6 +16,7 @@
 #include "construction/surface.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/threads.h"
 #include "hpsdf/output/contour.h"
 #include "hpsdf/output/sample_file.h"
 #include "hpsdf/output/sample_points.h"
@@ -192,11 +193,18 @@ void runSample(Session& session, const Arguments& arguments) {
   const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
   const auto start = std::chrono::steady_clock::now();
   MadeSamples made = makeSamples(session, arguments);
-  saveSamples(made.samples, file, sampleFileOptions(arguments));
+  withThreads(arguments.whole("threads"), [&] { saveSamples(made.samples, file, sampleFileOptions(arguments)); });
   made.seconds = secondsSince(start);
   std::ostream& result = session.console().out;
   if (session.wantsJson(arguments)) return printJson(result, samplesJson(made, file));
   result << samplesText(made, file);
+}
+
+/// Returns the parameter `seed`, which all help texts show: two seeds make a training and a test set.
+Parameter seedOfSamples() {
+  Parameter seed = seedParameter("Seed of the random numbers: another seed gives other points.");
+  seed.isAdvanced = false;
+  return seed;
 }
 
 const std::vector<Parameter> kSampleParameters = {
@@ -250,10 +258,9 @@ random order, so that any part of them is a sample, too.
 
 For a field, distances and gradients are the field's, and there are no closest points, faces and normals.
 
-Use it to make training data: distances of a mesh have no wrong signs, for meshes with holes and overlaps too (see sign in
-'hpsdf build --help'), and gradients and normals suit losses that compare slopes. Points depend on the seed only, not on the
-number of threads: two seeds give independent sets for training and for testing. A million points of a mesh of 50,000 faces
-take about half a second on two cores.
+Use it to make training data: signs are right for meshes with holes and overlaps, too, and gradients and normals suit losses
+that compare slopes. Points depend on the seed only, not on the number of threads: two seeds give independent sets for training
+and for testing. A million points of a mesh of 70,000 faces take about half a second on two cores.
 
 docs/samples.md lists the arrays with their shapes and shows how to read them.)"),
       .examples = {"hpsdf sample bunny.obj -o bunny.npz", "hpsdf sample part.stl -o part.npz --edge 100000 --seed 7",
@@ -261,7 +268,7 @@ docs/samples.md lists the arrays with their shapes and shows how to read them.)"
                    "hpsdf sample bunny.hpsdf -o cloud.ply --near 0 --uniform 100000"},
       .parameters = joined({kSampleParameters,
                             under("The surface", insideParameters()),
-                            {seedParameter(), threadsParameter("The file is")}}),
+                            {seedOfSamples(), threadsParameter("The file is")}}),
       .action = runSample,
       .check = checkSample,
   });

@@ -357,11 +357,11 @@ struct ExactDistance::Data {
       return inside.winding;
     // A thread that waits for another one to prepare them helps it. With a mutex it could wait for itself: a thread may
     // run another caller's task while it waits for its own parallel loop.
-    tbb::collaborative_call_once(preparesWinding, [&] {
-      preparedWinding = std::make_unique<const WindingSign>(hierarchy, BoundaryEdges(hierarchy));
-      winding = preparedWinding.get();
+    tbb::collaborative_call_once(preparesWinding_, [&] {
+      preparedWinding_ = std::make_unique<const WindingSign>(hierarchy, BoundaryEdges(hierarchy));
+      winding = preparedWinding_.get();
     });
-    return *preparedWinding;
+    return *preparedWinding_;
   }
 
   Source source;
@@ -371,7 +371,7 @@ struct ExactDistance::Data {
   ChosenInsideTest inside;
   std::optional<distance::ExactLeafSigns> signs;
   std::optional<distance::CandidateSearch> candidates;
-  mutable std::atomic<const WindingSign*> winding = nullptr;  ///< is `preparedWinding` once this is complete
+  mutable std::atomic<const WindingSign*> winding = nullptr;  ///< is `preparedWinding_` once this is complete
 
  private:
   Vector3 normalOfVertex(std::uint32_t vertex) const {
@@ -382,8 +382,8 @@ struct ExactDistance::Data {
                                                                 : Vector3::Zero();
   }
 
-  mutable tbb::collaborative_once_flag preparesWinding;
-  mutable std::unique_ptr<const WindingSign> preparedWinding;
+  mutable tbb::collaborative_once_flag preparesWinding_;
+  mutable std::unique_ptr<const WindingSign> preparedWinding_;
 };
 
 ExactDistance::ExactDistance(const TriangleMesh& mesh, const DistanceOptions& options, const Progress& progress) {

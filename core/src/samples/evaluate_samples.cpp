@@ -1,5 +1,3 @@
-#include "hpsdf/output/sample_points.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
+#include "hpsdf/output/sample_points.h"
 #include "samples/draw_points.h"
 #include "util/chunks.h"
 #include "util/morton_order.h"
