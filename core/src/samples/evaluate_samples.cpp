@@ -26,7 +26,7 @@ void requireInRange(bool isInRange, const char* option, const char* problem) {
   if (!isInRange) throw Error(ErrorKind::option, option, problem);
 }
 
-void check(const SamplePointsOptions& options) {
+void requireSampleOptions(const SamplePointsOptions& options) {
   for (const double width : options.widths)
     requireInRange(std::isfinite(width) && width > 0, "widths", "must be finite numbers above 0");
   requireInRange(options.sharpAngleDegrees >= 0 && options.sharpAngleDegrees <= 180, "sharp angle",
@@ -104,7 +104,7 @@ SamplePoints exactSamples(const TriangleMesh& mesh, const TriangleMesh& surface,
 
 SamplePoints samplePoints(const TriangleMesh& mesh, const ExactDistance& distance, const SamplePointsOptions& options,
                           const Progress& progress) {
-  check(options);
+  requireSampleOptions(options);
   requireValidIndices(mesh);
   if (mesh.triangles.size() != distance.source().faces)
     throw Error(ErrorKind::mesh, mesh.name.empty() ? "mesh" : mesh.name,
@@ -118,7 +118,7 @@ SamplePoints samplePoints(const TriangleMesh& mesh, const ExactDistance& distanc
 
 SamplePoints samplePoints(const TriangleMesh& mesh, const Field& field, const SamplePointsOptions& options,
                           const Progress& progress) {
-  check(options);
+  requireSampleOptions(options);
   requireValidIndices(mesh);
   return withThreads(options.threads, [&] {
     samples::DrawnPoints drawn = samples::drawPoints(mesh, options);
