@@ -302,6 +302,8 @@ TEST(SamplePoints, refuseOptionsOutOfRange) {
   EXPECT_THAT(refusal({.surface = 1'000'000'000'000'000}), testing::HasSubstr("would take some"));
   EXPECT_THAT(refusal({.surface = std::numeric_limits<std::size_t>::max()}),
               testing::HasSubstr("ask for fewer points"));
+  EXPECT_THAT(refusal({.widths = {1e101, 1e308}}), testing::HasSubstr("exceed 1e100"));
+  EXPECT_THAT(refusal({.widths = {1e38, 1e38}, .floatPoints = true}), testing::HasSubstr("exceed the range of floats"));
   EXPECT_THROW(samplePoints(shapes::mesh("gear"), distance), Error) << "another mesh";
   EXPECT_THROW(samplePoints(mesh, distance, {}, {.cancelled = [] { return true; }}), Cancelled);
 }

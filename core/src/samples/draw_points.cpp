@@ -156,7 +156,14 @@ Box uniformBox(const TriangleMesh& surface, double enlargement) {
 }
 
 DrawnPoints drawPoints(const TriangleMesh& surface, const SamplePointsOptions& options) {
-  return KindByKind(surface, options).draw();
+  DrawnPoints drawn = KindByKind(surface, options).draw();
+  const auto isInRange = [](const Vector3& x) { return x.cwiseAbs().maxCoeff() <= kLargestCoordinate; };
+  if (!std::ranges::all_of(drawn.points, isInRange))
+    throw Error(ErrorKind::option, "samples",
+                options.floatPoints
+                    ? "coordinates of points exceed the range of floats; write doubles, or scale the mesh"
+                    : "coordinates of points exceed 1e100; give a smaller width or box");
+  return drawn;
 }
 
 }  // namespace hpsdf::samples

@@ -70,8 +70,8 @@ struct SamplePoints {
 /// gradient is unknown and 0.
 ///
 /// Throws `Error` if an option is out of range, if the mesh has no area or has no sharp edges although edge points are
-/// asked for, if it is not the mesh of the distance, and if the samples do not fit into memory. Throws `Cancelled` when
-/// `progress` says so.
+/// asked for, if it is not the mesh of the distance, if coordinates of points exceed `kLargestCoordinate` or the range
+/// of floats, and if the samples do not fit into memory. Throws `Cancelled` when `progress` says so.
 ///
 /// @code
 /// const TriangleMesh mesh = loadMesh("part.obj");
