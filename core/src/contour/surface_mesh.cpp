@@ -8,18 +8,12 @@
 #include "contour/vertex_placement.h"
 #include "mesh/connectivity.h"
 #include "surface/crossings.h"
+#include "util/single_precision.h"
 
 namespace hpsdf::contouring {
 namespace {
 
 constexpr double kUnknownGap = -1;
-
-/// Returns the single-precision number nearest to x. GCC 12 leaves out conversions to float and back where it handles
-/// two numbers at a time; `volatile` prevents this.
-double inSinglePrecision(double x) {
-  const volatile float single = static_cast<float>(x);
-  return single;
-}
 
 }  // namespace
 
@@ -71,8 +65,7 @@ void SurfaceMesh::placeChangedVertices(const std::optional<Sheets>& before) {
 
 void SurfaceMesh::round(std::vector<Vector3>& vertices) const {
   if (!options_.isSinglePrecision) return;
-  for (Vector3& vertex : vertices)
-    for (double& coordinate : vertex) coordinate = inSinglePrecision(coordinate);
+  for (Vector3& vertex : vertices) vertex = detail::inSinglePrecision(vertex);
 }
 
 const std::vector<double>& SurfaceMesh::findGaps() {

@@ -13,6 +13,7 @@
 #include "mesh/area_points.h"
 #include "mesh/connectivity.h"
 #include "util/number_text.h"
+#include "util/single_precision.h"
 
 namespace hpsdf::samples {
 namespace {
@@ -38,16 +39,6 @@ Vector3 gaussian(Random& random) {
   const auto [x, y] = pair([](double r, double angle) { return std::array{r * std::cos(angle), r * std::sin(angle)}; });
   const double z = pair([](double r, double angle) { return r * std::cos(angle); });
   return {x, y, z};
-}
-
-/// Rounds each coordinate to `float`. The floats go through memory, because GCC 12 removes the two conversions of a
-/// pair of coordinates, from double to float and back, when it vectorizes them.
-Vector3 roundedToFloat(const Vector3& x) {
-  const auto rounded = [](double coordinate) {
-    const volatile float stored = static_cast<float>(coordinate);
-    return static_cast<double>(stored);
-  };
-  return {rounded(x.x()), rounded(x.y()), rounded(x.z())};
 }
 
 /// The sharp edges of a surface, from which points are drawn uniformly by length.
@@ -131,7 +122,7 @@ class KindByKind {
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
       Random random(seed, i);
       const Vector3 point = draw(random, i);
-      drawn_.points[first + i] = options_.floatPoints ? roundedToFloat(point) : point;
+      drawn_.points[first + i] = options_.floatPoints ? detail::inSinglePrecision(point) : point;
     });
   }
 

@@ -24,10 +24,12 @@ void writeObj(const TriangleMesh& mesh, const VertexData& data, const WriteBytes
     std::string line = lineOf("v", mesh.vertices[i]);
     // Colours behind the position, 0 to 1, are an extension that MeshLab, Blender and others read.
     if (!data.colors.empty())
-      for (const std::uint8_t channel : data.colors[i]) detail::appendNumber(line += ' ', static_cast<float>(channel) / 255);
+      for (const std::uint8_t channel : data.colors[i])
+        detail::appendNumber(line += ' ', static_cast<float>(channel) / 255);
     out.add(line += '\n');
   }
-  for (const Vector3& normal : data.normals) out.add(lineOf("vn", std::array{float(normal[0]), float(normal[1]), float(normal[2])}) + '\n');
+  for (const Vector3& normal : data.normals)
+    out.add(lineOf("vn", std::array{float(normal[0]), float(normal[1]), float(normal[2])}) + '\n');
   for (const Triangle& triangle : mesh.triangles) {
     std::string line = "f";
     for (const std::uint32_t v : triangle) {
