@@ -90,6 +90,8 @@ const std::multimap<std::string, std::string> kTrials = {
     {"contour", "contour output=$out/surface.ply tolerance=1%"},
     {"export", "export resolution=4 points=100 output=$out/grid.cdf"},
     {"sample", "sample surface=100 near=100 uniform=100 output=$out/samples.csv"},
+    {"export", "export resolution=4 gradients=true output=$out/grid.vti"},
+    {"export", "export order=3 output=$out/leaves.vtu"},
     {"show", "show slice; shot output=$out/shot.png"},
     {"camera", "camera 120,10,0.9; shot output=$out/shot.png"},
     {"surface", "surface offset=0.02 clip=z cracks=true; shot output=$out/shot.png"},

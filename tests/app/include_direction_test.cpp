@@ -22,7 +22,7 @@ namespace include_direction_test {
 namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
-constexpr std::array<std::string_view, 4> kRooms = {"core", "render", "physics", "app"};
+constexpr std::array<std::string_view, 5> kRooms = {"core", "render", "physics", "openvdb", "app"};
 constexpr std::size_t kMostFilesInFolder = 20;
 constexpr std::size_t kMostFilesInAppItself = 4;
 
@@ -157,7 +157,7 @@ std::set<std::string> quotedWords(const std::string& cell) {
 
 /// Reads table rows of the form "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
 Folders parseFolders(const std::string& design) {
-  static const std::regex row(R"(^\| `((?:core|render|physics|app)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
+  static const std::regex row(R"(^\| `((?:core|render|physics|openvdb|app)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
   Folders folders;
   std::istringstream stream(design);
   std::string line;

@@ -3,6 +3,7 @@
 #include "check/check_command.h"
 #include "compare/compare_command.h"
 #include "explorer/explorer_commands.h"
+#include "export/export_command.h"
 #include "language/help.h"
 #include "pictures/picture_commands.h"
 #include "simulate/simulate_command.h"

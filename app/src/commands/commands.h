@@ -9,7 +9,6 @@ Registry makeRegistry();
 
 // Each of the following functions adds the commands that are defined in the source file of the same name.
 void addContourCommand(Registry& registry);
-void addExportCommand(Registry& registry);
 void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, info, load and save; query too
 void addJumpsCommand(Registry& registry);
 void addProbeCommand(Registry& registry);

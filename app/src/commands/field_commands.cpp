@@ -227,7 +227,7 @@ const Parameter kCompress = {
     "up to half a second, and loading a few milliseconds."};
 
 const std::vector<Parameter> kBuildFiles = {
-    {"mesh", text("MESH").positional(), "Mesh file, builtin:SHAPE or analytic:SHAPE."},
+    {"mesh", text("MESH").positional(), "Mesh file, grid file, builtin:SHAPE or analytic:SHAPE."},
     {"output", outputFile().as('o').requiredOnCommandLine().under(kFiles),
      "File of the field, usually *.hpsdf. With batch it is the folder of the fields, which is created where it does "
      "not exist."},
@@ -242,7 +242,10 @@ void addBuildCommand(Registry& registry) {
       .summary = "Build a field from a mesh or a built-in shape.",
       .help = paragraphs(R"(
 MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), the mesh of a built-in shape (builtin:SHAPE,parameter=value,…) or a
-shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes' lists the shapes.
+shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes' lists the shapes. It may also be a grid of
+distances: a level set of OpenVDB (.vdb), image data of VTK (.vti) or an array of NumPy (.npy, with --spacing). Distances
+between its samples are interpolated tricubically, and a line tells the likely error of that; the field's own error, which
+is measured against the interpolation, comes on top.
 
 Say how exact the field must be with --tolerance: 0.01 in the mesh's units, or 0.02% of its longest side. The error of the
 distance then exceeds it nowhere within --within of the surface; farther away 1 % of the further distance is allowed in

@@ -87,7 +87,7 @@ Normalization toUnitSphere(const TriangleMesh& mesh) {
 MadeSamples samplesOfMesh(const Console& console, const std::string& surface, const Arguments& arguments) {
   return namingSurface(surface, [&] {
     PreparedSurface prepared = prepareSurface(console, surface, false);
-    if (prepared.analytic)
+    if (prepared.function)
       throw Error("an analytic shape has no mesh; give builtin:" + surface.substr(kAnalytic.size()));
     MadeSamples made;
     if (arguments.flag("unit-sphere")) {
@@ -110,7 +110,7 @@ TriangleMesh surfaceOfField(const Console& console, const Field& field, const Ar
     const bool normalizes = !field.metadata().source.normalization.isIdentity();
     return namingSurface(surface, [&] {
       PreparedSurface prepared = prepareSurface(console, surface, normalizes);
-      if (prepared.analytic) throw Error("an analytic shape has no mesh; leave it out");
+      if (prepared.function) throw Error("an analytic shape has no mesh; leave it out");
       return std::move(prepared.mesh);
     });
   }

@@ -66,6 +66,12 @@ const std::vector<Parameter> kInside = {
     {"thickness", number().above(0).in("world units").advanced(),
      "Thickness of the wall that --sign unsigned-shell makes."}};
 
+const std::vector<Parameter> kPlacement = {
+    {"spacing", numbers("H|HX,HY,HZ", {1, 3}).above(0).advanced(),
+     "Distance of the points of a grid of NumPy (.npy), whose file does not tell it; 1 by default."},
+    {"origin", numbers("X,Y,Z", {3}).advanced(),
+     "Position of the first point of a grid of NumPy (.npy); 0,0,0 by default."}};
+
 const Parameter kPaper = {
     "paper", flag().under("The paper's settings"),
     "All of the paper's settings but τ and grid at once: normalize, margin 0.1, cube, nearness 4, max-degree 30, "
@@ -144,6 +150,7 @@ std::vector<Parameter> buildParameters() {
     if (setting.isOffered) parameters.push_back(parameterFrom(setting));
   insertBefore(parameters, "strategy", under(setting_group::kResult, kDomain));
   insertBefore(parameters, "band", under("The surface", kInside));
+  insertBefore(parameters, "band", under("The surface", kPlacement));
   parameters.push_back(kPaper);
   return parameters;
 }
@@ -219,6 +226,19 @@ DistanceOptions distanceOptions(const Arguments& arguments) {
         "certified: nothing is proven where sign pseudonormal is forced upon a mesh: leave out sign; auto takes "
         "pseudonormals wherever they are certain to be right");
   return options;
+}
+
+GridPlacement gridPlacement(const Arguments& arguments) {
+  GridPlacement placement;
+  if (arguments.given("spacing")) {
+    const auto h = arguments.numbers("spacing");
+    placement.spacing = h.size() == 1 ? Vector3::Constant(h[0]) : Vector3(h[0], h[1], h[2]);
+  }
+  if (arguments.given("origin")) {
+    const auto x = arguments.numbers("origin");
+    placement.origin = Vector3(x[0], x[1], x[2]);
+  }
+  return placement;
 }
 
 bool wantsNormalized(const Arguments& arguments) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "construction/grid_surface.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/error.h"
@@ -54,6 +55,9 @@ DistanceOptions insideOptions(const Arguments& arguments);
 
 /// Returns the options of a construction's distance function, among them the method that tells inside from outside.
 DistanceOptions distanceOptions(const Arguments& arguments);
+
+/// Returns where the points of a grid lie, as far as the arguments tell it.
+GridPlacement gridPlacement(const Arguments& arguments);
 
 /// Returns true if the arguments ask for the mesh to be scaled and centred.
 bool wantsNormalized(const Arguments& arguments);

@@ -36,10 +36,12 @@ void noteOtherPrecision(const Console& console, CoefficientType asked, const Fie
                      precisionName(field)));
 }
 
-void refuseInsideTestOfAnalytic(const std::string& surface, const Arguments& arguments) {
-  if (!surface.starts_with(kAnalytic)) return;
+void refuseInsideTestOfFunction(const std::string& surface, const Arguments& arguments) {
+  const bool isGrid = isGridName(surface);
+  if (!surface.starts_with(kAnalytic) && !isGrid) return;
   for (const char* name : {"sign", "thickness", "hull"})
-    if (arguments.given(name)) throw Error(std::string(name) + ": an analytic shape has a sign of its own");
+    if (arguments.given(name))
+      throw Error(fmt::format("{}: {} has a sign of its own", name, isGrid ? "a grid" : "an analytic shape"));
 }
 
 Checkpoint checkpointAt(const Console& console, const std::filesystem::path& file, const Arguments& arguments) {
@@ -77,10 +79,11 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     // Convert the arguments to options first, to find mistakes in the arguments before the long work starts.
     buildOptions(arguments, 1);
     const DistanceOptions insideOptions = distanceOptions(arguments);
-    refuseInsideTestOfAnalytic(surface, arguments);
+    refuseInsideTestOfFunction(surface, arguments);
 
     // Load the surface, check its domain, and warn if the domain cuts the surface off.
-    const PreparedSurface prepared = prepareSurface(console, surface, wantsNormalized(arguments));
+    const PreparedSurface prepared =
+        prepareSurface(console, surface, wantsNormalized(arguments), gridPlacement(arguments));
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
     BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
     withinMemory(arguments, [&] { checkBuild(domain, options); });
@@ -88,7 +91,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     if (options.certified && !isShell && prepared.report && !prepared.report->closed())
       throw Error("certified: the mesh has holes, beside which nothing is proven: close them, or leave certified out");
     warnOfCutSurface(console, box, domain);
-    if (console.listener != nullptr && !prepared.analytic) console.listener->showMesh(prepared.mesh, domain);
+    if (console.listener != nullptr && !prepared.function) console.listener->showMesh(prepared.mesh, domain);
 
     // Set up the exact distance function and measure how long this takes.
     const auto start = std::chrono::steady_clock::now();

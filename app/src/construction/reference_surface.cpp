@@ -85,8 +85,10 @@ bool isMadeFrom(const Source& candidate, const Source& source) {
 
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {
+    if (isGridName(surface))
+      throw Error("a grid has no mesh, at which fields are measured; give the mesh from which the grid was made");
     PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
-    ReferenceSurface reference = prepared.analytic ? analyticReference(*prepared.analytic, surface)
+    ReferenceSurface reference = prepared.function ? analyticReference(*prepared.function, surface)
                                                    : meshReference(console, std::move(prepared), source);
     reference.fieldIsMadeFromIt = isMadeFrom(reference.distance->source(), source);
     return reference;
@@ -107,7 +109,7 @@ MeshDistance meshDistance(const Console& console, const std::string& surface, co
                           const DistanceOptions& options) {
   return namingSurface(surface, [&] {
     PreparedSurface prepared = prepareSurface(console, surface, source && !source->normalization.isIdentity());
-    if (prepared.analytic)
+    if (prepared.function)
       throw Error("an analytic shape has no faces; take builtin:" + surface.substr(kAnalytic.size()));
     auto distance = distanceToMesh(console, surface, prepared, source ? distanceOptions(*source) : options);
     if (source) warnIfForeign(console, surface, distance->source(), *source);
@@ -118,7 +120,7 @@ MeshDistance meshDistance(const Console& console, const std::string& surface, co
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {
     const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
-    if (prepared.analytic) throw Error("an analytic shape has no mesh, and so no defects");
+    if (prepared.function) throw Error("this surface has no mesh, and so no defects");
     requireDistanceMemory(prepared.mesh);
     warnIfForeign(console, surface, {.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source);
     return findDefects(prepared.mesh, withProgress(console, [&](const Progress& progress) {

@@ -56,6 +56,15 @@ struct SharedDistance {
   const TriangleSearch& triangleSearch() const { return exact->triangleSearch(); }
 };
 
+/// Returns the distance of a surface that has no mesh: of an analytic shape or a grid.
+std::optional<DistanceFunction> functionOf(const Console& console, const std::string& surface,
+                                           const GridPlacement& placement) {
+  if (surface.starts_with(kAnalytic)) return shapes::analytic(surface);
+  if (isGridName(surface)) return DistanceFunction(readGridSurface(console, surface, placement));
+  if (placement.isGiven()) throw Error("spacing and origin belong to an array of NumPy (.npy): leave them out");
+  return std::nullopt;
+}
+
 /// Reports which inside test (method to tell inside from outside) was chosen. A closed mesh without self-intersections
 /// needs no report. The position in `choice` is in units of the normalized mesh. Positions in `report` are in units of
 /// the file.
@@ -80,6 +89,9 @@ ImportedMesh importSurface(const Console& console, const std::string& surface) {
   if (surface.starts_with(kAnalytic))
     throw Error(ErrorKind::mesh, surface,
                 "an analytic shape has no mesh; take builtin:" + surface.substr(kAnalytic.size()));
+  if (isGridName(surface))
+    throw Error(ErrorKind::mesh, surface,
+                "a grid has no mesh; 'hpsdf build' makes a field from it, and 'hpsdf contour' a mesh from that");
   if (surface.starts_with(kBuiltin)) {
     TriangleMesh mesh = shapes::mesh(surface);
     const MeshReport report = inspect(mesh);
@@ -88,11 +100,12 @@ ImportedMesh importSurface(const Console& console, const std::string& surface) {
   return readFile(console, surface);
 }
 
-PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes) {
+PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes,
+                               const GridPlacement& placement) {
   PreparedSurface prepared;
-  if (surface.starts_with(kAnalytic)) {
-    prepared.analytic = shapes::analytic(surface);
-    if (normalizes) prepared.analytic = normalizedFunction(*prepared.analytic);
+  prepared.function = functionOf(console, surface, placement);
+  if (prepared.function) {
+    if (normalizes) prepared.function = normalizedFunction(*prepared.function);
     return prepared;
   }
   ImportedMesh imported = importSurface(console, surface);
@@ -132,7 +145,7 @@ std::shared_ptr<const ExactDistance> distanceToMesh(const Console& console, cons
 
 std::shared_ptr<const DistanceFunction> distanceTo(const Console& console, const std::string& surface,
                                                    const PreparedSurface& prepared, const DistanceOptions& options) {
-  if (prepared.analytic) return std::make_shared<const DistanceFunction>(*prepared.analytic);
+  if (prepared.function) return std::make_shared<const DistanceFunction>(*prepared.function);
   return withNormalization(distanceToMesh(console, surface, prepared, options), prepared.normalization);
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "console/console.h"
+#include "construction/grid_surface.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/mesh_report.h"
@@ -22,23 +23,24 @@ constexpr std::string_view kAnalytic = "analytic:";
 bool isShape(std::string_view surface);
 
 /// Reads a mesh file or makes a built-in shape. All commands get their meshes from this function. The console's
-/// `meshReader` reads files that assimp or Draco take part in reading. Throws `Error`, also for an analytic shape, and
-/// `Cancelled` after Ctrl-C.
+/// `meshReader` reads files that assimp or Draco take part in reading. Throws `Error`, also for an analytic shape or a
+/// grid, and `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
-/// A surface in the units of the field: a mesh, or a distance in closed form.
+/// A surface in the units of the field: a mesh, or a distance without one.
 struct PreparedSurface {
-  std::optional<DistanceFunction> analytic;  ///< set for an analytic shape; other surfaces have a mesh
+  std::optional<DistanceFunction> function;  ///< set for an analytic shape or a grid; other surfaces have a mesh
   TriangleMesh mesh;
   std::optional<MeshReport> report;  ///< report on the mesh before normalization
   Normalization normalization;
 
-  Box box() const { return analytic ? analytic->source().box : boundingBox(mesh); }
+  Box box() const { return function ? function->source().box : boundingBox(mesh); }
 };
 
-/// Loads a surface and normalizes it if `normalizes` is true. Throws `Error` if the surface cannot be loaded,
-/// and `Cancelled` after Ctrl-C.
-PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes);
+/// Loads a surface and normalizes it if `normalizes` is true. `placement` tells where the points of a grid lie. Throws
+/// `Error` if the surface cannot be loaded, and `Cancelled` after Ctrl-C.
+PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes,
+                               const GridPlacement& placement = {});
 
 /// Throws `Error` if the exact distance function of the mesh would need more memory than is available.
 void requireDistanceMemory(const TriangleMesh& mesh, InsideTest insideTest = InsideTest::automatic);

@@ -1,34 +1,20 @@
-#!/usr/bin/env python3
-"""Reads the samples that hpsdf writes by NumPy, as a training program would.
+"""Reads the samples that hpsdf writes by NumPy, as a training program would."""
 
-usage: numpy_samples.py HPSDF FOLDER
+from client import Program, module
 
-FOLDER is where the files are written. The exit status is 77 where NumPy is missing, unless CI is set.
-"""
-import os
-import subprocess
-import sys
-
-try:
-    import numpy as np
-except ImportError:
-    print("skipped: NumPy is missing (on Debian: python3-numpy)")
-    sys.exit(1 if os.environ.get("CI") else 77)
-
-PROGRAM, FOLDER = sys.argv[1:3]
+np = module("numpy", "python3-numpy")
+program = Program()
 COUNTS = ["--surface", "3000", "--edge", "1000", "--near", "3000", "--uniform", "2000"]
 TOTAL = 9000
 
 
 def sample(name, *options):
-    file = os.path.join(FOLDER, name)
-    subprocess.run([PROGRAM, "sample", *options, "-o", file], check=True, stdout=subprocess.DEVNULL)
-    return file
+    program.run("sample", *options, "-o", program.at(name))
+    return program.at(name)
 
 
 def check(holds, what):
-    if not holds:
-        sys.exit("failed: " + what)
+    assert holds, what
 
 
 def check_arrays(file, number):

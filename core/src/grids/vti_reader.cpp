@@ -1,0 +1,300 @@
+// Reads image data of VTK. Source: "VTK XML Formats", docs.vtk.org.
+#include <zlib.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "grids/grid_memory.h"
+#include "grids/read_grid.h"
+#include "hpsdf/detail/text.h"
+#include "util/refuse.h"
+
+namespace hpsdf::grids {
+namespace {
+
+/// An XML element's begin: its name, its attributes, and the text that follows it.
+struct Tag {
+  std::string name;
+  std::map<std::string, std::string> attributes;
+  std::string_view rest;
+
+  std::string attribute(const std::string& key) const {
+    const auto found = attributes.find(key);
+    return found == attributes.end() ? "" : found->second;
+  }
+};
+
+std::string_view takeUntil(std::string_view& text, std::string_view ends) {
+  const std::string_view taken = text.substr(0, text.find_first_of(ends));
+  text.remove_prefix(taken.size());
+  return taken;
+}
+
+/// Returns the next element's begin, or one without a name at the end. Comments, declarations and ends are passed over.
+Tag nextTag(std::string_view text) {
+  while (true) {
+    takeUntil(text, "<");
+    if (text.empty()) return {};
+    text.remove_prefix(1);
+    if (text.starts_with('/') || text.starts_with('?') || text.starts_with('!')) continue;
+    Tag tag{std::string(takeUntil(text, " \t\r\n/>")), {}, {}};
+    while (!(text = trimmed(text.substr(0))).empty() && !text.starts_with('>')) {
+      if (text.starts_with('/')) {
+        text.remove_prefix(1);
+        continue;
+      }
+      const std::string key(trimmed(takeUntil(text, "=>")));
+      takeUntil(text, "\"'>");
+      if (text.empty() || text.starts_with('>')) detail::refuse("the attribute ", key, " of ", tag.name, " is damaged");
+      const std::string_view quote = text.substr(0, 1);
+      text.remove_prefix(1);
+      tag.attributes[key] = takeUntil(text, quote);
+      if (!text.empty()) text.remove_prefix(1);
+    }
+    if (!text.empty()) text.remove_prefix(1);
+    tag.rest = text;
+    return tag;
+  }
+}
+
+/// Returns the numbers of an attribute, which must be `count`.
+std::vector<double> numbersOf(std::string_view text, std::size_t count, const std::string& what) {
+  std::vector<double> numbers;
+  while (!(text = trimmed(text)).empty()) {
+    double number = 0;
+    const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || !std::isfinite(number)) break;
+    numbers.push_back(number);
+    text.remove_prefix(std::size_t(rest - text.data()));
+  }
+  if (numbers.size() != count || !text.empty())
+    detail::refuse("the attribute ", what, " does not hold ", count, " numbers");
+  return numbers;
+}
+
+/// Returns the first `count` bytes that a text in base64 stands for, or fewer if it ends before. Padding ends a group
+/// of four letters; further groups may follow.
+std::string decodeBase64(std::string_view text, std::size_t count) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  std::uint32_t group = 0;
+  int letters = 0, padding = 0;
+  for (const char c : text) {
+    if (bytes.size() >= count || c == '<') break;
+    const std::size_t digit = kDigits.find(c);
+    if (digit == std::string_view::npos && c != '=') continue;  // line ends and blanks
+    padding += c == '=' ? 1 : 0;
+    group = group << 6 | std::uint32_t(c == '=' ? 0 : digit);
+    if (++letters < 4) continue;
+    for (int n = 0; n < 3 - padding; ++n) bytes += static_cast<char>(group >> (16 - 8 * n) & 0xff);
+    group = 0;
+    letters = padding = 0;
+  }
+  bytes.resize(std::min(bytes.size(), count));
+  return bytes;
+}
+
+/// How the arrays of a file are stored.
+struct Encoding {
+  bool hasLongHeaders = false;  ///< sizes have 64 bits instead of 32
+  bool isCompressed = false;
+  bool isAppendedRaw = false;  ///< the appended arrays are bytes, not base64
+  std::string_view appended;   ///< what follows the underscore of the appended data
+
+  std::size_t bytesOfSize() const { return hasLongHeaders ? 8 : 4; }
+};
+
+/// An array as it is stored, behind its header.
+class StoredArray {
+ public:
+  StoredArray(std::string_view stored, bool isRaw, const Encoding& encoding)
+      : stored_(stored), isRaw_(isRaw), encoding_(encoding) {}
+
+  /// Returns the array, which must have `size` bytes.
+  std::string bytes(std::size_t size) const {
+    const std::size_t width = encoding_.bytesOfSize();
+    if (!encoding_.isCompressed) {
+      if (sizeAt(first(width), 0) != size) refuseSize();
+      return first(width + size).substr(width);
+    }
+    const std::string start = first(3 * width);
+    const std::uint64_t blocks = sizeAt(start, 0), bytesOfBlock = sizeAt(start, 1), bytesOfLast = sizeAt(start, 2);
+    const bool isPartial = bytesOfLast > 0;
+    if (blocks == 0 || bytesOfBlock == 0 || blocks > size || bytesOfBlock > size + 1 + (std::uint64_t{1} << 30) ||
+        (blocks - (isPartial ? 1 : 0)) * bytesOfBlock + bytesOfLast != size)
+      refuseSize();
+    return decompressed(size, blocks, bytesOfBlock);
+  }
+
+ private:
+  [[noreturn]] static void refuseSize() {
+    detail::refuse("the array of distances does not have as many numbers as the grid has points");
+  }
+
+  /// Returns the first bytes of the stored array.
+  std::string first(std::size_t count) const {
+    std::string bytes = isRaw_ ? std::string(stored_.substr(0, count)) : decodeBase64(stored_, count);
+    if (bytes.size() < count) detail::refuse("the file ends within the array of distances");
+    return bytes;
+  }
+
+  std::uint64_t sizeAt(const std::string& bytes, std::size_t number) const {
+    const char* const at = bytes.data() + number * encoding_.bytesOfSize();
+    return encoding_.hasLongHeaders ? numberAt<std::uint64_t>(at) : numberAt<std::uint32_t>(at);
+  }
+
+  std::string decompressed(std::size_t size, std::uint64_t blocks, std::uint64_t bytesOfBlock) const {
+    const std::size_t headerSize = (3 + blocks) * encoding_.bytesOfSize();
+    const std::string header = first(headerSize);
+    std::uint64_t compressedSize = 0;
+    for (std::uint64_t n = 0; n < blocks; ++n) {
+      const std::uint64_t some = sizeAt(header, 3 + n);
+      if (some > stored_.size()) detail::refuse("the file ends within the array of distances");
+      compressedSize += some;
+    }
+    const std::string all = first(headerSize + compressedSize);
+    std::string bytes(size, '\0');
+    std::size_t from = headerSize, to = 0;
+    for (std::uint64_t n = 0; n < blocks; ++n) {
+      const std::uint64_t some = sizeAt(header, 3 + n);
+      uLongf length = std::min<std::uint64_t>(bytesOfBlock, size - to);
+      const uLongf expected = length;
+      if (uncompress(reinterpret_cast<Bytef*>(bytes.data() + to), &length,
+                     reinterpret_cast<const Bytef*>(all.data() + from), some) != Z_OK ||
+          length != expected)
+        detail::refuse("the compressed array of distances is damaged");
+      from += some;
+      to += expected;
+    }
+    return bytes;
+  }
+
+  std::string_view stored_;
+  bool isRaw_;
+  const Encoding& encoding_;
+};
+
+/// Returns the numbers of an array of text.
+std::vector<double> textNumbers(std::string_view text, std::size_t count) {
+  return numbersOf(takeUntil(text, "<"), count, "of distances (an array of text)");
+}
+
+std::vector<double> numbersFrom(const std::string& bytes, bool isDouble, std::size_t count) {
+  std::vector<double> numbers(count);
+  for (std::size_t n = 0; n < count; ++n)
+    numbers[n] = isDouble ? numberAt<double>(&bytes[8 * n]) : double(numberAt<float>(&bytes[4 * n]));
+  return numbers;
+}
+
+/// Reads the numbers of a data array.
+std::vector<double> readArray(const Tag& array, const Encoding& encoding, std::size_t count) {
+  const std::string type = array.attribute("type"), format = array.attribute("format");
+  if (type != "Float32" && type != "Float64")
+    detail::refuse("the array of distances has the type ", type, "; expected Float32 or Float64");
+  if (format == "ascii") return textNumbers(array.rest, count);
+  const bool isDouble = type == "Float64", isAppended = format == "appended";
+  std::string_view stored = array.rest;
+  if (isAppended) {
+    const double offset = numbersOf(array.attribute("offset"), 1, "offset")[0];
+    if (!(offset >= 0) || offset >= double(encoding.appended.size()))
+      detail::refuse("the array of distances begins behind the end of the file");
+    stored = encoding.appended.substr(std::size_t(offset));
+  }
+  const StoredArray whole(stored, isAppended && encoding.isAppendedRaw, encoding);
+  return numbersFrom(whole.bytes(count * (isDouble ? 8 : 4)), isDouble, count);
+}
+
+/// What the elements of a file tell, before its arrays are read.
+struct ImageDescription {
+  Encoding encoding;
+  RegularGrid grid;
+  std::string scalars;      ///< name of the array of distances, or ""
+  std::vector<Tag> arrays;  ///< of the points
+};
+
+void takeFile(const Tag& tag, ImageDescription& image) {
+  if (tag.attribute("type") != "ImageData")
+    detail::refuse("this is a file of VTK with ", tag.attribute("type"), "; expected ImageData (.vti)");
+  if (tag.attribute("byte_order") == "BigEndian") detail::refuse("the file is big-endian; expected little-endian");
+  const std::string compressor = tag.attribute("compressor");
+  if (!compressor.empty() && compressor != "vtkZLibDataCompressor")
+    detail::refuse("the file is compressed by ", compressor, "; expected vtkZLibDataCompressor, or none");
+  image.encoding.isCompressed = !compressor.empty();
+  image.encoding.hasLongHeaders = tag.attribute("header_type") == "UInt64";
+}
+
+void takeImage(const Tag& tag, ImageDescription& image) {
+  const auto extent = numbersOf(tag.attribute("WholeExtent"), 6, "WholeExtent");
+  const auto origin = numbersOf(tag.attribute("Origin"), 3, "Origin");
+  const auto spacing = numbersOf(tag.attribute("Spacing"), 3, "Spacing");
+  if (const std::string direction = tag.attribute("Direction"); !direction.empty()) {
+    const auto axes = numbersOf(direction, 9, "Direction");
+    if (axes != std::vector<double>{1, 0, 0, 0, 1, 0, 0, 0, 1})
+      detail::refuse("the grid is rotated (Direction); expected one along the axes");
+  }
+  GridLayout& layout = image.grid.layout;
+  Vector3 points;
+  for (int axis = 0; axis < 3; ++axis) {
+    points[axis] = extent[2 * axis + 1] - extent[2 * axis] + 1;
+    layout.spacing[axis] = spacing[axis];
+    layout.origin[axis] = origin[axis] + extent[2 * axis] * spacing[axis];
+  }
+  if (!(points.minCoeff() >= 1)) detail::refuse("the grid has no points (WholeExtent)");
+  requireGridMemory(points[0], points[1], points[2], 3 * sizeof(double));
+  for (int axis = 0; axis < 3; ++axis) layout.points[axis] = std::uint32_t(points[axis]);
+}
+
+/// Reads the elements of a file up to its appended data.
+ImageDescription describe(std::string_view bytes) {
+  ImageDescription image;
+  int pieces = 0;
+  bool isInPoints = false;
+  Tag tag = nextTag(bytes);
+  if (tag.name != "VTKFile") detail::refuse("this is no file of VTK in XML");
+  takeFile(tag, image);
+  for (; !tag.name.empty(); tag = nextTag(tag.rest)) {
+    if (tag.name == "ImageData") takeImage(tag, image);
+    if (tag.name == "Piece") ++pieces;
+    if (tag.name == "PointData") image.scalars = tag.attribute("Scalars");
+    if (tag.name == "PointData" || tag.name == "CellData" || tag.name == "FieldData")
+      isInPoints = tag.name == "PointData";
+    if (tag.name == "DataArray" && isInPoints) image.arrays.push_back(tag);
+    if (tag.name != "AppendedData") continue;
+    image.encoding.isAppendedRaw = tag.attribute("encoding") == "raw";
+    const std::size_t mark = tag.rest.find('_');
+    image.encoding.appended = mark == std::string_view::npos ? "" : tag.rest.substr(mark + 1);
+    break;
+  }
+  if (pieces != 1) detail::refuse("the grid has ", pieces, " pieces; expected one");
+  return image;
+}
+
+/// Returns the array of distances: the scalars or, if the file names none, the only array of single numbers.
+const Tag& distancesOf(const ImageDescription& image) {
+  const Tag* found = nullptr;
+  for (const Tag& array : image.arrays) {
+    const std::string components = array.attribute("NumberOfComponents");
+    if (!components.empty() && components != "1") continue;
+    if (!image.scalars.empty() && array.attribute("Name") != image.scalars) continue;
+    if (found != nullptr) detail::refuse("the points have several arrays, of which none is named as Scalars");
+    found = &array;
+  }
+  if (found == nullptr) detail::refuse("the points of the grid have no array of single numbers");
+  return *found;
+}
+
+}  // namespace
+
+RegularGrid readVti(std::string_view bytes) {
+  ImageDescription image = describe(bytes);
+  image.grid.values = readArray(distancesOf(image), image.encoding, image.grid.layout.count());
+  return std::move(image.grid);
+}
+
+}  // namespace hpsdf::grids
