@@ -119,6 +119,7 @@ TEST_F(Grids, thatAreDamagedOrForeignAreRefused) {
   refused("cut.vti", whole.substr(0, whole.size() / 2), "ends within the array");
   expectRefused({{"build", at("whole.vti"), "-o", at("x.hpsdf"), "--spacing", "2"}}, "leave them out");
   expectRefused({{"build", at("whole.vti"), "-o", at("x.hpsdf"), "--sign", "winding"}}, "a grid has a sign of its own");
+  expectRefused({{"build", at("whole.vti"), "-o", at("x.hpsdf"), "--bounds"}}, "nothing is proven");
   expectRefused({{"mesh", at("whole.vti")}}, "a grid has no mesh");
   expectRefused({{"verify", field(), at("whole.vti")}}, "a grid has no mesh");
 }

@@ -36,12 +36,19 @@ void noteOtherPrecision(const Console& console, CoefficientType asked, const Fie
                      precisionName(field)));
 }
 
-void refuseInsideTestOfFunction(const std::string& surface, const Arguments& arguments) {
+/// Throws `Error` for an option that has a meaning for meshes only, if the surface has none.
+void refuseOptionsOfMeshes(const std::string& surface, const Arguments& arguments) {
   const bool isGrid = isGridName(surface);
   if (!surface.starts_with(kAnalytic) && !isGrid) return;
   for (const char* name : {"sign", "thickness", "hull"})
     if (arguments.given(name))
       throw Error(fmt::format("{}: {} has a sign of its own", name, isGrid ? "a grid" : "an analytic shape"));
+  for (const char* name : {"certified", "bounds"})
+    if (isGrid && arguments.flag(name))
+      throw Error(
+          fmt::format("{}: nothing is proven for the distances of a grid, between whose samples they are "
+                      "interpolated; leave it out",
+                      name));
 }
 
 Checkpoint checkpointAt(const Console& console, const std::filesystem::path& file, const Arguments& arguments) {
@@ -79,7 +86,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     // Convert the arguments to options first, to find mistakes in the arguments before the long work starts.
     buildOptions(arguments, 1);
     const DistanceOptions insideOptions = distanceOptions(arguments);
-    refuseInsideTestOfFunction(surface, arguments);
+    refuseOptionsOfMeshes(surface, arguments);
 
     // Load the surface, check its domain, and warn if the domain cuts the surface off.
     const PreparedSurface prepared =

@@ -243,10 +243,10 @@ void addFieldAndShotCommands(Registry& registry) {
       .summary = "Set how 'rebuild' builds; what is not set is as it was.",
       .help = "The options are those of 'build'. Nothing is built yet; 'load' and 'build' forget them.",
       .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; rebuild"},
-      .parameters =
-          joined({{{"mesh", text("MESH"),
-                    "Mesh file, builtin:SHAPE or analytic:SHAPE; at first what the current field was made from."}},
-                  buildParameters()}),
+      .parameters = joined(
+          {{{"mesh", text("MESH"),
+             "Mesh file, grid file, builtin:SHAPE or analytic:SHAPE; at first what the current field was made from."}},
+           buildParameters()}),
       .action = runSettings,
   });
   registry.addForScripts({

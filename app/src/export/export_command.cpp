@@ -40,7 +40,7 @@ const ExportKind& kindOfOutput(const Arguments& arguments) {
 }
 
 /// Returns the parameters that have an effect on some kinds of files only.
-const std::vector<Parameter>& kindParameters() {
+const std::vector<Parameter>& exportParameters() {
   static const std::vector<Parameter> parameters = {
       {"resolution", wholeNumbers("N|NX,NY,NZ", {1, 3}).within(1, 1e7).under("The grid"),
        "Number of cells of a .cdf, .vti or .npy. One number counts the cells along the longest side of the domain, "
@@ -65,7 +65,7 @@ const std::vector<Parameter>& kindParameters() {
 
 /// Throws `Error` for a parameter that is given and has no effect on files of this kind.
 void requireEffectOnKind(const Arguments& arguments, const ExportKind& kind) {
-  for (const Parameter& parameter : kindParameters())
+  for (const Parameter& parameter : exportParameters())
     if (arguments.given(parameter.name) && std::ranges::find(kind.settings, parameter.name) == kind.settings.end())
       throw Error(fmt::format("{} has no effect on a {} file: leave it out", parameter.name, kind.extension));
 }
@@ -133,7 +133,7 @@ The file appears when it is complete.)"),
       .parameters = joined(
           {{fieldParameter()},
            {{"output", outputFile().as('o').required(), "File to write: *.vti, *.vtu, *.npy, *.vdb, *.nvdb or *.cdf."}},
-           kindParameters(),
+           exportParameters(),
            {threadsParameter("The file is")}}),
       .action = runExport,
       .check = checkExport,

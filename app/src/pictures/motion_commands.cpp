@@ -214,12 +214,12 @@ Legend and scale are those of the finished field in all frames. The surface's di
 the number of steps, once for the frames. In a script the finished field becomes the current one.)"),
       .examples = {"hpsdf frames bunny.obj -o refinement.mp4",
                    "hpsdf frames builtin:gear -o steps --frames 12 --of 'render color=depth size=960x540'"},
-      .parameters =
-          joined({{{"mesh", text("MESH").positional().required(), "Mesh file, builtin:SHAPE or analytic:SHAPE."}},
-                  filmParameters("30", "How many; fewer where the construction has fewer steps."),
-                  {{"of", text("COMMAND").byDefault("slice"),
-                    "What draws each frame: slice or render with options of theirs, as a line of a script."}},
-                  buildParameters()}),
+      .parameters = joined(
+          {{{"mesh", text("MESH").positional().required(), "Mesh file, grid file, builtin:SHAPE or analytic:SHAPE."}},
+           filmParameters("30", "How many; fewer where the construction has fewer steps."),
+           {{"of", text("COMMAND").byDefault("slice"),
+             "What draws each frame: slice or render with options of theirs, as a line of a script."}},
+           buildParameters()}),
       .action = [shared](Session& session, const Arguments& arguments) { runFrames(session, *shared, arguments); },
       .check = [shared](const Arguments& arguments) { checkFrames(*shared, arguments); },
       .drawsOnCpuBy = "--of 'slice cpu'",

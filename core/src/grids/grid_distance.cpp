@@ -239,10 +239,9 @@ GridDistance::GridDistance(const RegularGrid& grid, Source source) {
   samples_ = std::move(samples);
 }
 
-GridDistance::GridDistance(const SampledBlocks& samples, DistanceFunction beyond, Source source)
-    : beyond_(std::move(beyond)) {
+GridDistance::GridDistance(SampledBlocks samples, DistanceFunction beyond, Source source) : beyond_(std::move(beyond)) {
   auto own = std::make_shared<Samples>(samples.origin, samples.spacing);
-  own->fill(samples.blocks);
+  own->fill(std::move(samples.blocks));
   source_ = sourceOf(*own, std::move(source));
   samples_ = std::move(own);
 }

@@ -56,7 +56,7 @@ class GridDistance {
 
   /// Takes samples near a surface, and the distance `beyond` for points with fewer than 4 × 4 × 4 samples around them.
   /// Throws `Error` if there is no surface.
-  GridDistance(const SampledBlocks& samples, DistanceFunction beyond, Source source = {});
+  GridDistance(SampledBlocks samples, DistanceFunction beyond, Source source = {});
 
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
   bool hasGradients() const;
