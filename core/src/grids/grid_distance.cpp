@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kBlock = SampledBlocks::kSize;
 constexpr double kNearSpacings = 3;  ///< samples at most so many spacings from the surface are near it
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoSample = std::numeric_limits<double>::quiet_NaN();
 
 using SampleIndex = std::array<std::int32_t, 3>;
 
@@ -72,7 +72,7 @@ struct GridDistance::Samples {
   /// Returns a sample, or NaN if there is none.
   double at(const SampleIndex& index) const {
     const SampledBlocks::Block* const block = blockAt(blockOf(index));
-    return block == nullptr ? kNone : block->values[numberInBlock(index)];
+    return block == nullptr ? kNoSample : block->values[numberInBlock(index)];
   }
 
   /// Copies the 4³ samples from `first` on. Returns false if one of them is missing.
@@ -132,7 +132,35 @@ struct GridDistance::Samples {
     return true;
   }
 
+  /// Evaluates the distance and, if it is asked for, its gradient at a point in world units, or returns false.
+  template <bool WithGradient>
+  bool evaluate(const Vector3& point, double& value, Vector3& gradient) const {
+    constexpr double kMostIndex = 1 << 23;  // `keyOf` holds the indices of blocks below it
+    const Vector3 wanted = (point - origin).cwiseQuotient(spacing), x = clamped(wanted);
+    if (!x.allFinite() || !(x.cwiseAbs().maxCoeff() < kMostIndex)) return false;
+    if (!interpolate<WithGradient>(x, value, gradient)) return false;
+    gradient = gradient.cwiseQuotient(spacing);
+    continueBeyond((wanted - x).cwiseProduct(spacing), value, gradient);
+    return true;
+  }
+
  private:
+  /// Returns the closest point of the box of a grid that fills one, in units of samples.
+  Vector3 clamped(Vector3 x) const {
+    if (points)
+      for (int axis = 0; axis < 3; ++axis) x[axis] = std::clamp(x[axis], 0.0, double((*points)[axis] - 1));
+    return x;
+  }
+
+  /// Continues a distance from the closest point of the box to a point at `offset` from it.
+  static void continueBeyond(const Vector3& offset, double& value, Vector3& gradient) {
+    if (offset.isZero(0)) return;
+    value += offset.norm();
+    for (int axis = 0; axis < 3; ++axis)
+      if (offset[axis] != 0) gradient[axis] = 0;
+    gradient += offset.normalized();
+  }
+
   /// Packs the index of a block, of which 21 bits along each axis suffice for 24-bit indices of samples.
   static std::uint64_t keyOf(const SampleIndex& block) {
     std::uint64_t key = 0;
@@ -155,7 +183,7 @@ std::vector<SampledBlocks::Block> blocksOf(const RegularGrid& grid) {
     SampledBlocks::Block& block = blocks[n];
     const auto number = std::int32_t(n);
     block.index = {number % counts[0], number / counts[0] % counts[1], number / counts[0] / counts[1]};
-    block.values.fill(kNone);
+    block.values.fill(kNoSample);
     const auto end = [&](int axis) { return std::min(std::int32_t(points[axis]), kBlock * (block.index[axis] + 1)); };
     for (std::int32_t z = kBlock * block.index[2]; z < end(2); ++z)
       for (std::int32_t y = kBlock * block.index[1]; y < end(1); ++y)
@@ -227,6 +255,21 @@ Source sourceOf(const GridDistance::Samples& samples, Source source) {
   return source;
 }
 
+/// Asks the other distance for all points without samples at once. Without another distance, they get NaN.
+template <bool WithGradients>
+void evaluateBeyond(const std::optional<DistanceFunction>& beyond, std::span<const Vector3> points,
+                    std::span<const std::size_t> missing, std::span<double> out, std::span<Vector3> gradients) {
+  std::vector<Vector3> others(missing.size()), otherGradients(missing.size(), Vector3::Constant(kNoSample));
+  std::vector<double> values(missing.size(), kNoSample);
+  for (std::size_t n = 0; n < missing.size(); ++n) others[n] = points[missing[n]];
+  if (beyond && WithGradients) beyond->withGradients(others, values, otherGradients);
+  if (beyond && !WithGradients) (*beyond)(others, values);
+  for (std::size_t n = 0; n < missing.size(); ++n) {
+    out[missing[n]] = values[n];
+    if constexpr (WithGradients) gradients[missing[n]] = otherGradients[n];
+  }
+}
+
 }  // namespace
 
 GridDistance::GridDistance(const RegularGrid& grid, Source source) {
@@ -250,41 +293,12 @@ template <bool WithGradients>
 void GridDistance::evaluate(std::span<const Vector3> points, std::span<double> out,
                             std::span<Vector3> gradients) const {
   std::vector<std::size_t> missing;
+  Vector3 gradient = Vector3::Zero();
   for (std::size_t n = 0; n < points.size(); ++n) {
-    Vector3 x = (points[n] - samples_->origin).cwiseQuotient(samples_->spacing), gradient;
-    const Vector3 wanted = x;
-    if (samples_->points)
-      for (int axis = 0; axis < 3; ++axis) x[axis] = std::clamp(x[axis], 0.0, double((*samples_->points)[axis] - 1));
-    const bool isInRange = x.allFinite() && x.cwiseAbs().maxCoeff() < double(1 << 23);
-    if (!isInRange || !samples_->interpolate<WithGradients>(x, out[n], gradient)) {
-      missing.push_back(n);
-      continue;
-    }
-    gradient = gradient.cwiseQuotient(samples_->spacing);
-    if (const Vector3 offset = (wanted - x).cwiseProduct(samples_->spacing); !offset.isZero(0)) {
-      out[n] += offset.norm();
-      for (int axis = 0; axis < 3; ++axis)
-        if (offset[axis] != 0) gradient[axis] = 0;
-      gradient += offset.normalized();
-    }
+    if (!samples_->evaluate<WithGradients>(points[n], out[n], gradient)) missing.push_back(n);
     if constexpr (WithGradients) gradients[n] = gradient;
   }
-  if (missing.empty()) return;
-
-  // Ask the other distance for all points without samples at once.
-  std::vector<Vector3> others(missing.size()), otherGradients(missing.size(), Vector3::Constant(kNone));
-  std::vector<double> values(missing.size(), kNone);
-  for (std::size_t n = 0; n < missing.size(); ++n) others[n] = points[missing[n]];
-  if (beyond_) {
-    if constexpr (WithGradients)
-      beyond_->withGradients(others, values, otherGradients);
-    else
-      (*beyond_)(others, values);
-  }
-  for (std::size_t n = 0; n < missing.size(); ++n) {
-    out[missing[n]] = values[n];
-    if constexpr (WithGradients) gradients[missing[n]] = otherGradients[n];
-  }
+  if (!missing.empty()) evaluateBeyond<WithGradients>(beyond_, points, missing, out, gradients);
 }
 
 void GridDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {
@@ -309,7 +323,7 @@ InterpolationError GridDistance::interpolationError() const {
   detail::Sums sums;
   visitSamples(samples_->blocks, [&](const SampleIndex& index, double value) {
     if (std::abs(value) > near) return;
-    double greatest = kNone;
+    double greatest = kNoSample;
     for (int axis = 0; axis < 3; ++axis) {
       const auto at = [&](int steps) {
         SampleIndex other = index;
