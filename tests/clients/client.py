@@ -48,6 +48,12 @@ class Program:
         self.run("export", self.at("torus.hpsdf"), "-o", self.at(name), *options)
         return self.at(name)
 
+    def build(self, name, *options):
+        """Builds a field from a grid and checks that it is that of the torus."""
+        self.run("build", self.at(name), "-o", self.at("again.hpsdf"), "--target-error", "1e-5", *options)
+        points = [[0.7, 0.1, 0.2], [-0.5, 0.4, 0.1], [0.0, -0.9, -0.05], [0.1, 0.65, -0.2]]
+        check_near(self.values(points, "again.hpsdf"), [distance(*p) for p in points], 0.01, f"field from {name}")
+
     def values(self, points, field="torus.hpsdf"):
         """Returns the field's values at points."""
         lines = "\n".join(" ".join(repr(float(x)) for x in point) for point in points)

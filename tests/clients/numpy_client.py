@@ -1,4 +1,4 @@
-"""NumPy reads .npy: shape, type, values and gradients."""
+"""NumPy reads .npy: shape, type, values and gradients; and fields are built from the arrays that NumPy writes."""
 
 import json
 
@@ -24,3 +24,9 @@ def check(program, options, shape, number_type, tolerance):
 program = Program()
 check(program, ["--resolution", "20,21,22"], (23, 22, 21), numpy.float32, 1e-6)
 check(program, ["--resolution", "20,21,22", "--gradients", "--double"], (23, 22, 21, 4), numpy.float64, 1e-14)
+
+x, y, z = numpy.meshgrid(*3 * [numpy.linspace(-1.1, 1.1, 56)], indexing="ij")
+torus = numpy.sqrt((numpy.sqrt(x * x + y * y) - 0.7) ** 2 + z * z) - 0.25
+for array in (torus.T, torus.T.astype(numpy.float32), numpy.asfortranarray(torus.T)):
+    numpy.save(program.at("written.npy"), array)
+    program.build("written.npy", "--spacing", "0.04", "--origin=-1.1,-1.1,-1.1")

@@ -46,3 +46,10 @@ assert printed.returncode == 0 and "level set" in printed.stdout, printed.stdout
 first = open(file, "rb").read()
 again = program.export("again.vdb", "--voxel", str(VOXEL), "--band", str(BAND), "--threads", "1")
 assert open(again, "rb").read() == first
+
+# Fields are built from what OpenVDB writes, too: a level set of a mesh.
+vertices, quads = grid.convertToQuads()
+written = vdb.FloatGrid.createLevelSetFromPolygons(vertices, quads=quads, transform=grid.transform, halfWidth=3)
+written.name = "written"
+vdb.write(program.at("written.vdb"), grids=[written])
+program.build("written.vdb")

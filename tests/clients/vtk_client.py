@@ -1,5 +1,6 @@
-"""VTK reads .vti and .vtu: values, gradients, data of the leaves, polynomials of higher order, a contour. Runs by python3
-with the package python3-vtk9, and by pvpython of the package paraview, whose modules are the same."""
+"""VTK reads .vti and .vtu: values, gradients, data of the leaves, polynomials of higher order, a contour; and fields are
+built from the .vti that VTK writes. Runs by python3 with the package python3-vtk9, and by pvpython of the package paraview,
+whose modules are the same."""
 
 import random
 
@@ -68,8 +69,29 @@ def check_lagrange_cells(program):
     check_near(values, program.values(positions), 1e-12, "Lagrange cells")
 
 
+def check_files_of_vtk(program):
+    """VTK writes the grid again, in each of its encodings."""
+    image = read(io.vtkXMLImageDataReader(), program.export("torus.vti", "--resolution", "32"))
+    for mode in ("Ascii", "Binary", "Appended"):
+        for compressor in ("None", "ZLib"):
+            for is_base64 in (True, False):
+                writer = io.vtkXMLImageDataWriter()
+                writer.SetInputData(image)
+                writer.SetFileName(program.at("written.vti"))
+                getattr(writer, f"SetDataModeTo{mode}")()
+                getattr(writer, f"SetCompressorTypeTo{compressor}")()
+                writer.SetEncodeAppendedData(is_base64)
+                if is_base64:
+                    writer.SetHeaderTypeToUInt64()
+                else:
+                    writer.SetHeaderTypeToUInt32()
+                assert writer.Write() == 1
+                program.build("written.vti")
+
+
 program = Program()
 check_image(program, [], 1e-6)
 check_image(program, ["--double"], 1e-14)
 check_leaves(program)
 check_lagrange_cells(program)
+check_files_of_vtk(program)
