@@ -78,17 +78,27 @@ std::vector<double> numbersOf(std::string_view text, std::size_t count, const st
   return numbers;
 }
 
+/// Returns the numbers that the letters of base64 stand for, and −1 for all other bytes.
+std::array<std::int8_t, 256> base64Digits() {
+  constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::array<std::int8_t, 256> digits;
+  digits.fill(-1);
+  for (std::size_t n = 0; n < kLetters.size(); ++n)
+    digits[static_cast<unsigned char>(kLetters[n])] = static_cast<std::int8_t>(n);
+  return digits;
+}
+
 /// Returns the first `count` bytes that a text in base64 stands for, or fewer if it ends before. Padding ends a group
 /// of four letters; further groups may follow.
 std::string decodeBase64(std::string_view text, std::size_t count) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  static const std::array<std::int8_t, 256> digits = base64Digits();
   std::string bytes;
   std::uint32_t group = 0;
   int letters = 0, padding = 0;
   for (const char c : text) {
     if (bytes.size() >= count || c == '<') break;
-    const std::size_t digit = kDigits.find(c);
-    if (digit == std::string_view::npos && c != '=') continue;  // line ends and blanks
+    const std::int8_t digit = digits[static_cast<unsigned char>(c)];
+    if (digit < 0 && c != '=') continue;  // line ends and blanks
     padding += c == '=' ? 1 : 0;
     group = group << 6 | std::uint32_t(c == '=' ? 0 : digit);
     if (++letters < 4) continue;
