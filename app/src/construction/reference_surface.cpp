@@ -120,7 +120,9 @@ MeshDistance meshDistance(const Console& console, const std::string& surface, co
 MeshDefects meshDefects(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {
     const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
-    if (prepared.function) throw Error("this surface has no mesh, and so no defects");
+    if (prepared.function)
+      throw Error(
+          fmt::format("{} has no mesh, and so no defects", isGridName(surface) ? "a grid" : "an analytic shape"));
     requireDistanceMemory(prepared.mesh);
     warnIfForeign(console, surface, {.name = prepared.mesh.name, .fingerprint = fingerprint(prepared.mesh)}, source);
     return findDefects(prepared.mesh, withProgress(console, [&](const Progress& progress) {
