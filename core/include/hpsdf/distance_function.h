@@ -34,6 +34,15 @@ struct InsideTestChoice {
   std::optional<Vector3> position = {};  ///< a position on the mesh that shows the reason, if there is one
 };
 
+/// Tells which values of a signed distance are exact: which are the distance to the surface on which the values are 0.
+/// The magnitudes of all others are lower bounds of this distance.
+enum class Exactness : std::uint8_t {
+  everywhere,
+  outside,  ///< the values above 0
+  inside,   ///< the values below 0
+  nowhere,
+};
+
 /// A description of where a signed distance comes from. It is stored with each field that is built from this
 /// distance.
 struct Source {
@@ -45,6 +54,8 @@ struct Source {
   Normalization normalization = {};               ///< transform from the mesh's own units to world units
   InsideTest insideTest = InsideTest::automatic;  ///< the test that was chosen; `automatic` if unknown
   double thickness = 0;                           ///< thickness of a shell, in world units
+  /// Of a combination of solids (`CombinedDistance`): which of its values are exact. Empty for other distances.
+  std::optional<Exactness> exactness = {};
 };
 
 /// A signed distance Φ of any kind, negative inside, evaluated in batches of points.

@@ -5,6 +5,8 @@
 #include "hpsdf/build.h"
 #include "hpsdf/build_options.h"
 #include "hpsdf/cell_history.h"
+#include "hpsdf/combine/combined_distance.h"
+#include "hpsdf/combine/expression.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/error.h"

@@ -29,8 +29,9 @@ constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
 // and criteria; version 4 the inside test; version 8 exact leaves, the tolerance, the measurement and
 // the settings that a replay of the construction needs; version 9 quantized coefficients; version 10 their shifts and
-// wide leaves. Versions 5 to 7 were never released.
-constexpr std::uint32_t kFieldVersion = 10, kQuantizedVersion = 9, kExactLeavesVersion = 8;
+// wide leaves; version 11 the exactness of a combination, which other fields do not have, so that they are written as
+// version 10. Versions 5 to 7 were never released.
+constexpr std::uint32_t kFieldVersion = 11, kPlainVersion = 10, kQuantizedVersion = 9, kExactLeavesVersion = 8;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 // Set in the version of a file whose arrays are compressed.
 constexpr std::uint32_t kCompressed = std::uint32_t{1} << 31;
@@ -130,6 +131,15 @@ void measurementItem(Stream& stream, Optional& measurement) {
   if constexpr (!std::is_const_v<Optional>) measurement = m;
 }
 
+/// Writes or reads the exactness of a combination. `Optional` is const for writing.
+template <typename Stream, typename Optional>
+void exactnessItem(Stream& stream, Optional& exactness) {
+  auto stored = static_cast<std::uint8_t>(exactness.value_or(Exactness::nowhere));
+  stream.item(stored);
+  stream.require(stored <= static_cast<std::uint8_t>(Exactness::nowhere), "its exactness is unknown");
+  if constexpr (!std::is_const_v<Optional>) exactness = static_cast<Exactness>(stored);
+}
+
 /// Writes or reads every scalar of the file after its magic bytes and version, in order. `Data` is const for
 /// writing.
 template <typename Stream, typename Data, typename SizesRef>
@@ -176,6 +186,7 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(sizes.lists);
   stream.item(data.exact.offset);
   measurementItem(stream, m.measurement);
+  if (version >= kFieldVersion) exactnessItem(stream, m.source.exactness);
   if (version < kQuantizedVersion || sizes.coefficientBytes != kQuantized) return;
   stream.item(sizes.step);
   stream.item(sizes.meanBits);
@@ -252,9 +263,10 @@ Start readStart(detail::CheckedReader& reader) {
 void save(const Field& field, const std::filesystem::path& file, const SaveOptions& options) {
   const FieldData& data = field.data();
   detail::CheckedWriter writer(file);
-  writer.begin(kFieldMagic, options.compress ? kFieldVersion | kCompressed : kFieldVersion);
+  const std::uint32_t version = data.metadata.source.exactness ? kFieldVersion : kPlainVersion;
+  writer.begin(kFieldMagic, options.compress ? version | kCompressed : version);
   const FieldSizes sizes = sizesOf(data);
-  header(writer, data, sizes, kFieldVersion);
+  header(writer, data, sizes, version);
   if (options.compress)
     writeCompressed(writer, data);
   else

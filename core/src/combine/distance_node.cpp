@@ -1,0 +1,367 @@
+#include "combine/distance_node.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace hpsdf::combine {
+namespace {
+
+Box widened(const Box& box, double by) {
+  if (box.isEmpty()) return box;
+  return Box(Vector3(box.min().array() - by), Vector3(box.max().array() + by));
+}
+
+/// Buffers for the samples of an operand.
+class Buffer {
+ public:
+  /// Evaluates a node at points, with gradients if `like` has them.
+  Samples evaluate(const DistanceNode& node, std::span<const Vector3> points, const Samples& like) {
+    values_.resize(points.size());
+    if (like.hasGradients()) gradients_.resize(points.size());
+    const Samples samples{values_, gradients_};
+    node.evaluate(points, samples);
+    return samples;
+  }
+
+ private:
+  std::vector<double> values_;
+  std::vector<Vector3> gradients_;
+};
+
+class MeshNode final : public DistanceNode {
+ public:
+  explicit MeshNode(std::shared_ptr<const ExactDistance> distance) : distance_(std::move(distance)) {
+    box = distance_->source().box;
+    hasGradients = distance_->hasGradients();
+    bytes = distance_->bytes();
+    const InsideTest test = distance_->insideTestChoice().insideTest;
+    exactSides.outside = test == InsideTest::shell || hasGradients;
+    exactSides.inside = test == InsideTest::pseudonormal;
+    if (test == InsideTest::shell) box = widened(box, distance_->source().thickness / 2);
+  }
+
+  void evaluate(std::span<const Vector3> points, const Samples& out) const override {
+    if (out.hasGradients())
+      distance_->withGradients(points, out.values, out.gradients);
+    else
+      (*distance_)(points, out.values);
+  }
+
+ private:
+  std::shared_ptr<const ExactDistance> distance_;
+};
+
+class BooleanNode final : public DistanceNode {
+ public:
+  /// The triangles of the boundary have no common vertices, so that pseudonormals give no sign there. The inside test by
+  /// pseudonormals is taken because it costs least; only magnitudes are taken from this distance.
+  BooleanNode(std::vector<MeshSolid> solids, BooleanTree tree, const TriangleMesh& boundary)
+      : solids_(std::move(solids)),
+        tree_(std::move(tree)),
+        boundary_(boundary, {.insideTest = InsideTest::pseudonormal}) {
+    box = boundary_.source().box;
+    exactSides = {true, true};
+    hasGradients = true;
+    bytes = boundary_.bytes();
+    for (const MeshSolid& solid : solids_) bytes += solid.distance->bytes();
+  }
+
+  void evaluate(std::span<const Vector3> points, const Samples& out) const override {
+    if (out.hasGradients())
+      boundary_.withGradients(points, out.values, out.gradients);
+    else
+      boundary_(points, out.values);
+    std::vector<double> magnitudes(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) magnitudes[i] = std::abs(out.values[i]);
+    const std::vector<char> inside = insideAt(points, magnitudes);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double value = inside[i] != 0 ? -magnitudes[i] : magnitudes[i];
+      // The gradient's sign follows from that of the value for which it was computed.
+      if (out.hasGradients() && std::signbit(value) != std::signbit(out.values[i])) out.gradients[i] = -out.gradients[i];
+      out.values[i] = value + 0.0;  // adding 0 turns -0 into 0
+    }
+  }
+
+ private:
+  /// Returns whether each point is inside. Signs are asked of the solids only at few points: the ball around a point that
+  /// just touches the boundary lies on one side.
+  std::vector<char> insideAt(std::span<const Vector3> points, std::span<const double> magnitudes) const {
+    constexpr double kShare = 0.999;  // of the radius, which leaves room for rounding
+    std::vector<std::size_t> sampleOf(points.size());
+    std::vector<std::size_t> samples;
+    const auto covers = [&](std::size_t sample, std::size_t i) {
+      return (points[i] - points[samples[sample]]).norm() < kShare * magnitudes[samples[sample]];
+    };
+    if (!points.empty())
+      samples.push_back(static_cast<std::size_t>(std::ranges::max_element(magnitudes) - magnitudes.begin()));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::size_t last = samples.size() - 1;
+      sampleOf[i] = covers(0, i) ? 0 : last;
+      if (sampleOf[i] == last && !covers(last, i) && i != samples[last]) {
+        sampleOf[i] = samples.size();
+        samples.push_back(i);
+      }
+    }
+    const std::vector<char> insideOfSamples = insideAtSamples(points, samples);
+    std::vector<char> inside(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) inside[i] = insideOfSamples[sampleOf[i]];
+    return inside;
+  }
+
+  std::vector<char> insideAtSamples(std::span<const Vector3> points, const std::vector<std::size_t>& samples) const {
+    std::vector<Vector3> places;
+    for (const std::size_t sample : samples) places.push_back(points[sample]);
+    std::vector<std::vector<double>> distances;
+    for (const MeshSolid& solid : solids_) (*solid.distance)(places, distances.emplace_back(places.size()));
+    std::vector<char> inside(places.size());
+    for (std::size_t i = 0; i < places.size(); ++i)
+      inside[i] = tree_.contains([&](std::uint32_t solid) { return distances[solid][i] < 0; });
+    return inside;
+  }
+
+  std::vector<MeshSolid> solids_;
+  BooleanTree tree_;
+  ExactDistance boundary_;
+};
+
+/// A node whose operand is placed by a similarity.
+class PlacedNode : public DistanceNode {
+ public:
+  explicit PlacedNode(const Similarity& placement) : placement_(placement) {}
+
+  void evaluate(std::span<const Vector3> points, const Samples& out) const final {
+    std::vector<Vector3> local(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) local[i] = placement_.inverse(points[i]);
+    evaluateLocally(local, out);
+    for (double& value : out.values) value *= placement_.scale;
+    for (Vector3& gradient : out.gradients) gradient = placement_.rotation * gradient;
+  }
+
+ private:
+  virtual void evaluateLocally(std::span<const Vector3> points, const Samples& out) const = 0;
+
+  Similarity placement_;
+};
+
+class FieldNode final : public PlacedNode {
+ public:
+  FieldNode(std::shared_ptr<const Field> field, const Similarity& placement)
+      : PlacedNode(placement), field_(std::move(field)) {
+    const Box& surface = field_->metadata().source.box;
+    const bool isKnown = !surface.isEmpty() && surface.sizes().allFinite();
+    box = transformed(isKnown ? Box(surface.intersection(field_->domain())) : field_->domain(), placement);
+    hasGradients = true;
+    bytes = field_->bytes();
+  }
+
+ private:
+  void evaluateLocally(std::span<const Vector3> points, const Samples& out) const override {
+    const Box& domain = field_->domain();
+    std::vector<Vector3> nearest(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+      nearest[i] = points[i].cwiseMax(domain.min()).cwiseMin(domain.max());
+    if (out.hasGradients()) {
+      std::vector<ValueAndGradient> found(points.size());
+      field_->valuesAndGradients(nearest, found);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        out.values[i] = found[i].value;
+        out.gradients[i] = found[i].gradient;
+      }
+    } else {
+      field_->values(nearest, out.values);
+    }
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (points[i] != nearest[i]) continueOutside(points[i] - nearest[i], out, i);
+  }
+
+  /// Turns a sample at the domain's nearest point into one at a point farther outside: a bound of the distance to a
+  /// surface that lies in the domain. Where the solid reaches the domain's wall, it ends there.
+  static void continueOutside(const Vector3& away, const Samples& out, std::size_t i) {
+    const double distance = away.norm(), value = out.values[i];
+    const double continued = value >= 0 ? std::hypot(distance, value) : distance + value;
+    out.values[i] = continued;
+    if (!out.hasGradients()) return;
+    Vector3& gradient = out.gradients[i];
+    for (int axis = 0; axis < 3; ++axis)
+      if (away[axis] != 0) gradient[axis] = 0;
+    gradient = value >= 0 ? Vector3((away + value * gradient) / continued) : Vector3(away / distance + gradient);
+  }
+
+  std::shared_ptr<const Field> field_;
+};
+
+class FunctionNode final : public PlacedNode {
+ public:
+  FunctionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement)
+      : PlacedNode(placement), function_(std::move(function)) {
+    const Source& source = function_->source();
+    const Exactness exactness = source.exactness.value_or(Exactness::everywhere);
+    exactSides.outside = exactness == Exactness::everywhere || exactness == Exactness::outside;
+    exactSides.inside = exactness == Exactness::everywhere || exactness == Exactness::inside;
+    box = transformed(source.box, placement);
+    hasGradients = function_->hasGradients();
+    bytes = function_->bytes();
+  }
+
+ private:
+  void evaluateLocally(std::span<const Vector3> points, const Samples& out) const override {
+    if (out.hasGradients())
+      function_->withGradients(points, out.values, out.gradients);
+    else
+      (*function_)(points, out.values);
+  }
+
+  std::shared_ptr<const DistanceFunction> function_;
+};
+
+/// Combines the values of operands two at a time, from the first to the last.
+///
+/// All are forms of the union s·min(s·a, t·b), where s and t are 1 or −1: the intersection has s = t = −1, and the
+/// difference s = −1, t = 1. The smooth union is that of Quilez, "smooth minimum" (2013, quadratic): its gradient is a
+/// mean of the gradients of a and b, with weights that add up to 1.
+class FoldNode final : public DistanceNode {
+ public:
+  FoldNode(std::vector<NodePtr> operands, double radius, double sign, double signOfOthers)
+      : operands_(std::move(operands)), radius_(radius), sign_(sign), signOfOthers_(signOfOthers) {
+    hasGradients = std::ranges::all_of(operands_, [](const NodePtr& node) { return node->hasGradients; });
+    for (const NodePtr& node : operands_) bytes += node->bytes;
+  }
+
+  const std::vector<NodePtr>& operands() const { return operands_; }
+
+  void evaluate(std::span<const Vector3> points, const Samples& out) const override {
+    operands_[0]->evaluate(points, out);
+    Buffer buffer;
+    for (std::size_t k = 1; k < operands_.size(); ++k) {
+      const Samples other = buffer.evaluate(*operands_[k], points, out);
+      for (std::size_t i = 0; i < points.size(); ++i) add(out, other, i);
+    }
+  }
+
+ private:
+  void add(const Samples& out, const Samples& other, std::size_t i) const {
+    const double a = sign_ * out.values[i], b = signOfOthers_ * other.values[i];
+    const double gap = std::abs(a - b);
+    const double overlap = radius_ > gap ? radius_ - gap : 0;
+    const double lowered = radius_ > 0 ? overlap * overlap / (4 * radius_) : 0;
+    out.values[i] = sign_ * (std::min(a, b) - lowered);
+    if (!out.hasGradients()) return;
+    const double share = radius_ > 0 ? overlap / (2 * radius_) : 0;  // of the greater one
+    const double shareOfOther = b < a ? 1 - share : share;
+    out.gradients[i] = (1 - shareOfOther) * out.gradients[i] + shareOfOther * sign_ * signOfOthers_ * other.gradients[i];
+  }
+
+  std::vector<NodePtr> operands_;
+  double radius_, sign_, signOfOthers_;
+};
+
+/// f(a) of the operand's value a, whose slope is 1 or −1.
+template <typename ValueAndSlope>
+class MappedNode final : public DistanceNode {
+ public:
+  MappedNode(NodePtr solid, ValueAndSlope map) : solid_(std::move(solid)), map_(std::move(map)) {
+    hasGradients = solid_->hasGradients;
+    bytes = solid_->bytes;
+  }
+
+  void evaluate(std::span<const Vector3> points, const Samples& out) const override {
+    solid_->evaluate(points, out);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto [value, slope] = map_(out.values[i]);
+      out.values[i] = value;
+      if (out.hasGradients()) out.gradients[i] *= slope;
+    }
+  }
+
+ private:
+  NodePtr solid_;
+  ValueAndSlope map_;
+};
+
+bool allAre(const std::vector<NodePtr>& operands, bool ExactSides::*side) {
+  return std::ranges::all_of(operands, [side](const NodePtr& node) { return node->exactSides.*side; });
+}
+
+}  // namespace
+
+Exactness ExactSides::exactness() const {
+  if (outside) return inside ? Exactness::everywhere : Exactness::outside;
+  return inside ? Exactness::inside : Exactness::nowhere;
+}
+
+NodePtr meshNode(std::shared_ptr<const ExactDistance> distance) {
+  return std::make_unique<MeshNode>(std::move(distance));
+}
+
+NodePtr booleanNode(std::vector<MeshSolid> solids, BooleanTree tree, const TriangleMesh& boundary) {
+  return std::make_unique<BooleanNode>(std::move(solids), std::move(tree), boundary);
+}
+
+NodePtr fieldNode(std::shared_ptr<const Field> field, const Similarity& placement) {
+  return std::make_unique<FieldNode>(std::move(field), placement);
+}
+
+NodePtr functionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement) {
+  return std::make_unique<FunctionNode>(std::move(function), placement);
+}
+
+NodePtr uniteNode(std::vector<NodePtr> operands, double radius) {
+  auto node = std::make_unique<FoldNode>(std::move(operands), radius, 1, 1);
+  const std::vector<NodePtr>& all = node->operands();
+  node->exactSides.outside = radius == 0 && allAre(all, &ExactSides::outside);
+  const bool areBoxed = std::ranges::none_of(all, [](const NodePtr& operand) { return operand->box.isEmpty(); });
+  if (areBoxed)
+    for (const NodePtr& operand : all) node->box.extend(operand->box);
+  node->box = widened(node->box, radius / 4 * static_cast<double>(all.size() - 1));
+  return node;
+}
+
+NodePtr intersectNode(std::vector<NodePtr> operands, double radius) {
+  auto node = std::make_unique<FoldNode>(std::move(operands), radius, -1, -1);
+  node->exactSides.inside = radius == 0 && allAre(node->operands(), &ExactSides::inside);
+  for (const NodePtr& operand : node->operands()) {
+    const Box common = node->box.intersection(operand->box);
+    if (node->box.isEmpty() || !common.isEmpty()) node->box = node->box.isEmpty() ? operand->box : common;
+  }
+  return node;
+}
+
+NodePtr subtractNode(std::vector<NodePtr> operands, double radius) {
+  auto node = std::make_unique<FoldNode>(std::move(operands), radius, -1, 1);
+  const std::vector<NodePtr>& all = node->operands();
+  const bool areOthersExact =
+      std::all_of(all.begin() + 1, all.end(), [](const NodePtr& other) { return other->exactSides.outside; });
+  node->exactSides.inside = radius == 0 && all[0]->exactSides.inside && areOthersExact;
+  node->box = all[0]->box;
+  return node;
+}
+
+NodePtr offsetNode(NodePtr solid, double distance) {
+  const Box box = solid->box;
+  const ExactSides sides = solid->exactSides;
+  const auto map = [distance](double value) { return std::pair(value - distance, 1.0); };
+  auto node = std::make_unique<MappedNode<decltype(map)>>(std::move(solid), map);
+  node->exactSides = {sides.outside && distance >= 0, sides.inside && distance <= 0};
+  const Box moved = widened(box, distance);
+  node->box = moved.isEmpty() ? box : moved;
+  return node;
+}
+
+NodePtr shellNode(NodePtr solid, double thickness, ShellSide side) {
+  const std::array middles = {-thickness / 2, 0.0, thickness / 2};  // where the middle of the wall is
+  const double middle = middles[static_cast<std::size_t>(side)];
+  const Box box = solid->box;
+  const bool isExact = solid->exactSides.outside && solid->exactSides.inside;
+  const auto map = [middle, thickness](double value) {
+    const double fromMiddle = value - middle;
+    return std::pair(std::abs(fromMiddle) - thickness / 2, fromMiddle < 0 ? -1.0 : 1.0);
+  };
+  auto node = std::make_unique<MappedNode<decltype(map)>>(std::move(solid), map);
+  node->exactSides.outside = isExact;
+  node->box = widened(box, middle + thickness / 2);
+  return node;
+}
+
+}  // namespace hpsdf::combine

@@ -1,0 +1,228 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <system_error>
+
+#include "combine/operations.h"
+#include "hpsdf/detail/nearest_name.h"
+
+namespace hpsdf {
+namespace combine {
+namespace {
+
+constexpr std::size_t kLongestExpression = 1'000'000;  ///< bytes
+
+bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+bool isQuote(char c) { return c == '"' || c == '\''; }
+bool endsWord(char c) { return isBlank(c) || isQuote(c) || c == ',' || c == '(' || c == ')'; }
+bool isParameterLetter(char c) { return (c >= 'a' && c <= 'z') || c == '-'; }
+
+/// Returns true if a word is meant as a number. It may still be none, or too great.
+bool looksLikeNumber(std::string_view word) {
+  const std::size_t digit = word.find_first_not_of("+-.");
+  return digit != std::string_view::npos && word[digit] >= '0' && word[digit] <= '9' &&
+         word.find_first_not_of("0123456789+-.eE") == std::string_view::npos;
+}
+
+/// Returns the length of the text ",name=" at the beginning of `text`, or 0 if it begins otherwise.
+std::size_t parameterStart(std::string_view text) {
+  std::size_t end = 1;
+  if (text.empty() || text[0] != ',') return 0;
+  while (end < text.size() && isParameterLetter(text[end])) ++end;
+  return end > 1 && end < text.size() && text[end] == '=' ? end + 1 : 0;
+}
+
+/// Returns the number of bytes of the bare word at the beginning of `text`. The parameters of a shape belong to its
+/// word.
+std::size_t wordLength(std::string_view text) {
+  std::size_t end = 0;
+  const auto skipLetters = [&] {
+    while (end < text.size() && !endsWord(text[end])) ++end;
+  };
+  skipLetters();
+  if (!isShapeName(text.substr(0, end))) return end;
+  while (const std::size_t start = parameterStart(text.substr(end))) {
+    end += start;
+    skipLetters();
+  }
+  return end;
+}
+
+/// Returns a piece of the text for a message, without control characters.
+std::string shown(std::string_view text) {
+  constexpr std::size_t kLongest = 40;
+  std::size_t end = std::min(text.size(), kLongest);
+  while (end > 0 && end < text.size() && (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80U) --end;
+  std::string shown(text.substr(0, end));
+  std::ranges::replace_if(
+      shown, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '?');
+  return end < text.size() ? shown + "…" : shown;
+}
+
+/// An argument of an operation: a number, a bare word that may name a side or a solid, or another expression.
+struct ParsedArgument {
+  std::size_t column;
+  std::optional<double> number = {};
+  std::optional<Expression> expression = {};
+  std::string word = {};  ///< empty unless the argument is a bare word
+};
+
+class ExpressionParser {
+ public:
+  explicit ExpressionParser(std::string_view text) : text_(text) {}
+
+  Expression parse() {
+    if (text_.size() > kLongestExpression)
+      throw Error(ErrorKind::limit, "expression", "it is longer than a million characters");
+    const ParsedArgument whole = argument(1);
+    if (whole.number) refuse(whole.column, "a number is no solid: expected a file, a shape or an operation");
+    skipBlanks();
+    if (at_ < text_.size()) refuse(column(), "expected the end of the expression, found " + found());
+    return *whole.expression;
+  }
+
+ private:
+  /// Reads the argument at the current position. `depth` counts the operations around it, itself included.
+  ParsedArgument argument(int depth) {
+    skipBlanks();
+    const std::size_t start = column();
+    if (at_ < text_.size() && isQuote(text_[at_])) return {.column = start, .expression = quoted(start)};
+    const std::string_view word = text_.substr(at_, wordLength(text_.substr(at_)));
+    if (word.empty()) refuse(start, "expected a file, a shape or an operation, found " + found());
+    at_ += word.size();
+    skipBlanks();
+    if (at_ < text_.size() && text_[at_] == '(') return {.column = start, .expression = operation(word, start, depth)};
+    if (looksLikeNumber(word)) return {.column = start, .number = number(word, start)};
+    return {.column = start, .expression = Expression::named(std::string(word), start), .word = std::string(word)};
+  }
+
+  Expression quoted(std::size_t start) {
+    const std::size_t end = text_.find(text_[at_], at_ + 1);
+    if (end == std::string_view::npos) refuse(start, "the quote is not closed");
+    const std::string_view name = text_.substr(at_ + 1, end - at_ - 1);
+    if (name.empty()) refuse(start, "a name is missing between the quotes");
+    at_ = end + 1;
+    return Expression::named(std::string(name), start);
+  }
+
+  static double number(std::string_view word, std::size_t start) {
+    double value = 0;
+    const std::string_view digits = word.substr(word[0] == '+' ? 1 : 0);
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc::result_out_of_range) refuse(start, shown(word) + " is out of the range of numbers");
+    if (error != std::errc() || end != digits.data() + digits.size())
+      refuse(start, "'" + shown(word) + "' is not a number; write a name that looks like one between quotes");
+    return value;
+  }
+
+  Expression operation(std::string_view name, std::size_t start, int depth) {
+    const auto row = std::ranges::find(operations(), name, &OperationDescription::name);
+    if (row == operations().end()) refuse(start, unknownOperation(name));
+    if (depth >= kMaxExpressionDepth)
+      refuse(start, "the expression is deeper than " + std::to_string(kMaxExpressionDepth) + " operations");
+    ++at_;  // skip the parenthesis
+    std::vector<ParsedArgument> arguments;
+    do {
+      arguments.push_back(argument(depth + 1));
+      skipBlanks();
+    } while (skip(','));
+    if (!skip(')')) refuse(column(), "expected ',' or ')', found " + found());
+    return make(*row, std::move(arguments), start);
+  }
+
+  static std::string unknownOperation(std::string_view name) {
+    std::vector<std::string> names;
+    std::string all;
+    for (const OperationDescription& row : operations()) {
+      names.emplace_back(row.name);
+      all += (all.empty() ? "" : ", ") + names.back();
+    }
+    return "there is no operation '" + shown(name) + "'; " + didYouMean(name, names, "there are " + all);
+  }
+
+  /// Makes an operation of its arguments: operands, then numbers, then the side of a shell.
+  static Expression make(const OperationDescription& row, std::vector<ParsedArgument> arguments, std::size_t start) {
+    ShellSide side = ShellSide::centred;
+    if (row.operation == Operation::shell && arguments.size() > 2 && !arguments.back().word.empty()) {
+      side = sideOf(arguments.back());
+      arguments.pop_back();
+    }
+    std::vector<Expression> operands;
+    std::vector<double> numbers;
+    for (const ParsedArgument& argument : arguments) {
+      if (argument.number) {
+        if (operands.empty())
+          refuse(argument.column,
+                 "expected a solid before the number: " + std::string(row.name) + " is written " + std::string(row.form));
+        numbers.push_back(*argument.number);
+      } else {
+        if (!numbers.empty())
+          refuse(argument.column, "expected a number: " + std::string(row.name) + " is written " + std::string(row.form));
+        operands.push_back(*argument.expression);
+      }
+    }
+    try {
+      return Expression::operation(row.operation, std::move(operands), std::move(numbers), side);
+    } catch (const Error& error) {
+      throw expressionError(error.kind(), start, error.what());
+    }
+  }
+
+  static ShellSide sideOf(const ParsedArgument& argument) {
+    const auto name = std::ranges::find(kSideNames, argument.word);
+    if (name == kSideNames.end())
+      refuse(argument.column, "expected inward, outward or centred, found '" + shown(argument.word) + "'");
+    return static_cast<ShellSide>(name - kSideNames.begin());
+  }
+
+  void skipBlanks() {
+    while (at_ < text_.size() && isBlank(text_[at_])) ++at_;
+  }
+
+  bool skip(char c) {
+    if (at_ >= text_.size() || text_[at_] != c) return false;
+    ++at_;
+    return true;
+  }
+
+  /// Returns the number of the character at the current position, from 1. Bytes that continue a character of UTF-8 do not
+  /// count.
+  std::size_t column() {
+    for (; counted_ < at_; ++counted_)
+      if ((static_cast<unsigned char>(text_[counted_]) & 0xc0U) != 0x80U) ++characters_;
+    return characters_ + 1;
+  }
+
+  std::string found() const {
+    if (at_ >= text_.size()) return "the end";
+    const std::size_t length = std::max<std::size_t>(1, wordLength(text_.substr(at_)));
+    return "'" + shown(text_.substr(at_, length)) + "'";
+  }
+
+  [[noreturn]] static void refuse(std::size_t column, const std::string& problem) {
+    throw expressionError(ErrorKind::option, column, problem);
+  }
+
+  std::string_view text_;
+  std::size_t at_ = 0;                        ///< position of the next byte
+  std::size_t counted_ = 0, characters_ = 0;  ///< bytes whose characters are counted, and the characters
+};
+
+}  // namespace
+
+bool isShapeName(std::string_view name) { return name.starts_with("builtin:") || name.starts_with("analytic:"); }
+
+bool readsAsName(std::string_view name) {
+  return !name.empty() && wordLength(name) == name.size() && !looksLikeNumber(name);
+}
+
+Error expressionError(ErrorKind kind, std::size_t column, const std::string& problem) {
+  return {kind, "expression", "column " + std::to_string(column) + ": " + problem};
+}
+
+}  // namespace combine
+
+Expression parseExpression(std::string_view text) { return combine::ExpressionParser(text).parse(); }
+
+}  // namespace hpsdf
