@@ -14,6 +14,7 @@ namespace hpsdf::app {
 Registry makeRegistry() {
   Registry registry;
   addFieldCommands(registry);
+  addCombineCommand(registry);
   addJumpsCommand(registry);
   addVerifyCommand(registry);
   addPictureCommands(registry);

@@ -8,6 +8,7 @@ namespace hpsdf::app {
 Registry makeRegistry();
 
 // Each of the following functions adds the commands that are defined in the source file of the same name.
+void addCombineCommand(Registry& registry);
 void addContourCommand(Registry& registry);
 void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, info, load and save; query too
 void addJumpsCommand(Registry& registry);

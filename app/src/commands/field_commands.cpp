@@ -5,6 +5,7 @@
 
 #include "batch/batch.h"
 #include "commands/commands.h"
+#include "commands/made_field.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
@@ -18,7 +19,6 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/safe_distance.h"
-#include "session/asked_errors.h"
 #include "session/field_argument.h"
 #include "session/field_summary.h"
 #include "session/field_surface.h"
@@ -28,28 +28,6 @@
 
 namespace hpsdf::app {
 namespace {
-
-void saveCurrent(Session& session, const Arguments& arguments) {
-  const std::string file = arguments.text("output");
-  save(session.current().field, file, {.compress = arguments.flag("compress")});
-  session.setFileBytes(std::filesystem::file_size(file));
-}
-
-void checkFieldOutput(const Arguments& arguments) {
-  requireOwner(arguments, "compress", "output", arguments.has("output"));
-  if (arguments.has("output")) checkWritable(arguments.text("output"));
-}
-
-void saveMade(Session& session, const Arguments& arguments) {
-  if (arguments.has("output")) saveCurrent(session, arguments);
-}
-
-/// Returns facts about the current field, and the file to which it was saved, as JSON.
-Json madeJson(const Session& session, const Arguments& arguments) {
-  Json json = fieldJson(session.current());
-  json["output"] = arguments.has("output") ? Json(arguments.text("output")) : Json();
-  return json;
-}
 
 /// Replaces the current field by `field`, a post-processed version of it. Saves `field` if an output is given. Reports
 /// `field` as JSON that includes `figures`, or as the text that textOf(field) returns.
@@ -67,76 +45,22 @@ void changeCurrent(Session& session, const Arguments& arguments, Field field, co
   printJson(out, json);
 }
 
-/// Returns the path of the checkpoint file, or an empty path if the arguments ask for no checkpoint.
-std::filesystem::path checkpointFile(const Arguments& arguments) {
-  return arguments.flag("checkpoint") ? checkpointOf(arguments.text("output")) : std::filesystem::path();
-}
-
 void checkBuildArguments(const Arguments& arguments) {
   const bool many = arguments.has("batch");
   if (many && arguments.has("mesh")) throw Error("batch: the list names the meshes; leave MESH out");
   if (many && !arguments.has("output")) throw Error("batch: the fields are written to a folder; give output");
   if (!many && !arguments.has("mesh"))
     throw Error("build: mesh is missing: give one, or a list of them as batch; 'hpsdf help build' explains");
-  const bool keeps = arguments.flag("checkpoint");
-  if (keeps && !arguments.has("output")) throw Error("checkpoint: the file is kept beside the output; give output");
-  requireOwner(arguments, "checkpoint-seconds", "checkpoint", keeps);
-}
-
-BuiltField buildAndKeep(const Console& console, const std::string& surface, const Arguments& arguments,
-                        const std::filesystem::path& checkpoint) {
-  try {
-    return buildField(console, surface, arguments, checkpoint);
-  } catch (const Cancelled&) {
-    if (!checkpoint.empty() && std::filesystem::exists(checkpoint))
-      throw CancelledPartway(
-          fmt::format("{} keeps the state; the same command continues from it", checkpoint.string()));
-    throw;
-  }
-}
-
-/// Removes the checkpoint of a finished construction. Also removes temporary files of processes that were
-/// killed while they wrote the field.
-void removeLeftovers(const std::filesystem::path& checkpoint, const std::filesystem::path& output) {
-  std::error_code ignored;
-  std::filesystem::remove(checkpoint, ignored);
-  OutputFile::removeAbandoned(output);
-}
-
-/// Reports the current field, which was just built. `missed` is what it misses of the errors that were asked for.
-void reportBuilt(const Session& session, const Arguments& arguments, const BuiltField& built,
-                 const std::string& missed) {
-  const std::string surface = arguments.text("mesh");
-  std::ostream& out = session.console().out;
-  if (session.wantsJson(arguments)) {
-    Json json = madeJson(session, arguments);
-    json["build_seconds"] = built.seconds;
-    json["missed"] = missed.empty() ? Json() : Json(missed);
-    if (built.mesh) json["mesh_report"] = meshJson(surface, *built.mesh);
-    return printJson(out, json);
-  }
-  if (built.mesh) out << meshText(surface, *built.mesh);
-  const Field& field = session.current().field;
-  out << fmt::format("{}{} in {:.1f} s\nmeasured: {}\n", arguments.has("output") ? arguments.text("output") + ": " : "",
-                     fieldLine(field), built.seconds, measuredText(field));
-  if (hasTolerance(field) && !missesTolerance(field)) out << fmt::format("tolerance: {}\n", toleranceText(field));
+  checkCheckpoint(arguments);
 }
 
 void runBuild(Session& session, const Arguments& arguments) {
-  const Console& console = session.console();
-  if (arguments.has("batch")) return buildBatch(console, arguments);
+  if (arguments.has("batch")) return buildBatch(session.console(), arguments);
   const std::string surface = arguments.text("mesh");
-  const std::filesystem::path checkpoint = checkpointFile(arguments);
-  checkFieldOutput(arguments);
-  const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
-  BuiltField built = buildAndKeep(console, surface, arguments, checkpoint);
-  session.setField({std::move(built.field), arguments.textOr("output", surface), {}, surface});
-  session.setExact(std::move(built.exact));
-  saveMade(session, arguments);
-  if (!checkpoint.empty()) removeLeftovers(checkpoint, arguments.text("output"));
-  const std::string missed = missedErrors(arguments, session.current().field);
-  reportBuilt(session, arguments, built, missed);
-  if (!missed.empty()) throw Failed(missed);
+  buildAndReport(session, arguments, {.name = surface, .surface = surface},
+                 [&](const std::filesystem::path& checkpoint) {
+                   return buildField(session.console(), surface, arguments, checkpoint);
+                 });
 }
 
 void runLoad(Session& session, const Arguments& arguments) {
@@ -214,18 +138,6 @@ void runBounds(Session& session, const Arguments& arguments) {
   });
 }
 
-const Parameter kFieldOutput = {"output", outputFile().as('o').requiredOnCommandLine(),
-                                "File of the resulting field, usually *.hpsdf. A script may leave it out; the result "
-                                "becomes the current field in any case."};
-
-const Parameter kCompress = {
-    "compress", flag().under(kFiles),
-    "Compress the file without loss. It loads into the same field, to the bit, by the same commands, and takes as many "
-    "bytes of memory. Use it to store or send fields: files take a third to four fifths of their bytes, quantized "
-    "ones and those with exact leaves the least; one of less than 2 kB does not shrink. For each megabyte, saving "
-    "takes "
-    "up to half a second, and loading a few milliseconds."};
-
 const std::vector<Parameter> kBuildFiles = {
     {"mesh", text("MESH").positional(), "Mesh file, grid file, builtin:SHAPE or analytic:SHAPE."},
     {"output", outputFile().as('o').requiredOnCommandLine().under(kFiles),
@@ -234,7 +146,7 @@ const std::vector<Parameter> kBuildFiles = {
     {"batch", file("LIST").under(kFiles),
      "Builds the fields of many meshes instead of MESH. LIST names one mesh file (relative to the current folder) or "
      "shape a line; empty lines and # comments are ignored, - is standard input."},
-    kCompress};
+    compressParameter()};
 
 void addBuildCommand(Registry& registry) {
   registry.add({
@@ -300,8 +212,8 @@ measured errors are removed, and so is the tolerance of a field that was built w
 once.)"),
       .examples = {"hpsdf smooth bunny.hpsdf -o smooth.hpsdf",
                    "hpsdf smooth bunny.hpsdf -o smoother.hpsdf --continuity-weight 0.05"},
-      .parameters = {fieldParameter(), kFieldOutput, kCompress, settingParameter("continuity-weight"),
-                     threadsParameter("The field is")},
+      .parameters = {fieldParameter(), fieldOutputParameter(), compressParameter(),
+                     settingParameter("continuity-weight"), threadsParameter("The field is")},
       .action = runSmooth,
   });
   registry.add({
@@ -317,8 +229,8 @@ measured errors are removed, and so is the tolerance of a field that was built w
 --continuity exact' keeps the tolerance with blending.)"),
       .examples = {"hpsdf blend bunny.hpsdf -o smooth.hpsdf", "hpsdf blend bunny.hpsdf -o gentle.hpsdf --width 0.1"},
       .parameters = {fieldParameter(),
-                     kFieldOutput,
-                     kCompress,
+                     fieldOutputParameter(),
+                     compressParameter(),
                      {"width", settingKind("blend-width"), std::string(buildSetting("blend-width").help)}},
       .action = runBlend,
   });
@@ -341,7 +253,8 @@ not beside the holes of an open mesh, nor where a mesh intersects itself.
 'smooth' and 'blend' change the field and remove bounds: compute them last. 'hpsdf verify --max-violations 0' tests them
 at random points.)"),
       .examples = {"hpsdf bounds bunny.hpsdf bunny.obj -o certain.hpsdf", "hpsdf bounds torus.hpsdf -o certain.hpsdf"},
-      .parameters = {fieldParameter(), surfaceParameter(), kFieldOutput, kCompress, threadsParameter("The field is")},
+      .parameters = {fieldParameter(), surfaceParameter(), fieldOutputParameter(), compressParameter(),
+                     threadsParameter("The field is")},
       .action = runBounds,
   });
 }
@@ -377,7 +290,8 @@ void addReadingCommands(Registry& registry) {
           "The file is written under a temporary name and renamed, so that an interrupted save leaves an older file "
           "intact.",
       .examples = {"save output=bunny.hpsdf"},
-      .parameters = {{"output", outputFile().as('o').required(), "File of the field, usually *.hpsdf."}, kCompress},
+      .parameters = {{"output", outputFile().as('o').required(), "File of the field, usually *.hpsdf."},
+                     compressParameter()},
       .action = runSave,
   });
 }

@@ -6,7 +6,9 @@
 #include <utility>
 
 #include "console/long_work.h"
+#include "construction/operands.h"
 #include "construction/surface.h"
+#include "hpsdf/combine/combined_distance.h"
 #include "hpsdf/verify.h"
 #include "text/text.h"
 
@@ -49,6 +51,18 @@ void refuseOptionsOfMeshes(const std::string& surface, const Arguments& argument
           fmt::format("{}: nothing is proven for the distances of a grid, between whose samples they are "
                       "interpolated; leave it out",
                       name));
+}
+
+/// Throws `Error` for settings that promise more than the values of fields can keep.
+void refuseProofsOfFields(const BuildOptions& options, const Expression& expression) {
+  if (!hasField(expression)) return;
+  const auto refuse = [](const char* name) {
+    throw Error(ErrorKind::option, name,
+                "nothing is proven of an expression with a field, because a field has errors of its own; leave it out, "
+                "or take the mesh in place of the field");
+  };
+  if (options.certified) refuse("certified");
+  if (options.bounds) refuse("bounds");
 }
 
 Checkpoint checkpointAt(const Console& console, const std::filesystem::path& file, const Arguments& arguments) {
@@ -108,13 +122,42 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
   });
 }
 
+BuildInput combinedInput(const Console& console, const std::string& expression, const Arguments& arguments) {
+  return namingSurface("expression", [&]() -> BuildInput {
+    // Find mistakes in the text and in the arguments before the long work starts.
+    const Expression parsed = parseExpression(expression);
+    buildOptions(arguments, 1);
+    const DistanceOptions insideOptions = distanceOptions(arguments);
+    const Expression loaded = withLoadedOperands(console, parsed, insideOptions.insideTest);
+    refuseProofsOfFields(buildOptions(arguments, 1), loaded);
+
+    // Set up the distance function, from which the size of the surface is known.
+    const auto start = std::chrono::steady_clock::now();
+    DistanceFunction distance = withProgress(console, [&](const Progress& progress) -> DistanceFunction {
+      return CombinedDistance(loaded, insideOptions, progress);
+    });
+    if (wantsNormalized(arguments)) distance = normalizedFunction(distance);
+    const double setUpSeconds = secondsSince(start);
+    const Box box = distance.source().box, domain = domainFrom(arguments, box);
+    BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
+    withinMemory(arguments, [&] { checkBuild(domain, options); });
+    warnOfCutSurface(console, box, domain);
+    allowDistance(options, distance, arguments);
+    return {std::make_shared<const DistanceFunction>(std::move(distance)), std::nullopt, domain, options, setUpSeconds};
+  });
+}
+
 void allowDistance(BuildOptions& options, const DistanceFunction& exact, const Arguments& arguments) {
   if (options.memoryLimit && !arguments.given("memory-limit")) *options.memoryLimit += exact.bytes();
 }
 
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint) {
-  BuildInput input = buildInput(console, surface, arguments);
+  return buildField(console, buildInput(console, surface, arguments), surface, arguments, checkpoint);
+}
+
+BuiltField buildField(const Console& console, BuildInput input, const std::string& surface, const Arguments& arguments,
+                      const std::filesystem::path& checkpoint) {
   const auto construct = [&]() -> BuiltField {
     const auto start = std::chrono::steady_clock::now();
     Field field = withProgress(console, [&](const Progress& progress) {

@@ -25,6 +25,10 @@ struct BuildInput {
 /// Loads a surface, warns about its flaws and sets up its exact distance function. Throws `Error` naming `surface`.
 BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments);
 
+/// Reads an expression of solids, loads its operands, warns about a domain that cuts the surface, and sets up the
+/// expression's distance function. Throws `Error` naming "expression".
+BuildInput combinedInput(const Console& console, const std::string& expression, const Arguments& arguments);
+
 /// Allows a construction the memory of the distance `exact` in addition to the default memory limit, which is meant for
 /// what grows. Changes nothing if the arguments give a limit.
 void allowDistance(BuildOptions& options, const DistanceFunction& exact, const Arguments& arguments);
@@ -41,6 +45,10 @@ struct BuiltField {
 /// call saved there. The arguments must then include those of `checkpointParameters`. Throws `Error` naming `surface`,
 /// and `Cancelled` after Ctrl-C.
 BuiltField buildField(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::filesystem::path& checkpoint = {});
+
+/// Builds and measures the field of `input`, which `surface` names, as the function above does.
+BuiltField buildField(const Console& console, BuildInput input, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 
 /// Returns the name of the checkpoint file in which the construction of the field file `output` saves its state.

@@ -23,19 +23,27 @@ namespace {
 /// here.
 constexpr double kBytesPerFace = 520, kBytesPerHullFace = 800;
 
-DistanceFunction normalizedFunction(const DistanceFunction& distance) {
-  const Normalization to = normalizationOf(distance.source().box);
-  Source source = distance.source();
-  source.box = Box(to.scale * (source.box.min() - to.center), to.scale * (source.box.max() - to.center));
-  source.normalization = to;
-  auto evaluate = [distance, to](std::span<const Vector3> points, std::span<double> out) {
+/// A distance in the units of a normalized surface.
+struct NormalizedDistance {
+  DistanceFunction distance;
+  Normalization to;
+
+  std::vector<Vector3> original(std::span<const Vector3> points) const {
     std::vector<Vector3> original(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) original[i] = points[i] / to.scale + to.center;
-    distance(original, out);
+    return original;
+  }
+  void operator()(std::span<const Vector3> points, std::span<double> out) const {
+    distance(original(points), out);
     for (double& value : out) value *= to.scale;
-  };
-  return DistanceFunction(std::move(evaluate), source);  // moved: a reference to the local variable would dangle
-}
+  }
+  bool hasGradients() const { return distance.hasGradients(); }
+  void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const {
+    distance.withGradients(original(points), out, gradients);
+    for (double& value : out) value *= to.scale;
+  }
+  std::size_t bytes() const { return distance.bytes(); }
+};
 
 ImportedMesh readFile(const Console& console, const std::string& file) {
   return withProgress(console, [&](const Progress& progress) {
@@ -82,6 +90,14 @@ void tellInsideTest(const Console& console, const std::string& surface, const Me
 }
 
 }  // namespace
+
+DistanceFunction normalizedFunction(const DistanceFunction& distance) {
+  const Normalization to = normalizationOf(distance.source().box);
+  Source source = distance.source();
+  source.box = Box(to.scale * (source.box.min() - to.center), to.scale * (source.box.max() - to.center));
+  source.normalization = to;
+  return DistanceFunction(NormalizedDistance{distance, to}, source);
+}
 
 bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) || surface.starts_with(kAnalytic); }
 

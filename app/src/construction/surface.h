@@ -42,6 +42,10 @@ struct PreparedSurface {
 PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes,
                                const GridPlacement& placement = {});
 
+/// Returns the distance to the surface scaled and centred so that the longest side of its box spans [-1, 1], with
+/// gradients if `distance` has them. Throws `Error` if the box is empty or unknown.
+DistanceFunction normalizedFunction(const DistanceFunction& distance);
+
 /// Throws `Error` if the exact distance function of the mesh would need more memory than is available.
 void requireDistanceMemory(const TriangleMesh& mesh, InsideTest insideTest = InsideTest::automatic);
 

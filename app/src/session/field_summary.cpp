@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -29,6 +30,12 @@ std::string histogram(std::string_view name, const std::map<int, double>& volume
                         grouped(leaves.at(level)), "", cells);
   }
   return text;
+}
+
+/// Returns the word for an exactness in JSON.
+std::string exactnessWord(Exactness exactness) {
+  constexpr std::array<const char*, 4> kWords = {"everywhere", "outside", "inside", "nowhere"};
+  return kWords[static_cast<std::size_t>(exactness)];
 }
 
 std::string fingerprintText(std::uint64_t fingerprint) { return fmt::format("{:016x}", fingerprint); }
@@ -112,6 +119,7 @@ Json fieldJson(const CurrentField& current) {
       {{"continuity", settingText(buildSetting("continuity"), settingsOf(field.data()))},
        {"blend", field.data().blend},
        {"bounds", boundsJson(field)},
+       {"exact", metadata.source.exactness ? Json(exactnessWord(*metadata.source.exactness)) : Json()},
        {"reference_length", metadata.referenceLength},
        {"normalization",
         {{"center", vectorJson(metadata.source.normalization.center)}, {"scale", metadata.source.normalization.scale}}},
@@ -183,6 +191,21 @@ std::string measuredText(const Field& field) {
   return fmt::format("near the surface {}; over the domain {}{}{}{}", errorText(m->near), errorText(m->domain),
                      m->wrongSigns > 0 ? "; " + wrongSignsText(*m) : "", m->tornShare > 0 ? "; " + tornText(*m) : "",
                      unitText(field));
+}
+
+std::string exactnessText(const Field& field) {
+  const std::optional<Exactness>& exactness = field.metadata().source.exactness;
+  if (!exactness) return "";
+  switch (*exactness) {
+    case Exactness::everywhere:
+      return "exact everywhere";
+    case Exactness::outside:
+      return "exact outside; a lower bound inside";
+    case Exactness::inside:
+      return "exact inside; a lower bound outside";
+    default:
+      return "a lower bound; the surface may be farther away than the values say";
+  }
 }
 
 std::string estimateLine(const Field& field) {
@@ -267,6 +290,7 @@ std::string fieldText(const CurrentField& current) {
   std::string text = current.name + "\n";
   const auto row = [&](std::string_view label, const std::string& value) { text += summaryRow(label, value); };
   row("made from", metadata.source.name.empty() ? "a function" : printable(metadata.source.name));
+  if (const std::string exactness = exactnessText(field); !exactness.empty()) row("distances", exactness);
   if (fromMesh) {
     row("vertices, faces", fmt::format("{}, {}", grouped(metadata.source.vertices), grouped(metadata.source.faces)));
     row("fingerprint", fingerprintText(metadata.source.fingerprint));

@@ -38,6 +38,10 @@ bool missesTolerance(const Field& field);
 /// Returns the tolerance of a field, and whether the measurement found it kept.
 std::string toleranceText(const Field& field);
 
+/// Returns which values of the distance that a field was built from are exact, or "" for a field that is no
+/// combination.
+std::string exactnessText(const Field& field);
+
 /// Return parts of `measuredText`: "RMS 2.06e-4, greatest 3.12e-3", "2.57 % of the surface torn", and the number of
 /// points with a wrong sign.
 std::string errorText(const Measurement::Error& error);
