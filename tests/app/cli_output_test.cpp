@@ -57,6 +57,7 @@ TEST_F(Outputs, outputsThatDoNotFitLeaveOlderFiles) {
   const std::vector<std::vector<std::string>> calls = {
       {"build", "builtin:torus", "--target-error", "1e-4", "-o"},
       {"build", "builtin:torus", "--target-error", "1e-4", "--checkpoint", "-o"},
+      {"combine", "union(builtin:torus, builtin:box)", "--target-error", "1e-4", "-o"},
       {"smooth", field(), "-o"},
       {"blend", field(), "-o"},
       {"bounds", field(), "-o"},

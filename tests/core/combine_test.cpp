@@ -1,7 +1,5 @@
 // Distances of combined solids: against boundaries that are computed here in another way, closed forms, and properties.
 
-#include "hpsdf/combine/combined_distance.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,6 +16,7 @@
 #include <vector>
 
 #include "hpsdf/build.h"
+#include "hpsdf/combine/combined_distance.h"
 #include "hpsdf/detail/random_points.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_file.h"
@@ -131,8 +130,8 @@ class BruteForce {
 
   static double squaredDistance(const Vector3& x, const Vector3& a, const Vector3& b, const Vector3& c) {
     const Vector3 normal = (b - a).cross(c - a);
-    const bool projectsInside = normal.cross(b - a).dot(x - a) > 0 && normal.cross(c - b).dot(x - b) > 0 &&
-                                normal.cross(a - c).dot(x - c) > 0;
+    const bool projectsInside =
+        normal.cross(b - a).dot(x - a) > 0 && normal.cross(c - b).dot(x - b) > 0 && normal.cross(a - c).dot(x - c) > 0;
     if (projectsInside) {
       const double height = normal.dot(x - a);
       return height * height / normal.squaredNorm();
@@ -170,15 +169,24 @@ std::vector<BooleanCase> booleanCases() {
   const TriangleMesh ball = support::moved(turned(sphere(0.7, 2), 17), {0.4, 0.2, 0.3});
   const TriangleMesh pin = turned(boxBetween({-0.2, -0.25, -3}, {0.2, 0.15, 3}), 25);
   return {
-      {"union", {box, other}, [](const auto& s) { return unite(s[0], s[1]); },
+      {"union",
+       {box, other},
+       [](const auto& s) { return unite(s[0], s[1]); },
        [](const auto& in) { return in[0] || in[1]; }},
-      {"intersection", {box, ball}, [](const auto& s) { return intersect(s[0], s[1]); },
+      {"intersection",
+       {box, ball},
+       [](const auto& s) { return intersect(s[0], s[1]); },
        [](const auto& in) { return in[0] && in[1]; }},
-      {"difference", {box, ball}, [](const auto& s) { return subtract(s[0], s[1]); },
+      {"difference",
+       {box, ball},
+       [](const auto& s) { return subtract(s[0], s[1]); },
        [](const auto& in) { return in[0] && !in[1]; }},
-      {"three", {box, ball, pin}, [](const auto& s) { return subtract(unite(s[0], s[1]), s[2]); },
+      {"three",
+       {box, ball, pin},
+       [](const auto& s) { return subtract(unite(s[0], s[1]), s[2]); },
        [](const auto& in) { return (in[0] || in[1]) && !in[2]; }},
-      {"four", {box, other, ball, pin},
+      {"four",
+       {box, other, ball, pin},
        [](const auto& s) { return unite(subtract(s[0], s[1], s[2]), intersect(s[1], s[2], s[3])); },
        [](const auto& in) { return (in[0] && !in[1] && !in[2]) || (in[1] && in[2] && in[3]); }},
   };
@@ -278,8 +286,8 @@ TEST(Combine, transformsApplyFromTheInsideOut) {
 
 TEST(Combine, exactnessFollowsTheOperands) {
   const Expression box = shapes::analytic("box"), ball = shapes::analytic("sphere");
-  const Expression field = build(shapes::analytic("sphere"), Box(Vector3::Constant(-2), Vector3::Constant(2)),
-                                 {.targetError = 1e-2});
+  const Expression field =
+      build(shapes::analytic("sphere"), Box(Vector3::Constant(-2), Vector3::Constant(2)), {.targetError = 1e-2});
   const auto exactnessOf = [](const Expression& expression) { return CombinedDistance(expression).exactness(); };
   EXPECT_EQ(exactnessOf(box), Exactness::everywhere);
   EXPECT_EQ(exactnessOf(unite(box, ball)), Exactness::outside);
@@ -296,6 +304,10 @@ TEST(Combine, exactnessFollowsTheOperands) {
   EXPECT_EQ(exactnessOf(unite(box, field)), Exactness::nowhere);
   EXPECT_EQ(exactnessOf(unite(support::boxOfTwo(), sphere(0.5, 2))), Exactness::everywhere);
   EXPECT_EQ(exactnessOf(support::openBox()), Exactness::nowhere);
+  EXPECT_EQ(CombinedDistance(support::boxOfTwo(), {.insideTest = InsideTest::pseudonormal}).exactness(),
+            Exactness::nowhere);
+  EXPECT_EQ(CombinedDistance(support::boxOfTwo(), {.insideTest = InsideTest::winding}).exactness(),
+            Exactness::everywhere);
   EXPECT_EQ(exactnessOf(DistanceFunction(CombinedDistance(unite(box, ball)))), Exactness::outside);
 }
 
@@ -340,8 +352,8 @@ struct Accuracy {
   double rms = 0, inside = 0;  ///< RMS error over the domain and over its points inside, over the estimate
 };
 
-/// Builds a field and compares it with a closed form at random points. The errors are multiples of the RMS error that the
-/// target error stands for, which depends on the size of the surface.
+/// Builds a field and compares it with a closed form at random points. The errors are multiples of the RMS error that
+/// the target error stands for, which depends on the size of the surface.
 Accuracy accuracyOf(const DistanceFunction& distance, const std::function<double(const Vector3&)>& closedForm) {
   const Box domain(Vector3::Constant(-1.25), Vector3::Constant(1.25));
   const Field field = build(distance, domain, {.targetError = 1e-7});
@@ -377,8 +389,9 @@ TEST(Combine, fieldsAreAsAccurateAsASpheresAtTheSameTarget) {
   EXPECT_LT(ofShell.rms, 1.5 * ofSphere);
 
   const Accuracy ofOffset =
-      accuracyOf(CombinedDistance(offset(boxBetween({-0.7, -0.5, -0.4}, {0.7, 0.5, 0.4}), 0.2)),
-                 [](const Vector3& x) { return shapes::boxDistance(x, {0.7, 0.5, 0.4}) - 0.2; });
+      accuracyOf(CombinedDistance(offset(boxBetween({-0.7, -0.5, -0.4}, {0.7, 0.5, 0.4}), 0.2)), [](const Vector3& x) {
+        return shapes::boxDistance(x, {0.7, 0.5, 0.4}) - 0.2;
+      });
   EXPECT_LT(ofOffset.rms, 1.5 * ofSphere);
   RecordProperty("sphere", std::to_string(ofSphere));
   RecordProperty("union", std::to_string(ofUnion.rms));
@@ -432,8 +445,8 @@ std::vector<double> byValues(const Expression& part, std::span<const Vector3> pl
 }
 
 /// Compares a Boolean expression of meshes with its values by minimum and maximum: these are 0 at all corners of the
-/// boundary. At other places signs agree, magnitudes are no less, and are the distances to the boundary. Returns the number
-/// of places inside.
+/// boundary. At other places signs agree, magnitudes are no less, and are the distances to the boundary. Returns the
+/// number of places inside.
 int expectBoolean(const Expression& expression, const CombinedDistance& combined, std::span<const Vector3> places) {
   const ExactDistance toBoundary(*combined.boundary(), {.insideTest = InsideTest::pseudonormal});
   std::vector<double> values(places.size()), magnitudes(places.size());
@@ -473,9 +486,8 @@ TEST(Combine, randomBooleansHaveTheSignsOfTheirOperands) {
 
 TEST(Combine, gradientsLeadToTheSurfaceAndValuesAreLipschitz) {
   const Expression a = turned(sphere(0.8, 3), 10), b = moved(support::boxOfTwo(), {0.8, 0.3, 0.2});
-  const Expression field = build(
-      [](const Vector3& x) { return x.norm() - 0.7; }, Box(Vector3::Constant(-1), Vector3::Constant(1)),
-      {.targetError = 1e-10});
+  const Expression field = build([](const Vector3& x) { return x.norm() - 0.7; },
+                                 Box(Vector3::Constant(-1), Vector3::Constant(1)), {.targetError = 1e-10});
   for (const Expression& expression :
        {unite(a, b), subtract(b, a), offset(intersect(a, b), 0.1), shell(unite(a, b), 0.2, ShellSide::inward),
         smoothUnite(0.3, {a, b}), smoothSubtract(0.2, {rotated(scaled(field, 1.5), {1, 1, 0}, 50), b})}) {
@@ -493,8 +505,8 @@ TEST(Combine, gradientsLeadToTheSurfaceAndValuesAreLipschitz) {
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (i > 0) steep += std::abs(values[i] - values[i - 1]) > (places[i] - places[i - 1]).norm() + 1e-4;
       const Vector3 direction = Vector3(0.3, -0.5, 0.8).normalized();
-      const double slope = (distance(places[i] + kStep * direction) - distance(places[i] - kStep * direction)) /
-                           (2 * kStep);
+      const double slope =
+          (distance(places[i] + kStep * direction) - distance(places[i] - kStep * direction)) / (2 * kStep);
       wrong += std::abs(slope - gradients[i].dot(direction)) > 1e-4;
     }
     EXPECT_EQ(steep, 0);
@@ -522,7 +534,8 @@ TEST(Combine, resultsDoNotDependOnThreadsAndFilesKeepTheExactness) {
     EXPECT_EQ(loaded.metadata().source.name, textOf(expression));
     EXPECT_EQ(loaded.data().nodes, one.data().nodes);
   }
-  save(build([](const Vector3& x) { return x.norm() - 0.5; }, one.domain(), {.targetError = 1e-2}), folder.path() / "p");
+  save(build([](const Vector3& x) { return x.norm() - 0.5; }, one.domain(), {.targetError = 1e-2}),
+       folder.path() / "p");
   EXPECT_EQ(load(folder.path() / "p").metadata().source.exactness, std::nullopt);
 }
 

@@ -104,7 +104,8 @@ TEST(Expression, operandsAreLoadedOnceAndNamedWithoutFolders) {
     if (name == "missing.obj") throw Error(ErrorKind::file, name, "no such file");
     return shapes::mesh("box");
   };
-  const Expression loaded = withOperands(parseExpression("union(in/a.obj, move(in/a.obj, 1, 0, 0), builtin:box)"), load);
+  const Expression loaded =
+      withOperands(parseExpression("union(in/a.obj, move(in/a.obj, 1, 0, 0), builtin:box)"), load);
   EXPECT_THAT(names, testing::ElementsAre("in/a.obj", "builtin:box"));
   EXPECT_EQ(textOf(loaded), "union(a.obj, move(a.obj, 1, 0, 0), builtin:box)");
   try {

@@ -41,13 +41,19 @@ TriangleMesh overlappingOctahedra() {
 void writeFields(const fs::path& folder) {
   fs::create_directories(folder);
   const BuildOptions plain{.targetError = 1e-2, .grid = {2, 1, 1}, .maxDegree = 3, .maxDepth = 2, .threads = 1};
-  const auto add = [&](const std::string& name, const auto& change) {
+  const Source mesh{.name = "sphere.obj",
+                    .fingerprint = 7,
+                    .vertices = 8,
+                    .faces = 12,
+                    .box = fuzz::domain(),
+                    .insideTest = InsideTest::pseudonormal};
+  const auto addOf = [&](const Source& source, const std::string& name, const auto& change) {
     BuildOptions options = plain;
     change(options);
-    Source source{"sphere.obj", 7, 8, 12, fuzz::domain()};
-    source.insideTest = InsideTest::pseudonormal;
     save(build(DistanceFunction(fuzz::sphere, source), fuzz::domain(), options), folder / (name + ".hpsdf"));
   };
+  const auto add = [&](const std::string& name, const auto& change) { addOf(mesh, name, change); };
+  addOf({.name = "union(a.obj, b.hpsdf)", .exactness = Exactness::outside}, "combination", [](BuildOptions&) {});
   add("double", [](BuildOptions& o) { o.targetError = 1e-4, o.coefficients = CoefficientType::float64; });
   add("float", [](BuildOptions& o) { o.coefficients = CoefficientType::float32; });
   add("quantized", [](BuildOptions& o) { o.targetError = 1e-4, o.coefficients = CoefficientType::quantized; });

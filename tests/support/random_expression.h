@@ -11,9 +11,9 @@
 namespace hpsdf {
 
 struct RandomExpressionOptions {
-  int depth = 3;             ///< greatest number of Boolean operations between the root and a leaf
-  double reach = 0.6;        ///< greatest move of a leaf along each axis
-  double length = 0.1;       ///< greatest offset, thickness and radius
+  int depth = 3;               ///< greatest number of Boolean operations between the root and a leaf
+  double reach = 0.6;          ///< greatest move of a leaf along each axis
+  double length = 0.1;         ///< greatest offset, thickness and radius
   bool isBooleanOnly = false;  ///< only unions, intersections and differences of placed leaves
 };
 
@@ -54,8 +54,8 @@ inline Expression node(detail::Random& random, const std::vector<Expression>& le
 
 }  // namespace random_expression
 
-/// Returns a random expression of the leaves, which should be about as large as the cube [-1, 1]³. Nothing may be left of
-/// it, so that `CombinedDistance` refuses it.
+/// Returns a random expression of the leaves, which should be about as large as the cube [-1, 1]³. Nothing may be left
+/// of it, so that `CombinedDistance` refuses it.
 inline Expression randomExpression(std::uint64_t seed, const std::vector<Expression>& leaves,
                                    const RandomExpressionOptions& options = {}) {
   detail::Random random(seed, 0);

@@ -73,15 +73,17 @@ void reportBuilt(const Session& session, const Arguments& arguments, const std::
 }  // namespace
 
 Parameter fieldOutputParameter() {
-  return {"output", outputFile().as('o').requiredOnCommandLine(),
-          "File of the resulting field, usually *.hpsdf. A script may leave it out; the result becomes the current field "
-          "in any case."};
+  return {
+      "output", outputFile().as('o').requiredOnCommandLine(),
+      "File of the resulting field, usually *.hpsdf. A script may leave it out; the result becomes the current field "
+      "in any case."};
 }
 
 Parameter compressParameter() {
   return {
       "compress", flag().under(kFiles),
-      "Compress the file without loss. It loads into the same field, to the bit, by the same commands, and takes as many "
+      "Compress the file without loss. It loads into the same field, to the bit, by the same commands, and takes as "
+      "many "
       "bytes of memory. Use it to store or send fields: files take a third to four fifths of their bytes, quantized "
       "ones and those with exact leaves the least; one of less than 2 kB does not shrink. For each megabyte, saving "
       "takes up to half a second, and loading a few milliseconds."};

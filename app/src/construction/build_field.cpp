@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
+#include <vector>
 
 #include "console/long_work.h"
 #include "construction/operands.h"
@@ -63,6 +65,21 @@ void refuseProofsOfFields(const BuildOptions& options, const Expression& express
   };
   if (options.certified) refuse("certified");
   if (options.bounds) refuse("bounds");
+}
+
+/// Warns if no point of a lattice in the domain is inside, because offsets and differences by values may leave nothing.
+void warnOfNothingInside(const Console& console, const DistanceFunction& distance, const Box& domain) {
+  constexpr int kPoints = 32;  // along each axis
+  std::vector<Vector3> points;
+  for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
+    const Vector3 index(i % kPoints, i / kPoints % kPoints, i / (kPoints * kPoints));
+    points.push_back(domain.min() + domain.sizes().cwiseProduct(index + Vector3::Constant(0.5)) / kPoints);
+  }
+  std::vector<double> values(points.size());
+  distance(points, values);
+  if (std::ranges::none_of(values, [](double value) { return value < 0; }))
+    warn(console, fmt::format("none of {} points in the domain is inside: the solid is empty, or thin throughout",
+                              grouped(points.size())));
 }
 
 Checkpoint checkpointAt(const Console& console, const std::filesystem::path& file, const Arguments& arguments) {
@@ -142,6 +159,7 @@ BuildInput combinedInput(const Console& console, const std::string& expression, 
     BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
     withinMemory(arguments, [&] { checkBuild(domain, options); });
     warnOfCutSurface(console, box, domain);
+    warnOfNothingInside(console, distance, domain);
     allowDistance(options, distance, arguments);
     return {std::make_shared<const DistanceFunction>(std::move(distance)), std::nullopt, domain, options, setUpSeconds};
   });

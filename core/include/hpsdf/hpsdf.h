@@ -7,6 +7,7 @@
 #include "hpsdf/cell_history.h"
 #include "hpsdf/combine/combined_distance.h"
 #include "hpsdf/combine/expression.h"
+#include "hpsdf/combine/operation.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/error.h"

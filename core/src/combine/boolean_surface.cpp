@@ -24,8 +24,8 @@ namespace {
 // pieces have been cut along the other surface's edges. Triangles within kReach of each other are considered at all.
 constexpr double kSnapped = 0x1p-42, kCoincident = 0x1p-45, kReach = 0x1p-41;
 
-// Pieces narrower than this are left out: other surfaces may cross them without cutting them, and their neighbours are no
-// farther from any point than they are, up to this length.
+// Pieces narrower than this are left out: other surfaces may cross them without cutting them, and their neighbours are
+// no farther from any point than they are, up to this length.
 constexpr double kNarrow = 0x1p-41;
 
 constexpr std::size_t kMostCrossings = 20'000'000;
@@ -133,7 +133,7 @@ void cutBy(TriangleCutter& cutter, const bvh::TriangleFrame& frame, const Corner
 struct Piece {
   std::uint32_t triangle;
   Vector3 middle, normal;
-  double width;                 ///< distance of the middle from the nearest side
+  double width;                       ///< distance of the middle from the nearest side
   std::vector<Vector3> corners = {};  ///< empty for a whole triangle
 };
 
@@ -151,10 +151,7 @@ Piece pieceOf(std::uint32_t triangle, const bvh::TriangleFrame& frame, std::span
   Vector3 middle = Vector3::Zero();
   for (const Vector3& corner : corners) middle += corner;
   middle /= static_cast<double>(corners.size());
-  return {.triangle = triangle,
-          .middle = middle,
-          .normal = frame.normal,
-          .width = distanceToSides(corners, middle)};
+  return {.triangle = triangle, .middle = middle, .normal = frame.normal, .width = distanceToSides(corners, middle)};
 }
 
 /// Returns the width of a convex polygon in a plane: the least distance between two parallel lines around it.
@@ -182,8 +179,7 @@ void addPieces(const Arrangement& all, std::uint32_t triangle, std::vector<Piece
     order.emplace_back(detail::Random(triangle, partner).next(), partner);
   std::ranges::sort(order);
   TriangleCutter cutter(frame);
-  for (const auto& [key, partner] : order)
-    cutBy(cutter, frame, all.cornersOf(partner), all.mesh.triangles[partner]);
+  for (const auto& [key, partner] : order) cutBy(cutter, frame, all.cornersOf(partner), all.mesh.triangles[partner]);
   if (!cutter.isCut()) {
     pieces.push_back(pieceOf(triangle, frame, corners));
     return;

@@ -17,9 +17,7 @@ struct MeshSolid {
 
   /// Returns true if the outside is in front of each triangle and the inside behind it, and the mesh does not intersect
   /// itself.
-  bool hasOrientedTriangles() const {
-    return distance->insideTestChoice().insideTest == InsideTest::pseudonormal;
-  }
+  bool hasOrientedTriangles() const { return distance->insideTestChoice().insideTest == InsideTest::pseudonormal; }
 };
 
 /// Returns the boundary of a Boolean expression of solids: triangles with the outside in front of them and the inside
@@ -27,8 +25,9 @@ struct MeshSolid {
 /// own, and their corners may lie on edges of other pieces. All vertices lie on the boundary, up to rounding. Surfaces
 /// nearer to each other than about 1e-13 times the largest coordinate count as coincident.
 ///
-/// The triangles do not depend on the number of threads. Throws `Error` (of the kind `mesh`) if nothing is left, (of the
-/// kind `limit`) if more than 20 million pairs of triangles cross or the pieces do not fit into memory, and `Cancelled`.
+/// The triangles do not depend on the number of threads. Throws `Error` (of the kind `mesh`) if nothing is left, (of
+/// the kind `limit`) if more than 20 million pairs of triangles cross or the pieces do not fit into memory, and
+/// `Cancelled`.
 TriangleMesh boundaryOf(const std::vector<MeshSolid>& solids, const BooleanTree& tree, const Progress& progress);
 
 }  // namespace hpsdf::combine

@@ -37,6 +37,13 @@ BooleanSolid joined(BooleanTree::Kind kind, std::vector<BooleanSolid> parts) {
   return all;
 }
 
+/// Returns true if the mesh is known to be closed. Pseudonormals that a caller forces upon it prove nothing.
+bool boundsSolid(const ExactDistance& distance) {
+  const InsideTestChoice& choice = distance.insideTestChoice();
+  if (choice.insideTest == InsideTest::pseudonormal) return !choice.reason.empty();
+  return choice.insideTest == InsideTest::winding && distance.hasGradients();
+}
+
 /// Turns an expression into nodes. Transforms are passed down to the leaves, where they are applied.
 class Compiler {
  public:
@@ -102,7 +109,8 @@ class Compiler {
     return nodes;
   }
 
-  /// Returns the union or intersection of parts. Those that are Boolean expressions of meshes become one, which is exact.
+  /// Returns the union or intersection of parts. Those that are Boolean expressions of meshes become one, which is
+  /// exact.
   CompiledPart grouped(std::vector<CompiledPart> parts, BooleanTree::Kind kind) {
     std::vector<BooleanSolid> solids;
     std::vector<CompiledPart> others;
@@ -116,8 +124,8 @@ class Compiler {
     if (solids.size() > 1) others.push_back({.solid = joined(kind, std::move(solids))});
     if (others.size() == 1) return std::move(others[0]);
     std::vector<NodePtr> nodes = nodesOf(std::move(others));
-    return {.node = kind == BooleanTree::Kind::unite ? uniteNode(std::move(nodes), 0)
-                                                     : intersectNode(std::move(nodes), 0)};
+    return {.node =
+                kind == BooleanTree::Kind::unite ? uniteNode(std::move(nodes), 0) : intersectNode(std::move(nodes), 0)};
   }
 
   /// Returns the first part without the union of the others.
@@ -153,9 +161,7 @@ class Compiler {
       DistanceOptions options = options_;
       options.thickness *= placement.scale;
       auto distance = std::make_shared<const ExactDistance>(*placed, options, progress_);
-      const InsideTest test = distance->insideTestChoice().insideTest;
-      const bool isSolid = (test == InsideTest::pseudonormal || test == InsideTest::winding) && distance->hasGradients();
-      if (!isSolid) return {.node = meshNode(std::move(distance))};
+      if (!boundsSolid(*distance)) return {.node = meshNode(std::move(distance))};
       BooleanSolid solid;
       solid.solids.push_back({std::move(placed), std::move(distance)});
       return {.solid = std::move(solid)};

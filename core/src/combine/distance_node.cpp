@@ -36,9 +36,10 @@ class MeshNode final : public DistanceNode {
     box = distance_->source().box;
     hasGradients = distance_->hasGradients();
     bytes = distance_->bytes();
-    const InsideTest test = distance_->insideTestChoice().insideTest;
-    exactSides.outside = test == InsideTest::shell || hasGradients;
-    exactSides.inside = test == InsideTest::pseudonormal;
+    const auto& [test, reason, position] = distance_->insideTestChoice();
+    const bool isForced = test == InsideTest::pseudonormal && reason.empty();
+    exactSides.outside = hasGradients && !isForced;
+    exactSides.inside = test == InsideTest::pseudonormal && !isForced;
     if (test == InsideTest::shell) box = widened(box, distance_->source().thickness / 2);
   }
 
@@ -55,8 +56,8 @@ class MeshNode final : public DistanceNode {
 
 class BooleanNode final : public DistanceNode {
  public:
-  /// The triangles of the boundary have no common vertices, so that pseudonormals give no sign there. The inside test by
-  /// pseudonormals is taken because it costs least; only magnitudes are taken from this distance.
+  /// The triangles of the boundary have no common vertices, so that pseudonormals give no sign there. The inside test
+  /// by pseudonormals is taken because it costs least; only magnitudes are taken from this distance.
   BooleanNode(std::vector<MeshSolid> solids, BooleanTree tree, const TriangleMesh& boundary)
       : solids_(std::move(solids)),
         tree_(std::move(tree)),
@@ -79,14 +80,15 @@ class BooleanNode final : public DistanceNode {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double value = inside[i] != 0 ? -magnitudes[i] : magnitudes[i];
       // The gradient's sign follows from that of the value for which it was computed.
-      if (out.hasGradients() && std::signbit(value) != std::signbit(out.values[i])) out.gradients[i] = -out.gradients[i];
+      if (out.hasGradients() && std::signbit(value) != std::signbit(out.values[i]))
+        out.gradients[i] = -out.gradients[i];
       out.values[i] = value + 0.0;  // adding 0 turns -0 into 0
     }
   }
 
  private:
-  /// Returns whether each point is inside. Signs are asked of the solids only at few points: the ball around a point that
-  /// just touches the boundary lies on one side.
+  /// Returns whether each point is inside. Signs are asked of the solids only at few points: the ball around a point
+  /// that just touches the boundary lies on one side.
   std::vector<char> insideAt(std::span<const Vector3> points, std::span<const double> magnitudes) const {
     constexpr double kShare = 0.999;  // of the radius, which leaves room for rounding
     std::vector<std::size_t> sampleOf(points.size());
@@ -250,7 +252,8 @@ class FoldNode final : public DistanceNode {
     if (!out.hasGradients()) return;
     const double share = radius_ > 0 ? overlap / (2 * radius_) : 0;  // of the greater one
     const double shareOfOther = b < a ? 1 - share : share;
-    out.gradients[i] = (1 - shareOfOther) * out.gradients[i] + shareOfOther * sign_ * signOfOthers_ * other.gradients[i];
+    out.gradients[i] =
+        (1 - shareOfOther) * out.gradients[i] + shareOfOther * sign_ * signOfOthers_ * other.gradients[i];
   }
 
   std::vector<NodePtr> operands_;

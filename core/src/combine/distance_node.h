@@ -38,7 +38,7 @@ class DistanceNode {
   /// Evaluates the samples at the points. Gradients may be asked for if `hasGradients` is true.
   virtual void evaluate(std::span<const Vector3> points, const Samples& out) const = 0;
 
-  Box box = {};              ///< holds the surface; empty if it is unknown
+  Box box = {};  ///< holds the surface; empty if it is unknown
   ExactSides exactSides = {};
   bool hasGradients = false;  ///< gradients can be asked for
   std::size_t bytes = 0;

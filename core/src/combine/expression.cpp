@@ -7,36 +7,14 @@
 #include <filesystem>
 #include <map>
 
-#include "combine/operations.h"
+#include "combine/expression_words.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf {
 namespace combine {
 namespace {
 
-constexpr std::array kOperations = {
-    OperationDescription{Operation::unite, "union", "union(A, B, …)", true, 0, "all that is in one of them or more"},
-    OperationDescription{Operation::intersect, "intersection", "intersection(A, B, …)", true, 0,
-                         "all that is in each of them"},
-    OperationDescription{Operation::subtract, "difference", "difference(A, B, …)", true, 0,
-                         "all that is in A and in none of the others"},
-    OperationDescription{Operation::smoothUnite, "smooth-union", "smooth-union(A, B, …, R)", true, 1,
-                         "the union with rounded creases, where distances differ by less than the radius R"},
-    OperationDescription{Operation::smoothIntersect, "smooth-intersection", "smooth-intersection(A, B, …, R)", true, 1,
-                         "the intersection with rounded edges"},
-    OperationDescription{Operation::smoothSubtract, "smooth-difference", "smooth-difference(A, B, …, R)", true, 1,
-                         "the difference with rounded edges"},
-    OperationDescription{Operation::offset, "offset", "offset(A, D)", false, 1,
-                         "A grown by the distance D, or shrunk where D is below 0"},
-    OperationDescription{Operation::shell, "shell", "shell(A, T, SIDE)", false, 1,
-                         "a wall of the thickness T along the surface of A; SIDE is inward, outward or, where it is "
-                         "left out, centred"},
-    OperationDescription{Operation::move, "move", "move(A, X, Y, Z)", false, 3, "A moved by X, Y, Z"},
-    OperationDescription{Operation::rotate, "rotate", "rotate(A, X, Y, Z, DEGREES)", false, 4,
-                         "A turned about the axis X, Y, Z through the origin"},
-    OperationDescription{Operation::scale, "scale", "scale(A, S)", false, 1,
-                         "A scaled about the origin by S, the same along all axes"},
-};
+constexpr double kLeastFactor = 1e-12;  ///< of a scale; its reciprocal is the greatest factor
 
 [[noreturn]] void refuseOperation(const OperationDescription& row, const std::string& problem) {
   throw Error(ErrorKind::option, std::string(row.name), problem);
@@ -94,6 +72,20 @@ std::string nameText(const std::string& name) {
   return quote + name + quote;
 }
 
+std::string ownName(const TriangleMesh& mesh) { return mesh.name; }
+std::string ownName(const Field&) { return ""; }
+std::string ownName(const DistanceFunction& distance) { return distance.source().name; }
+
+/// Returns a leaf that holds a solid. It has the solid's own name or, if there is none, the name `otherwise`.
+template <typename Solid>
+Expression::Node leafOf(Solid solid, const char* otherwise) {
+  Expression::Node node;
+  node.name = ownName(solid);
+  if (node.name.empty()) node.name = otherwise;
+  node.operand = std::make_shared<const Solid>(std::move(solid));
+  return node;
+}
+
 /// Returns a file's name without its folders, and a shape's name as it is.
 std::string shortName(const std::string& name) {
   return isShapeName(name) ? name : std::filesystem::path(name).filename().string();
@@ -101,36 +93,15 @@ std::string shortName(const std::string& name) {
 
 }  // namespace
 
-const OperationDescription& descriptionOf(Operation operation) {
-  return *std::ranges::find(kOperations, operation, &OperationDescription::operation);
-}
-
 }  // namespace combine
-
-std::span<const OperationDescription> operations() { return combine::kOperations; }
 
 Expression::Expression(Node node) : node_(std::make_shared<const Node>(std::move(node))) {}
 
-Expression::Expression(TriangleMesh mesh) : Expression(Node{}) {
-  Node node;
-  node.name = mesh.name.empty() ? "mesh" : mesh.name;
-  node.operand = std::make_shared<const TriangleMesh>(std::move(mesh));
-  *this = Expression(std::move(node));
-}
+Expression::Expression(TriangleMesh mesh) : Expression(combine::leafOf(std::move(mesh), "mesh")) {}
 
-Expression::Expression(Field field) : Expression(Node{}) {
-  Node node;
-  node.name = "field";
-  node.operand = std::make_shared<const Field>(std::move(field));
-  *this = Expression(std::move(node));
-}
+Expression::Expression(Field field) : Expression(combine::leafOf(std::move(field), "field")) {}
 
-Expression::Expression(DistanceFunction distance) : Expression(Node{}) {
-  Node node;
-  node.name = distance.source().name.empty() ? "function" : distance.source().name;
-  node.operand = std::make_shared<const DistanceFunction>(std::move(distance));
-  *this = Expression(std::move(node));
-}
+Expression::Expression(DistanceFunction distance) : Expression(combine::leafOf(std::move(distance), "function")) {}
 
 Expression Expression::named(std::string name, std::size_t column) {
   Node node;
@@ -142,7 +113,7 @@ Expression Expression::named(std::string name, std::size_t column) {
 
 Expression Expression::operation(Operation operation, std::vector<Expression> operands, std::vector<double> numbers,
                                  ShellSide side) {
-  const OperationDescription& row = combine::descriptionOf(operation);
+  const OperationDescription& row = descriptionOf(operation);
   Node node{.operation = operation, .operands = std::move(operands), .numbers = std::move(numbers), .side = side};
   combine::requireCounts(row, node);
   combine::requireNumbers(row, node);
@@ -163,7 +134,7 @@ Expression Expression::renamed(std::string name) const {
 std::string textOf(const Expression& expression) {
   const Expression::Node& node = expression.node();
   if (node.operation == Operation::operand) return combine::nameText(node.name);
-  std::string text = std::string(combine::descriptionOf(node.operation).name) + "(";
+  std::string text = std::string(descriptionOf(node.operation).name) + "(";
   const auto add = [&](const std::string& argument) { text += (text.back() == '(' ? "" : ", ") + argument; };
   for (const Expression& operand : node.operands) add(textOf(operand));
   for (const double number : node.numbers) add(combine::numberText(number));

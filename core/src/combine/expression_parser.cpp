@@ -4,7 +4,8 @@
 #include <optional>
 #include <system_error>
 
-#include "combine/operations.h"
+#include "combine/expression_words.h"
+#include "hpsdf/combine/expression.h"
 #include "hpsdf/detail/nearest_name.h"
 
 namespace hpsdf {
@@ -12,42 +13,6 @@ namespace combine {
 namespace {
 
 constexpr std::size_t kLongestExpression = 1'000'000;  ///< bytes
-
-bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-bool isQuote(char c) { return c == '"' || c == '\''; }
-bool endsWord(char c) { return isBlank(c) || isQuote(c) || c == ',' || c == '(' || c == ')'; }
-bool isParameterLetter(char c) { return (c >= 'a' && c <= 'z') || c == '-'; }
-
-/// Returns true if a word is meant as a number. It may still be none, or too great.
-bool looksLikeNumber(std::string_view word) {
-  const std::size_t digit = word.find_first_not_of("+-.");
-  return digit != std::string_view::npos && word[digit] >= '0' && word[digit] <= '9' &&
-         word.find_first_not_of("0123456789+-.eE") == std::string_view::npos;
-}
-
-/// Returns the length of the text ",name=" at the beginning of `text`, or 0 if it begins otherwise.
-std::size_t parameterStart(std::string_view text) {
-  std::size_t end = 1;
-  if (text.empty() || text[0] != ',') return 0;
-  while (end < text.size() && isParameterLetter(text[end])) ++end;
-  return end > 1 && end < text.size() && text[end] == '=' ? end + 1 : 0;
-}
-
-/// Returns the number of bytes of the bare word at the beginning of `text`. The parameters of a shape belong to its
-/// word.
-std::size_t wordLength(std::string_view text) {
-  std::size_t end = 0;
-  const auto skipLetters = [&] {
-    while (end < text.size() && !endsWord(text[end])) ++end;
-  };
-  skipLetters();
-  if (!isShapeName(text.substr(0, end))) return end;
-  while (const std::size_t start = parameterStart(text.substr(end))) {
-    end += start;
-    skipLetters();
-  }
-  return end;
-}
 
 /// Returns a piece of the text for a message, without control characters.
 std::string shown(std::string_view text) {
@@ -153,12 +118,13 @@ class ExpressionParser {
     for (const ParsedArgument& argument : arguments) {
       if (argument.number) {
         if (operands.empty())
-          refuse(argument.column,
-                 "expected a solid before the number: " + std::string(row.name) + " is written " + std::string(row.form));
+          refuse(argument.column, "expected a solid before the number: " + std::string(row.name) + " is written " +
+                                      std::string(row.form));
         numbers.push_back(*argument.number);
       } else {
         if (!numbers.empty())
-          refuse(argument.column, "expected a number: " + std::string(row.name) + " is written " + std::string(row.form));
+          refuse(argument.column,
+                 "expected a number: " + std::string(row.name) + " is written " + std::string(row.form));
         operands.push_back(*argument.expression);
       }
     }
@@ -186,8 +152,8 @@ class ExpressionParser {
     return true;
   }
 
-  /// Returns the number of the character at the current position, from 1. Bytes that continue a character of UTF-8 do not
-  /// count.
+  /// Returns the number of the character at the current position, from 1. Bytes that continue a character of UTF-8 do
+  /// not count.
   std::size_t column() {
     for (; counted_ < at_; ++counted_)
       if ((static_cast<unsigned char>(text_[counted_]) & 0xc0U) != 0x80U) ++characters_;
@@ -210,16 +176,6 @@ class ExpressionParser {
 };
 
 }  // namespace
-
-bool isShapeName(std::string_view name) { return name.starts_with("builtin:") || name.starts_with("analytic:"); }
-
-bool readsAsName(std::string_view name) {
-  return !name.empty() && wordLength(name) == name.size() && !looksLikeNumber(name);
-}
-
-Error expressionError(ErrorKind kind, std::size_t column, const std::string& problem) {
-  return {kind, "expression", "column " + std::to_string(column) + ": " + problem};
-}
 
 }  // namespace combine
 

@@ -49,9 +49,9 @@ Vector3 TriangleCutter::placed(const Point& x) const {
   return frame_.origin + x.x() * frame_.along + x.y() * frame_.across;
 }
 
-/// Passes a segment that has reached an inner node on to the children in which it lies. A segment along the node's line,
-/// up to kSameLine, ends there, because the line cuts already. Beyond the line it goes on even for a short way, kBeyond,
-/// because pieces with an acute corner are narrow there.
+/// Passes a segment that has reached an inner node on to the children in which it lies. A segment along the node's
+/// line, up to kSameLine, ends there, because the line cuts already. Beyond the line it goes on even for a short way,
+/// kBeyond, because pieces with an acute corner are narrow there.
 void TriangleCutter::pass(const Segment& segment, std::vector<Segment>& waiting) const {
   const Node& node = nodes_[segment.node];
   const double atA = node.line.heightOf(segment.a), atB = node.line.heightOf(segment.b);

@@ -26,8 +26,8 @@ class TriangleCutter {
   /// triangle do not count.
   void cut(const Vector3& a, const Vector3& b);
 
-  /// Cuts as the function above does, along the intersection with a plane of this normal. The normal gives the direction
-  /// of the line, because that of a short segment is less accurate.
+  /// Cuts as the function above does, along the intersection with a plane of this normal. The normal gives the
+  /// direction of the line, because that of a short segment is less accurate.
   void cut(const Vector3& a, const Vector3& b, const Vector3& normal);
 
   bool isCut() const { return nodes_.size() > 1; }

@@ -13,18 +13,22 @@
 
 namespace hpsdf {
 
-/// The signed distance of an expression of solids. It converts to a `DistanceFunction`, from which `build` makes a field.
+/// The signed distance of an expression of solids. It converts to a `DistanceFunction`, from which `build` makes a
+/// field.
 ///
 /// Unions, intersections and differences of closed meshes are exact everywhere: triangles are cut where others cross
 /// them, and the distance is measured to those pieces that bound the result. Moves, rotations and scales are applied to
 /// the vertices of meshes. The sign is the Boolean expression of the signs of the meshes.
 ///
-/// All other values come from the values of the operands, by minimum, maximum, sum and difference. All of these keep the
-/// property of distances that they nowhere change faster than the position does (1-Lipschitz). Therefore the magnitude of
-/// a value is at most the distance to the surface where the result is 0, so that no step of that length passes through
-/// the surface. `exactness` tells on which side of the surface the values are exact:
-/// * a mesh is exact everywhere where it is closed; an open one, whose holes the winding number closes, is a bound;
-/// * a distance function is exact, unless its source says otherwise; a field is a bound, up to its own error. Outside of
+/// All other values come from the values of the operands, by minimum, maximum, sum and difference. All of these keep
+/// the property of distances that they nowhere change faster than the position does (1-Lipschitz). Therefore the
+/// magnitude of a value is at most the distance to the surface where the result is 0, so that no step of that length
+/// passes through the surface. `exactness` tells on which side of the surface the values are exact:
+/// * a closed mesh is exact everywhere; an open one, whose holes the winding number closes, is a bound, and so is one
+/// upon
+///   which `InsideTest::pseudonormal` is forced;
+/// * a distance function is exact, unless its source says otherwise; a field is a bound, up to its own error. Outside
+/// of
 ///   its domain, at distance d from it, a field with the value f ≥ 0 at the domain's nearest point has the value
 ///   √(d² + f²), which no distance to a surface in the domain is below;
 /// * a union is exact outside if its operands are, an intersection inside; a difference is an intersection;
@@ -35,9 +39,9 @@ namespace hpsdf {
 /// Objects are const, thread-safe and cheap to copy. They keep no reference to the expression.
 class CombinedDistance {
  public:
-  /// Prepares the distance. `options` apply to all meshes. Throws `Error` for names that `withOperands` has not replaced,
-  /// for meshes that `ExactDistance` refuses, for a Boolean expression of meshes of which nothing is left, and if the
-  /// pieces of meshes do not fit into memory. Throws `Cancelled` when `progress` says so.
+  /// Prepares the distance. `options` apply to all meshes. Throws `Error` for names that `withOperands` has not
+  /// replaced, for meshes that `ExactDistance` refuses, for a Boolean expression of meshes of which nothing is left,
+  /// and if the pieces of meshes do not fit into memory. Throws `Cancelled` when `progress` says so.
   explicit CombinedDistance(const Expression& expression, const DistanceOptions& options = {},
                             const Progress& progress = {});
 
@@ -50,8 +54,8 @@ class CombinedDistance {
 
   Exactness exactness() const;
 
-  /// Returns a description: the expression as its name, a box that holds the surface, and the exactness. The box is empty
-  /// if an operand has none.
+  /// Returns a description: the expression as its name, a box that holds the surface, and the exactness. The box is
+  /// empty if an operand has none.
   const Source& source() const;
 
   /// Returns the triangles that bound the result if the whole expression is a Boolean expression of closed meshes, else

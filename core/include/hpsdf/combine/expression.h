@@ -5,41 +5,21 @@
 
 #include <concepts>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <memory>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "hpsdf/combine/operation.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/field.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
 
 namespace hpsdf {
-
-/// What a node of an expression does with its operands.
-enum class Operation : std::uint8_t {
-  operand,  ///< a leaf of the tree: a solid by itself
-  unite,
-  intersect,
-  subtract,  ///< the first operand without the others
-  smoothUnite,
-  smoothIntersect,
-  smoothSubtract,
-  offset,
-  shell,
-  move,
-  rotate,
-  scale
-};
-
-/// The side of the surface on which a shell has its material.
-enum class ShellSide : std::uint8_t { inward, centred, outward };
 
 /// The greatest depth of an expression: the number of nodes from its root to a leaf.
 constexpr int kMaxExpressionDepth = 100;
@@ -65,8 +45,8 @@ class Expression {
     int depth = 1;
   };
 
-  Expression(TriangleMesh mesh);         // NOLINT: implicit on purpose
-  Expression(Field field);               // NOLINT: implicit on purpose
+  Expression(TriangleMesh mesh);          // NOLINT: implicit on purpose
+  Expression(Field field);                // NOLINT: implicit on purpose
   Expression(DistanceFunction distance);  // NOLINT: implicit on purpose
 
   /// Returns a leaf with a name that `withOperands` replaces by a solid.
@@ -91,30 +71,18 @@ class Expression {
 
 /// Reads an expression from text, such as "difference(offset(a.hpsdf, 0.02), move(b.obj, 0, 0, 1))". A leaf is the name
 /// of a file or a shape. It is written between quotes (" or ') if it holds blanks, commas, parentheses or quotes, or
-/// looks like a number; commas before a shape's parameters, as in builtin:torus,minor=0.2, need none. Throws `Error` (of
-/// the kind `option`, with the subject "expression") that names the column, in characters from 1, and what is expected
-/// there. It opens no files.
+/// looks like a number; commas before a shape's parameters, as in builtin:torus,minor=0.2, need none. Throws `Error`
+/// (of the kind `option`, with the subject "expression") that names the column, in characters from 1, and what is
+/// expected there. It opens no files.
 Expression parseExpression(std::string_view text);
 
 /// Returns the text of an expression, which `parseExpression` reads again. Leaves are written by their names.
 std::string textOf(const Expression& expression);
 
 /// Returns the expression with each named leaf replaced by what `load` returns for its name. `load` is called once for
-/// each name. An `Error` that `load` throws is thrown again as one about "expression" that names the column of the leaf.
+/// each name. An `Error` that `load` throws is thrown again as one about "expression" that names the column of the
+/// leaf.
 Expression withOperands(const Expression& expression, const std::function<Expression(const std::string& name)>& load);
-
-/// A row of the table of operations, from which the parser, `textOf` and help texts take what they know of them.
-struct OperationDescription {
-  Operation operation;
-  std::string_view name;
-  std::string_view form;  ///< how it is written, such as "offset(A, D)"
-  bool takesMany;         ///< it takes two operands or more, else exactly one
-  std::size_t numbers;    ///< number of numbers behind the operands
-  std::string_view help;
-};
-
-/// Returns all operations that an expression can name, in the order in which help texts list them.
-std::span<const OperationDescription> operations();
 
 /// Functions that make expressions in C++. All of them throw `Error` as `Expression::operation` does.
 namespace combine {
@@ -134,9 +102,9 @@ Expression subtract(Expression from, More&&... more) {
   return Expression::operation(Operation::subtract, {std::move(from), Expression(std::forward<More>(more))...});
 }
 
-/// These three are the operations above with rounded creases. Where two distances a and b differ by less than the radius
-/// r, the union is min(a, b) − (r − |a − b|)² / (4 r), which is at most r/4 below the sharp one and continuous with its
-/// gradient. Several operands are combined from the first to the last.
+/// These three are the operations above with rounded creases. Where two distances a and b differ by less than the
+/// radius r, the union is min(a, b) − (r − |a − b|)² / (4 r), which is at most r/4 below the sharp one and continuous
+/// with its gradient. Several operands are combined from the first to the last.
 inline Expression smoothUnite(double radius, std::vector<Expression> operands) {
   return Expression::operation(Operation::smoothUnite, std::move(operands), {radius});
 }

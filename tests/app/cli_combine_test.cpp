@@ -1,0 +1,123 @@
+// Tests `hpsdf combine`.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "cli_fixture.h"
+#include "hpsdf/field_file.h"
+#include "hpsdf/mesh_file.h"
+#include "hpsdf/shapes.h"
+
+namespace hpsdf::app {
+namespace cli_combine_test {
+
+using namespace cli;
+using cli::Call;  // a call of the program, not app::Call (a command in a script)
+
+class Combine : public Cli {
+ protected:
+  Outcome combine(const std::string& expression, const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = {"combine", expression, "-o", at("c.hpsdf"), "--target-error", "1e-3"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run({.words = words});
+  }
+};
+
+TEST_F(Combine, meshesGiveExactDistances) {
+  saveMesh(shapes::mesh("box,width=2,height=2,depth=2"), at("a box.ply"));
+  const Outcome outcome = combine("difference(\"" + at("a box.ply") + "\", move(builtin:sphere,radius=0.5, 0, 0, 1))");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("c.hpsdf: "), HasSubstr("measured: "), HasSubstr("distances: exact everywhere\n")));
+  const Field made = load(at("c.hpsdf"));
+  EXPECT_NEAR(made.value({0, 0, 1}), 0.5, 0.05);
+  EXPECT_NEAR(made.value({0.9, 0.9, -0.9}), -0.1, 0.05);
+  const Outcome info = run({{"info", at("c.hpsdf")}});
+  EXPECT_THAT(info.out, AllOf(ContainsRegex("made from +difference\\(\"a box.ply\", move\\(builtin:sphere,radius=0.5, 0, 0, 1\\)\\)\n"),
+                              ContainsRegex("distances +exact everywhere\n"), Not(HasSubstr("fingerprint"))));
+  EXPECT_EQ(Json::parse(run({{"info", at("c.hpsdf"), "--json"}}).out).at("exact"), "everywhere");
+  EXPECT_TRUE(Json::parse(run({{"info", field(), "--json"}}).out).at("exact").is_null());
+}
+
+TEST_F(Combine, fieldsGiveBounds) {
+  const Outcome outcome =
+      combine("smooth-union(" + field() + ", rotate(" + field() + ", 1, 0, 0, 90), 0.05)", {"--json"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  EXPECT_EQ(json.at("exact"), "nowhere");
+  EXPECT_EQ(json.at("output"), at("c.hpsdf"));
+  EXPECT_EQ(json.at("mesh").at("name"), "smooth-union(torus.hpsdf, rotate(torus.hpsdf, 1, 0, 0, 90), 0.05)");
+  EXPECT_LT(load(at("c.hpsdf")).value({0, 0, 0.7}), -0.2);
+  const Outcome text = combine("shell(" + field() + ", 0.1, outward)");
+  EXPECT_THAT(text.out, HasSubstr("distances: a lower bound; the surface may be farther away than the values say\n"));
+}
+
+TEST_F(Combine, takesTheOptionsOfBuild) {
+  const Outcome outcome = combine("scale(builtin:box, 10)", {"--normalize", "--margin", "0.25", "--threads", "1"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Field made = load(at("c.hpsdf"));
+  EXPECT_NEAR(made.domain().max().x(), 1.25, 1e-12);
+  EXPECT_NEAR(made.metadata().source.normalization.scale, 0.1, 1e-12);
+  const std::string once = readFile(at("c.hpsdf"));
+  ASSERT_EQ(combine("scale(builtin:box, 10)", {"--normalize", "--margin", "0.25", "--threads", "3"}).status, 0);
+  EXPECT_EQ(readFile(at("c.hpsdf")), once);
+  const Outcome tolerance = run({{"combine", "offset(builtin:box, 0.1)", "-o", at("t.hpsdf"), "--tolerance", "1%"}});
+  EXPECT_EQ(tolerance.status, 0) << tolerance.err;
+  EXPECT_THAT(tolerance.out, HasSubstr("tolerance: "));
+}
+
+TEST_F(Combine, mistakesAreOneLineWithTheColumn) {
+  const auto expectColumn = [&](const std::string& expression, const std::string& message) {
+    expectRefused({{"combine", expression, "-o", at("x.hpsdf")}}, "expression: column " + message, {});
+  };
+  expectColumn("union(builtin:box, ofset(builtin:box, 1))", "20: there is no operation 'ofset'; did you mean 'offset'?");
+  expectColumn("union(builtin:box", "18: expected ',' or ')', found the end");
+  expectColumn(" ", "2: expected a file, a shape or an operation, found the end");
+  expectColumn("scale(builtin:box, 1, 2, 1)", "1: scale: is written scale(A, S): different factors");
+  expectColumn("union(builtin:box, none.obj)", "20: none.obj: no such file");
+  expectColumn("union(builtin:box, \"no\nne.obj\")", "20: no ne.obj: no such file");
+  expectColumn("union(builtin:box, builtin:sphere,radius=0)", "20: ");
+  writeFile(at("broken.ply"), "ply\nformat");
+  expectRefused({{"combine", "offset(" + at("broken.ply") + ", 1)", "-o", at("x.hpsdf")}}, "column 8: " + at("broken.ply"));
+}
+
+TEST_F(Combine, hostileCallsLeaveNothingBehind) {
+  const auto expectNothing = [&](std::vector<std::string> words, const std::string& message) {
+    words.insert(words.begin(), "combine");
+    words.insert(words.end(), {"-o", at("x.hpsdf")});
+    expectRefused({words}, message, {});
+  };
+  expectNothing({"difference(builtin:box, builtin:box)"}, "nothing is left of the meshes");
+  expectNothing({"intersection(builtin:box, move(builtin:box, 9, 0, 0))"}, "nothing is left of the meshes");
+  expectNothing({"offset(" + field() + ", 0.1)", "--tolerance", "1%", "--certified"}, "nothing is proven of an expression with a field");
+  expectNothing({field(), "--bounds"}, "bounds: nothing is proven");
+  expectNothing({"builtin:box", "--tolerance", "-1"}, "tolerance");
+  std::string deep(120, 'x');
+  for (int i = 0; i < 120; ++i) deep = "offset(" + deep + ",1)";
+  expectNothing({deep}, "deeper than 100 operations");
+  expectRefused({{"combine", "-o", at("x.hpsdf")}}, "expression", {});
+  expectRefused({{"combine", "builtin:box"}}, "output", {});
+}
+
+TEST_F(Combine, scriptsUseTheResult) {
+  const Outcome outcome = run({{"run", "-e",
+                                "combine \"union(builtin:box, move(builtin:box, 1, 0.5, 0.25))\" target-error=1e-3; "
+                                "expect at(0.5,0.2,0).value < -0.4; query points=0,0,0; slice color=error size=64x64 "
+                                "cpu=true output=" + at("error.png")}});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("distances: exact everywhere"));
+  EXPECT_TRUE(fs::exists(at("error.png")));
+}
+
+TEST_F(Combine, helpTeachesTheLanguage) {
+  const Outcome help = run({{"combine", "--help"}});
+  EXPECT_EQ(help.status, 0);
+  for (const char* form : {"union(A, B, …)", "shell(A, T, SIDE)", "rotate(A, X, Y, Z, DEGREES)", "--tolerance"})
+    EXPECT_THAT(help.out, HasSubstr(form));
+}
+
+}  // namespace cli_combine_test
+}  // namespace hpsdf::app
