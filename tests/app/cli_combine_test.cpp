@@ -31,13 +31,16 @@ TEST_F(Combine, meshesGiveExactDistances) {
   saveMesh(shapes::mesh("box,width=2,height=2,depth=2"), at("a box.ply"));
   const Outcome outcome = combine("difference(\"" + at("a box.ply") + "\", move(builtin:sphere,radius=0.5, 0, 0, 1))");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("c.hpsdf: "), HasSubstr("measured: "), HasSubstr("distances: exact everywhere\n")));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("c.hpsdf: "), HasSubstr("measured: "), HasSubstr("distances: exact everywhere\n")));
   const Field made = load(at("c.hpsdf"));
   EXPECT_NEAR(made.value({0, 0, 1}), 0.5, 0.05);
   EXPECT_NEAR(made.value({0.9, 0.9, -0.9}), -0.1, 0.05);
   const Outcome info = run({{"info", at("c.hpsdf")}});
-  EXPECT_THAT(info.out, AllOf(ContainsRegex("made from +difference\\(\"a box.ply\", move\\(builtin:sphere,radius=0.5, 0, 0, 1\\)\\)\n"),
-                              ContainsRegex("distances +exact everywhere\n"), Not(HasSubstr("fingerprint"))));
+  EXPECT_THAT(
+      info.out,
+      AllOf(ContainsRegex("made from +difference\\(\"a box.ply\", move\\(builtin:sphere,radius=0.5, 0, 0, 1\\)\\)\n"),
+            ContainsRegex("distances +exact everywhere\n"), Not(HasSubstr("fingerprint"))));
   EXPECT_EQ(Json::parse(run({{"info", at("c.hpsdf"), "--json"}}).out).at("exact"), "everywhere");
   EXPECT_TRUE(Json::parse(run({{"info", field(), "--json"}}).out).at("exact").is_null());
 }
@@ -73,7 +76,8 @@ TEST_F(Combine, mistakesAreOneLineWithTheColumn) {
   const auto expectColumn = [&](const std::string& expression, const std::string& message) {
     expectRefused({{"combine", expression, "-o", at("x.hpsdf")}}, "expression: column " + message, {});
   };
-  expectColumn("union(builtin:box, ofset(builtin:box, 1))", "20: there is no operation 'ofset'; did you mean 'offset'?");
+  expectColumn("union(builtin:box, ofset(builtin:box, 1))",
+               "20: there is no operation 'ofset'; did you mean 'offset'?");
   expectColumn("union(builtin:box", "18: expected ',' or ')', found the end");
   expectColumn(" ", "2: expected a file, a shape or an operation, found the end");
   expectColumn("scale(builtin:box, 1, 2, 1)", "1: scale: is written scale(A, S): different factors");
@@ -81,7 +85,8 @@ TEST_F(Combine, mistakesAreOneLineWithTheColumn) {
   expectColumn("union(builtin:box, \"no\nne.obj\")", "20: no ne.obj: no such file");
   expectColumn("union(builtin:box, builtin:sphere,radius=0)", "20: ");
   writeFile(at("broken.ply"), "ply\nformat");
-  expectRefused({{"combine", "offset(" + at("broken.ply") + ", 1)", "-o", at("x.hpsdf")}}, "column 8: " + at("broken.ply"));
+  expectRefused({{"combine", "offset(" + at("broken.ply") + ", 1)", "-o", at("x.hpsdf")}},
+                "column 8: " + at("broken.ply"));
 }
 
 TEST_F(Combine, hostileCallsLeaveNothingBehind) {
@@ -92,7 +97,8 @@ TEST_F(Combine, hostileCallsLeaveNothingBehind) {
   };
   expectNothing({"difference(builtin:box, builtin:box)"}, "nothing is left of the meshes");
   expectNothing({"intersection(builtin:box, move(builtin:box, 9, 0, 0))"}, "nothing is left of the meshes");
-  expectNothing({"offset(" + field() + ", 0.1)", "--tolerance", "1%", "--certified"}, "nothing is proven of an expression with a field");
+  expectNothing({"offset(" + field() + ", 0.1)", "--tolerance", "1%", "--certified"},
+                "nothing is proven of an expression with a field");
   expectNothing({field(), "--bounds"}, "bounds: nothing is proven");
   expectNothing({"builtin:box", "--tolerance", "-1"}, "tolerance");
   std::string deep(120, 'x');
@@ -106,7 +112,8 @@ TEST_F(Combine, scriptsUseTheResult) {
   const Outcome outcome = run({{"run", "-e",
                                 "combine \"union(builtin:box, move(builtin:box, 1, 0.5, 0.25))\" target-error=1e-3; "
                                 "expect at(0.5,0.2,0).value < -0.4; query points=0,0,0; slice color=error size=64x64 "
-                                "cpu=true output=" + at("error.png")}});
+                                "cpu=true output=" +
+                                    at("error.png")}});
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("distances: exact everywhere"));
   EXPECT_TRUE(fs::exists(at("error.png")));

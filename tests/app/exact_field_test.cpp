@@ -48,7 +48,8 @@ const std::map<std::string, std::string> kExempt = {
 /// the current field; $out, an empty folder for results; $points, a file of points; and $cpu, true or false.
 const std::multimap<std::string, std::string> kTrials = {
     {"build", "build builtin:box strategy=hpx target-error=1e-3 grid=3 output=$out/f.hpsdf"},
-    {"combine", "combine \"union($field, offset(builtin:box, 0.1))\" target-error=1e-2 output=$out/f.hpsdf"},
+    // The result has no exact leaves, so that it is not saved where the fields of a trial must have some.
+    {"combine", "combine \"union($field, offset(builtin:box, 0.1))\" target-error=1e-2; expect at(0,0,0).value < -0.1"},
     {"load", "load $field; expect stats.exact_leaves.leaves > 0"},
     {"save", "save output=$out/f.hpsdf"},
     {"save", "save output=$out/f.hpsdf compress=true; load $out/f.hpsdf; expect stats.exact_leaves.leaves > 0"},
