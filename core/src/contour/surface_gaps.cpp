@@ -11,9 +11,9 @@
 namespace hpsdf::contouring {
 namespace {
 
-constexpr std::size_t kLeavesAtOnce = 64;
-constexpr std::size_t kSeeds = 9;  ///< the middles of a leaf and of its eight parts
-constexpr std::size_t kPointsAtOnce = kSeeds * kLeavesAtOnce;
+constexpr std::size_t kGapLeavesAtOnce = 64;
+constexpr std::size_t kSeedsOfLeaf = 9;  ///< the middles of a leaf and of its eight parts
+constexpr std::size_t kGapPointsAtOnce = kSeedsOfLeaf * kGapLeavesAtOnce;
 
 /// A leaf with its sheets, which are successive.
 struct LeafSheets {
@@ -55,7 +55,7 @@ class TrianglesOfEdges {
 /// Moves points along the gradient to the zero set. Afterwards, a point counts if its value is at most `accuracy`.
 void moveToSurface(const ImplicitSurface& surface, std::span<Vector3> points, double accuracy, std::span<bool> counts) {
   constexpr int kSteps = 4;
-  std::array<ValueAndGradient, kPointsAtOnce> found;
+  std::array<ValueAndGradient, kGapPointsAtOnce> found;
   for (int step = 0; step <= kSteps; ++step) {
     surface.valuesAndGradients(points, std::span(found).first(points.size()));
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -68,8 +68,8 @@ void moveToSurface(const ImplicitSurface& surface, std::span<Vector3> points, do
 }
 
 /// Returns the greatest distance from those points that count to the triangles around the crossed edges of a leaf.
-double greatestDistance(const LeafSheets& leaf, const Sheets& sheets, const TrianglesOfEdges& trianglesOfEdges,
-                        const DualMesh& mesh, std::span<const Vector3> points, std::span<const bool> counts) {
+double greatestGapOf(const LeafSheets& leaf, const Sheets& sheets, const TrianglesOfEdges& trianglesOfEdges,
+                     const DualMesh& mesh, std::span<const Vector3> points, std::span<const bool> counts) {
   std::vector<bvh::TriangleFrame> frames;
   for (std::uint32_t sheet = leaf.first; sheet < leaf.end; ++sheet)
     for (const std::uint32_t edge : sheets.edgesOf(sheet))
@@ -94,26 +94,26 @@ void findSurfaceGaps(const ImplicitSurface& surface, const ContourOctree& octree
                      std::vector<double>& gaps) {
   const std::vector<LeafSheets> leaves = leavesOf(sheets, gaps);
   const TrianglesOfEdges trianglesOfEdges(edges.size(), mesh.edgeOfTriangle);
-  detail::forEachChunk(leaves.size(), kLeavesAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+  detail::forEachChunk(leaves.size(), kGapLeavesAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
     progress.throwIfCancelled();
-    std::array<Vector3, kPointsAtOnce> memory;
-    std::array<bool, kPointsAtOnce> counts;
-    const std::span points = std::span(memory).first(kSeeds * count);
+    std::array<Vector3, kGapPointsAtOnce> memory;
+    std::array<bool, kGapPointsAtOnce> counts;
+    const std::span points = std::span(memory).first(kSeedsOfLeaf * count);
     const auto boxOf = [&](std::size_t i) { return octree.box(octree[leaves[first + i].cell]); };
     for (std::size_t i = 0; i < count; ++i) {
       const Box box = boxOf(i);
       for (int n = 0; n < 8; ++n)
-        points[kSeeds * i + n] = (box.center() + box.corner(static_cast<Box::CornerType>(n))) / 2;
-      points[kSeeds * i + 8] = box.center();
+        points[kSeedsOfLeaf * i + n] = (box.center() + box.corner(static_cast<Box::CornerType>(n))) / 2;
+      points[kSeedsOfLeaf * i + 8] = box.center();
     }
     moveToSurface(surface, points, accuracy, counts);
     for (std::size_t i = 0; i < count; ++i) {
       const Box box = boxOf(i);
-      const std::span ours = points.subspan(kSeeds * i, kSeeds);
-      const std::span isOurs = std::span(counts).subspan(kSeeds * i, kSeeds);
-      for (std::size_t k = 0; k < kSeeds; ++k) isOurs[k] = isOurs[k] && box.contains(ours[k]);
+      const std::span ours = points.subspan(kSeedsOfLeaf * i, kSeedsOfLeaf);
+      const std::span isOurs = std::span(counts).subspan(kSeedsOfLeaf * i, kSeedsOfLeaf);
+      for (std::size_t k = 0; k < kSeedsOfLeaf; ++k) isOurs[k] = isOurs[k] && box.contains(ours[k]);
       gaps[static_cast<std::size_t>(leaves[first + i].cell)] =
-          greatestDistance(leaves[first + i], sheets, trianglesOfEdges, mesh, ours, isOurs);
+          greatestGapOf(leaves[first + i], sheets, trianglesOfEdges, mesh, ours, isOurs);
     }
   });
 }

@@ -25,25 +25,25 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A format in which meshes are written.
-struct Format {
+struct WrittenFormat {
   const char* extension;
   bool isSingle;  ///< coordinates are single-precision numbers
   void (*write)(const TriangleMesh& mesh, const VertexData& data, const mesh::WriteBytes& write);
 };
 
-constexpr std::array kFormats = {
-    Format{".obj", false, mesh::writeObj},
-    Format{".ply", false, mesh::writePly},
-    Format{".stl", true,
-           [](const TriangleMesh& surface, const VertexData&, const mesh::WriteBytes& write) {
-             mesh::writeStl(surface, write);
-           }},
-    Format{".glb", true, mesh::writeGlb},
+constexpr std::array kWrittenFormats = {
+    WrittenFormat{".obj", false, mesh::writeObj},
+    WrittenFormat{".ply", false, mesh::writePly},
+    WrittenFormat{".stl", true,
+                  [](const TriangleMesh& surface, const VertexData&, const mesh::WriteBytes& write) {
+                    mesh::writeStl(surface, write);
+                  }},
+    WrittenFormat{".glb", true, mesh::writeGlb},
 };
 
-const Format& formatOf(const fs::path& file) {
+const WrittenFormat& writtenFormat(const fs::path& file) {
   const std::string extension = lowerExtension(file);
-  for (const Format& format : kFormats)
+  for (const WrittenFormat& format : kWrittenFormats)
     if (format.extension == extension) return format;
   throw Error(ErrorKind::file, file.string(),
               "meshes are written as .obj, .ply, .stl or .glb; give a name that ends so");
@@ -85,14 +85,14 @@ TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress) 
 }
 
 void checkMeshWritable(const fs::path& file) {
-  formatOf(file);
+  writtenFormat(file);
   checkWritable(file);
 }
 
-bool isSinglePrecisionMesh(const fs::path& file) { return formatOf(file).isSingle; }
+bool isSinglePrecisionMesh(const fs::path& file) { return writtenFormat(file).isSingle; }
 
 void saveMesh(const TriangleMesh& mesh, const fs::path& file, const VertexData& data) {
-  const Format& format = formatOf(file);
+  const WrittenFormat& format = writtenFormat(file);
   if (format.isSingle) requireDifferentInSinglePrecision(mesh, file);
   OutputFile out(file);
   format.write(mesh, data, [&](std::span<const std::byte> bytes) { out.write(bytes); });

@@ -9,7 +9,7 @@ namespace hpsdf::mesh {
 namespace {
 
 // Numbers of the glTF 2.0 specification.
-constexpr std::uint32_t kMagic = 0x46546c67, kVersion = 2, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
+constexpr std::uint32_t kGlbMagic = 0x46546c67, kGlbVersion = 2, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 constexpr int kUnsignedByte = 5121, kUnsignedInt = 5125, kFloat = 5126;
 constexpr int kVertexBuffer = 34962, kIndexBuffer = 34963;
 constexpr std::size_t kChunkHeader = 8, kFileHeader = 12;
@@ -78,7 +78,7 @@ void writeGlb(const TriangleMesh& mesh, const VertexData& data, const WriteBytes
     throw Error(ErrorKind::limit, "", "a .glb file holds at most 4 GB; write .ply, or allow a greater tolerance");
   ByteStream out(write);
   for (const std::uint32_t number :
-       {kMagic, kVersion, static_cast<std::uint32_t>(size), static_cast<std::uint32_t>(text.size()), kJsonChunk})
+       {kGlbMagic, kGlbVersion, static_cast<std::uint32_t>(size), static_cast<std::uint32_t>(text.size()), kJsonChunk})
     out.addBytesOf(number);
   out.add(text);
   out.addBytesOf(static_cast<std::uint32_t>(document.bytes()));
