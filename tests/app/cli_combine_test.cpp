@@ -98,8 +98,14 @@ TEST_F(Combine, hostileCallsLeaveNothingBehind) {
   expectNothing({"difference(builtin:box, builtin:box)"}, "nothing is left of the meshes");
   expectNothing({"intersection(builtin:box, move(builtin:box, 9, 0, 0))"}, "nothing is left of the meshes");
   expectNothing({"offset(" + field() + ", 0.1)", "--tolerance", "1%", "--certified"},
-                "nothing is proven of an expression with a field");
-  expectNothing({field(), "--bounds"}, "bounds: nothing is proven");
+                "column 8: " + field() + ": nothing is proven of a field");
+  expectNothing({field(), "--bounds"}, "errors of its own: leave out bounds");
+  saveMesh({.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+            .triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}},
+            .name = ""},
+           at("open.ply"));
+  expectRefused({{"combine", at("open.ply"), "-o", at("x.hpsdf"), "--bounds"}}, "the mesh has holes");
+  fs::remove(at("open.ply"));
   expectNothing({"builtin:box", "--tolerance", "-1"}, "tolerance");
   std::string deep(120, 'x');
   for (int i = 0; i < 120; ++i) deep = "offset(" + deep + ",1)";

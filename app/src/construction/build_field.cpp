@@ -55,16 +55,9 @@ void refuseOptionsOfMeshes(const std::string& surface, const Arguments& argument
                       name));
 }
 
-/// Throws `Error` for settings that promise more than the values of fields can keep.
-void refuseProofsOfFields(const BuildOptions& options, const Expression& expression) {
-  if (!hasField(expression)) return;
-  const auto refuse = [](const char* name) {
-    throw Error(ErrorKind::option, name,
-                "nothing is proven of an expression with a field, because a field has errors of its own; leave it out, "
-                "or take the mesh in place of the field");
-  };
-  if (options.certified) refuse("certified");
-  if (options.bounds) refuse("bounds");
+/// Returns the name of the setting by which a construction proves its errors, or "".
+std::string proofOf(const BuildOptions& options) {
+  return options.certified ? "certified" : options.bounds ? "bounds" : "";
 }
 
 /// Warns if no point of a lattice in the domain is inside, because offsets and differences by values may leave nothing.
@@ -143,10 +136,9 @@ BuildInput combinedInput(const Console& console, const std::string& expression, 
   return namingSurface("expression", [&]() -> BuildInput {
     // Find mistakes in the text and in the arguments before the long work starts.
     const Expression parsed = parseExpression(expression);
-    buildOptions(arguments, 1);
+    const std::string proof = proofOf(buildOptions(arguments, 1));
     const DistanceOptions insideOptions = distanceOptions(arguments);
-    const Expression loaded = withLoadedOperands(console, parsed, insideOptions.insideTest);
-    refuseProofsOfFields(buildOptions(arguments, 1), loaded);
+    const Expression loaded = withLoadedOperands(console, parsed, insideOptions.insideTest, proof);
 
     // Set up the distance function, from which the size of the surface is known.
     const auto start = std::chrono::steady_clock::now();

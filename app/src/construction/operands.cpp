@@ -1,30 +1,39 @@
 #include "construction/operands.h"
 
-#include <algorithm>
-#include <memory>
-#include <variant>
+#include <utility>
 
 #include "construction/file_kind.h"
 #include "construction/surface.h"
+#include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/shapes.h"
 
 namespace hpsdf::app {
+namespace {
 
-Expression withLoadedOperands(const Console& console, const Expression& expression, InsideTest insideTest) {
-  return withOperands(expression, [&](const std::string& name) -> Expression {
-    if (name.starts_with(kAnalytic)) return shapes::analytic(name);
-    if (!isShape(name) && kindOfFile(name) == FileKind::field) return load(name);
-    TriangleMesh mesh = importSurface(console, name).mesh;
-    requireDistanceMemory(mesh, insideTest);
-    return mesh;
-  });
+void refuseProof(const std::string& proof, const std::string& name, const char* reason) {
+  if (!proof.empty())
+    throw Error(ErrorKind::option, name, reason + (": leave out " + proof) + ", or take another operand");
 }
 
-bool hasField(const Expression& expression) {
-  const Expression::Node& node = expression.node();
-  if (std::holds_alternative<std::shared_ptr<const Field>>(node.operand)) return true;
-  return std::ranges::any_of(node.operands, hasField);
+Expression loadedMesh(const Console& console, const std::string& name, InsideTest insideTest,
+                      const std::string& proof) {
+  ImportedMesh imported = importSurface(console, name);
+  if (!imported.report.closed()) refuseProof(proof, name, "the mesh has holes, beside which nothing is proven");
+  requireDistanceMemory(imported.mesh, insideTest);
+  return std::move(imported.mesh);
+}
+
+}  // namespace
+
+Expression withLoadedOperands(const Console& console, const Expression& expression, InsideTest insideTest,
+                              const std::string& proof) {
+  return withOperands(expression, [&](const std::string& name) -> Expression {
+    if (name.starts_with(kAnalytic)) return shapes::analytic(name);
+    if (isShape(name) || kindOfFile(name) != FileKind::field) return loadedMesh(console, name, insideTest, proof);
+    refuseProof(proof, name, "nothing is proven of a field, which has errors of its own");
+    return load(name);
+  });
 }
 
 }  // namespace hpsdf::app

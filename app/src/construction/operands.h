@@ -10,11 +10,10 @@
 namespace hpsdf::app {
 
 /// Returns the expression with its operands loaded: field files, mesh files and built-in shapes. Each file is read
-/// once. Throws `Error` if a file cannot be loaded or a mesh does not fit into memory, naming the column of its name,
-/// and `Cancelled` after Ctrl-C.
-Expression withLoadedOperands(const Console& console, const Expression& expression, InsideTest insideTest);
-
-/// Returns true if the loaded expression has a field among its operands.
-bool hasField(const Expression& expression);
+/// once. If `proof` names a setting that proves errors, such as "certified", fields and open meshes are refused, of
+/// which nothing is proven. Throws `Error` if a file cannot be loaded or a mesh does not fit into memory, naming the
+/// column of its name, and `Cancelled` after Ctrl-C.
+Expression withLoadedOperands(const Console& console, const Expression& expression, InsideTest insideTest,
+                              const std::string& proof = "");
 
 }  // namespace hpsdf::app
