@@ -1,7 +1,8 @@
 #include "hpsdf/combine/combined_distance.h"
 
+#include <algorithm>
 #include <cassert>
-#include <map>
+#include <iterator>
 #include <optional>
 #include <utility>
 
