@@ -190,7 +190,7 @@ TEST_F(Samples, queryTakesPointsBesideAMeshOrAField) {
             at("c.csv") + ": 1 point\n");
   EXPECT_EQ(readFile(at("c.csv")), expected);
   const std::set<std::string> before = {"c.csv", "p.txt"};
-  expectRefused({{"query", "--closest", "analytic:torus", "0,0,0"}}, "an analytic shape has no faces", before);
+  expectRefused({{"query", "--closest", "analytic:torus", "0,0,0"}}, "an analytic shape has no mesh", before);
   expectRefused({{"query", "--closest", at("none.obj"), "0,0,0"}}, "none.obj: no such file", before);
   expectRefused({{"query", "--closest", "builtin:torus", at("none.txt")}}, "none.txt: no such file", before);
   expectRefused({{"query", "--closest", "builtin:torus", "0,0"}}, "expected three finite numbers", before);

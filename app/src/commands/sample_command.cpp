@@ -86,9 +86,8 @@ Normalization toUnitSphere(const TriangleMesh& mesh) {
 
 MadeSamples samplesOfMesh(const Console& console, const std::string& surface, const Arguments& arguments) {
   return namingSurface(surface, [&] {
+    requireMesh(surface);
     PreparedSurface prepared = prepareSurface(console, surface, false);
-    if (prepared.function)
-      throw Error("an analytic shape has no mesh; give builtin:" + surface.substr(kAnalytic.size()));
     MadeSamples made;
     if (arguments.flag("unit-sphere")) {
       made.normalization = prepared.normalization = toUnitSphere(prepared.mesh);
@@ -109,8 +108,8 @@ TriangleMesh surfaceOfField(const Console& console, const Field& field, const Ar
     const std::string surface = arguments.text("mesh");
     const bool normalizes = !field.metadata().source.normalization.isIdentity();
     return namingSurface(surface, [&] {
+      requireMesh(surface);
       PreparedSurface prepared = prepareSurface(console, surface, normalizes);
-      if (prepared.function) throw Error("an analytic shape has no mesh; leave it out");
       return std::move(prepared.mesh);
     });
   }

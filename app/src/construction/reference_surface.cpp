@@ -108,9 +108,8 @@ std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, co
 MeshDistance meshDistance(const Console& console, const std::string& surface, const std::optional<Source>& source,
                           const DistanceOptions& options) {
   return namingSurface(surface, [&] {
+    requireMesh(surface);
     PreparedSurface prepared = prepareSurface(console, surface, source && !source->normalization.isIdentity());
-    if (prepared.function)
-      throw Error("an analytic shape has no faces; take builtin:" + surface.substr(kAnalytic.size()));
     auto distance = distanceToMesh(console, surface, prepared, source ? distanceOptions(*source) : options);
     if (source) warnIfForeign(console, surface, distance->source(), *source);
     return MeshDistance{std::move(prepared.mesh), std::move(distance)};

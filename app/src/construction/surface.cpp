@@ -101,13 +101,17 @@ DistanceFunction normalizedFunction(const DistanceFunction& distance) {
 
 bool isShape(std::string_view surface) { return surface.starts_with(kBuiltin) || surface.starts_with(kAnalytic); }
 
-ImportedMesh importSurface(const Console& console, const std::string& surface) {
+void requireMesh(const std::string& surface) {
   if (surface.starts_with(kAnalytic))
     throw Error(ErrorKind::mesh, surface,
                 "an analytic shape has no mesh; take builtin:" + surface.substr(kAnalytic.size()));
   if (isGridName(surface))
     throw Error(ErrorKind::mesh, surface,
                 "a grid has no mesh; 'hpsdf build' makes a field from it, and 'hpsdf contour' a mesh from that");
+}
+
+ImportedMesh importSurface(const Console& console, const std::string& surface) {
+  requireMesh(surface);
   if (surface.starts_with(kBuiltin)) {
     TriangleMesh mesh = shapes::mesh(surface);
     const MeshReport report = inspect(mesh);

@@ -27,6 +27,9 @@ bool isShape(std::string_view surface);
 /// grid, and `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
+/// Throws `Error` if the name is that of an analytic shape or a grid, which have no mesh.
+void requireMesh(const std::string& surface);
+
 /// A surface in the units of the field: a mesh, or a distance without one.
 struct PreparedSurface {
   std::optional<DistanceFunction> function;  ///< set for an analytic shape or a grid; other surfaces have a mesh
