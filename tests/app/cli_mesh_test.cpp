@@ -66,7 +66,7 @@ TEST_F(MeshCommand, repairsAMesh) {
   EXPECT_EQ(after.at("faces"), 4);
   EXPECT_EQ(after.at("sign").at("by"), "pseudonormal");
   EXPECT_THAT(run({{"mesh", at("repaired.ply"), "--repair", at("again.obj")}}).out, HasSubstr("nothing to do"));
-  expectRefused({{"mesh", at("bad.obj"), "--repair", at("repaired.stl")}}, ".obj or .ply");
+  expectRefused({{"mesh", at("bad.obj"), "--repair", at("repaired.fbx")}}, ".stl or .glb");
   expectRefused({{"mesh", at("bad.obj"), "--repair", at("none/mended.obj")}}, "none");
 }
 

@@ -222,15 +222,15 @@ TEST(Contour, inSinglePrecisionIsAClosedManifoldOfSuchNumbers) {
 }
 
 /// A plate that is thinner than the smallest cells, between two solids.
-TEST(Contour, countsCellsThatMayMissParts) {
+TEST(Contour, countsCellsThatLoseParts) {
   const auto withPlate = [](const Vector3& x) {
     return std::min(x.norm() - 0.3, std::max(std::abs(x.z() - 0.5) - 0.01, x.head<2>().norm() - 0.3));
   };
   const Field field = build(withPlate, cubeOf(), {.targetError = 1e-6});
   const Contour coarse = contour(field, {.tolerance = 0.05});
   const Contour sphereContour = contour(sphereField(), {.tolerance = 0.05});
-  EXPECT_GT(coarse.mayMissParts, 10u);
-  EXPECT_EQ(sphereContour.mayMissParts, 0u);
+  EXPECT_GT(coarse.lostParts, 10u);
+  EXPECT_EQ(sphereContour.lostParts, 0u);
 }
 
 TEST(Contour, doesNotDependOnThreads) {

@@ -82,7 +82,7 @@ Json contourJson(const WrittenContour& written) {
           {"greatest_value", made.greatestValue},
           {"blended", written.isBlended},
           {"missed", made.unresolved},
-          {"cells_that_may_miss_parts", made.mayMissParts},
+          {"cells_with_lost_parts", made.lostParts},
           {"cells_with_multiple_sheets", made.multipleSheets},
           {"divided_polygons", made.fans},
           {"crossing", made.flawed}};
@@ -96,10 +96,9 @@ std::string contourText(const WrittenContour& written) {
   text += summaryRow("from the surface", fmt::format("the field is {} there at most, for a tolerance of {}",
                                                      shortNumber(made.greatestValue), shortNumber(written.tolerance)));
   if (written.isBlended) text += summaryRow("field", "blended first, so that the mesh has no steps between cells");
-  if (made.mayMissParts > 0)
-    text +=
-        summaryRow("may be lost", fmt::format("parts or gaps thinner than the tolerance, in {} of the smallest cells",
-                                              grouped(made.mayMissParts)));
+  if (made.lostParts > 0)
+    text += summaryRow("lost", fmt::format("parts or gaps thinner than the tolerance, in {} of the smallest cells",
+                                           grouped(made.lostParts)));
   if (made.multipleSheets > 0)
     text +=
         summaryRow("kept apart", fmt::format("sheets that come closer than the tolerance, in {} of the smallest cells",

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <span>
@@ -60,12 +58,6 @@ bool isMeshFileName(const std::filesystem::path& file);
 /// Returns the mesh of a built-in shape (`shapes::mesh`) if the name starts with `builtin:`, else the mesh of the file
 /// with this name (`importMesh`).
 TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress = {});
-
-/// Data of vertices that is written with a mesh. Each list is empty or has one entry for each vertex.
-struct VertexData {
-  std::span<const Vector3> normals = {};                     ///< unit vectors
-  std::span<const std::array<std::uint8_t, 3>> colors = {};  ///< red, green, blue (sRGB)
-};
 
 /// Writes a mesh as OBJ, binary PLY, binary STL or GLB (binary glTF 2.0), depending on the file's extension. OBJ and
 /// PLY keep coordinates in full double precision; STL and GLB hold single-precision numbers, and STL no data of

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,12 @@ struct TriangleMesh {
   std::vector<Vector3> vertices;
   std::vector<Triangle> triangles;
   std::string name;  ///< the file's name without its path, or a shape's specification; for messages and metadata
+};
+
+/// Data of vertices that is written with a mesh. Each list is empty or has one entry for each vertex.
+struct VertexData {
+  std::span<const Vector3> normals = {};                     ///< unit vectors
+  std::span<const std::array<std::uint8_t, 3>> colors = {};  ///< red, green, blue (sRGB)
 };
 
 /// Returns the positions of the three vertices of a triangle.

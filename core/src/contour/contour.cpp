@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "contour/cell_samples.h"
-#include "contour/contour_octree.h"
-#include "contour/implicit_surface.h"
+#include "contour/cells/cell_samples.h"
+#include "contour/cells/contour_octree.h"
+#include "contour/cells/implicit_surface.h"
 #include "contour/open_mesh.h"
 #include "contour/surface_mesh.h"
 #include "hpsdf/detail/memory.h"
@@ -248,14 +248,31 @@ class Contouring {
 
   /// Counts the smallest cells that hold more than the mesh can show.
   void countLosses() {
-    for (std::size_t i = 0; i < samples_.size(); ++i)
-      if (octree_.cells()[i].isLeaf() && samples_[i].hides) ++result_.mayMissParts;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const ContourCell& cell = octree_.cells()[i];
+      if (cell.isLeaf() && samples_[i].hides && (samples_[i].changesSign || holdsOtherSign(cell))) ++result_.lostParts;
+    }
     const Sheets& sheets = mesh_.sheets();
     for (std::uint32_t sheet = 1; sheet < sheets.size(); ++sheet) {
       const std::int32_t cell = sheets.cellOf(sheet);
       const bool isFirst = sheet == 1 || sheets.cellOf(sheet - 2) != cell;
       if (cell == sheets.cellOf(sheet - 1) && isFirst) ++result_.multipleSheets;
     }
+  }
+
+  /// Returns true if a point of a lattice in the cell has another sign than the cell's corner. The certified range,
+  /// which says that the cell may hold such points, is wider than the values.
+  bool holdsOtherSign(const ContourCell& cell) const {
+    constexpr int kAlong = 7;
+    const Box box = octree_.box(cell);
+    std::array<Vector3, kAlong * kAlong * kAlong> points;
+    for (int n = 0; n < kAlong * kAlong * kAlong; ++n) {
+      const Vector3 share = Vector3(n % kAlong, n / kAlong % kAlong, n / (kAlong * kAlong)) / (kAlong - 1);
+      points[n] = box.min() + share.cwiseProduct(box.sizes());
+    }
+    std::array<double, points.size()> values;
+    surface_.values(points, values);
+    return std::ranges::any_of(values, [&](double value) { return isInside(value) != isInside(values[0]); });
   }
 
   Contour finish() {

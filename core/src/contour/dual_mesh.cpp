@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "contour/bisection.h"
+#include "contour/cells/bisection.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {

@@ -2,9 +2,9 @@
 
 #include <span>
 
-#include "contour/crossed_edges.h"
+#include "contour/cells/crossed_edges.h"
+#include "contour/cells/implicit_surface.h"
 #include "contour/dual_mesh.h"
-#include "contour/implicit_surface.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::contouring {

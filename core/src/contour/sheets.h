@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "contour/contour_octree.h"
-#include "contour/crossed_edges.h"
+#include "contour/cells/contour_octree.h"
+#include "contour/cells/crossed_edges.h"
 
 namespace hpsdf::contouring {
 

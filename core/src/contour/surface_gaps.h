@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "contour/contour_octree.h"
-#include "contour/crossed_edges.h"
+#include "contour/cells/contour_octree.h"
+#include "contour/cells/crossed_edges.h"
+#include "contour/cells/implicit_surface.h"
 #include "contour/dual_mesh.h"
-#include "contour/implicit_surface.h"
 #include "contour/sheets.h"
 #include "hpsdf/error.h"
 

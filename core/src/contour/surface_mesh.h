@@ -6,11 +6,11 @@
 #include <span>
 #include <vector>
 
-#include "contour/cell_samples.h"
-#include "contour/contour_octree.h"
-#include "contour/crossed_edges.h"
+#include "contour/cells/cell_samples.h"
+#include "contour/cells/contour_octree.h"
+#include "contour/cells/crossed_edges.h"
+#include "contour/cells/implicit_surface.h"
 #include "contour/dual_mesh.h"
-#include "contour/implicit_surface.h"
 #include "contour/sheets.h"
 #include "hpsdf/error.h"
 

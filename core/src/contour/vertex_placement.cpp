@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "contour/bisection.h"
-#include "contour/meeting_point.h"
+#include "contour/cells/bisection.h"
+#include "contour/cells/meeting_point.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {

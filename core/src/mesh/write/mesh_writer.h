@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 
-#include "hpsdf/mesh_file.h"
 #include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::mesh {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "contour/contour_octree.h"
-#include "contour/implicit_surface.h"
+#include "contour/cells/contour_octree.h"
+#include "contour/cells/implicit_surface.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::contouring {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contour/implicit_surface.h"
+#include "contour/cells/implicit_surface.h"
 #include "hpsdf/types.h"
 
 namespace hpsdf::contouring {

@@ -1,4 +1,4 @@
-#include "contour/meeting_point.h"
+#include "contour/cells/meeting_point.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

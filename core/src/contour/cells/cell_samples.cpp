@@ -1,9 +1,9 @@
-#include "contour/cell_samples.h"
+#include "contour/cells/cell_samples.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "contour/meeting_point.h"
+#include "contour/cells/meeting_point.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {

@@ -1,4 +1,4 @@
-#include "contour/implicit_surface.h"
+#include "contour/cells/implicit_surface.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "contour/contour_octree.h"
+#include "contour/cells/contour_octree.h"
 
 #include <cmath>
 

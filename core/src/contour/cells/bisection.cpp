@@ -1,9 +1,9 @@
-#include "contour/bisection.h"
+#include "contour/cells/bisection.h"
 
 #include <array>
 #include <cmath>
 
-#include "contour/cell_samples.h"
+#include "contour/cells/cell_samples.h"
 
 namespace hpsdf::contouring {
 

@@ -1,4 +1,4 @@
-#include "contour/crossed_edges.h"
+#include "contour/cells/crossed_edges.h"
 
 #include <algorithm>
 #include <cmath>

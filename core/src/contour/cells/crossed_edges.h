@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "contour/cell_samples.h"
-#include "contour/contour_octree.h"
-#include "contour/implicit_surface.h"
+#include "contour/cells/cell_samples.h"
+#include "contour/cells/contour_octree.h"
+#include "contour/cells/implicit_surface.h"
 #include "hpsdf/error.h"
 #include "hpsdf/types.h"
 
