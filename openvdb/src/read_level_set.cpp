@@ -68,10 +68,25 @@ Grid::Ptr asLevelSet(const openvdb::GridBase::Ptr& grid) {
   return nullptr;
 }
 
+void requireSampleMemory(double blocks) {
+  requireMemory("the samples of the level set", blocks * 2 * sizeof(SampledBlocks::Block),
+                "take a level set with larger voxels");
+}
+
+/// Throws `Error` for a grid whose active voxels do not fit into memory. Active tiles, of which a level set has none,
+/// hold up to 4096³ voxels each in a few bytes of a file.
+void requireVoxelMemory(const Grid& grid) {
+  const double voxels = double(grid.tree().activeVoxelCount()) - double(grid.tree().activeLeafVoxelCount());
+  requireSampleMemory(voxels / Leaf::NUM_VALUES + double(grid.tree().leafCount()));
+}
+
 Grid::Ptr levelSetOf(const fs::path& file) {
   const openvdb::GridPtrVecPtr grids = readGrids(file);
   for (const openvdb::GridBase::Ptr& grid : *grids)
-    if (Grid::Ptr found = asLevelSet(grid)) return found;
+    if (Grid::Ptr found = asLevelSet(grid)) {
+      requireVoxelMemory(*found);
+      return found;
+    }
   refuseFile(file, "the file holds no level set of floats or doubles");
 }
 
@@ -150,8 +165,7 @@ SampledBlocks samplesOf(const Grid& levelSet, const Vector3& origin, const Vecto
   widened.voxelizeActiveTiles();
   std::vector<const Leaf*> leaves;
   for (auto leaf = widened.cbeginLeaf(); leaf; ++leaf) leaves.push_back(leaf.getLeaf());
-  requireMemory("the samples of the level set", double(leaves.size()) * 2 * sizeof(SampledBlocks::Block),
-                "take a level set with larger voxels");
+  requireSampleMemory(double(leaves.size()));
   SampledBlocks samples{.origin = origin, .spacing = spacing, .blocks = {}};
   samples.blocks.resize(leaves.size());
   tbb::parallel_for(std::size_t{0}, leaves.size(),

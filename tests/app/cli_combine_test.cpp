@@ -80,7 +80,7 @@ TEST_F(Combine, mistakesAreOneLineWithTheColumn) {
                "20: there is no operation 'ofset'; did you mean 'offset'?");
   expectColumn("union(builtin:box", "18: expected ',' or ')', found the end");
   expectColumn(" ", "2: expected a file, a shape or an operation, found the end");
-  expectColumn("scale(builtin:box, 1, 2, 1)", "1: scale: is written scale(A, S): different factors");
+  expectColumn("scale(builtin:box, 1, 2, 1)", "1: scale: it is written scale(A, S): different factors");
   expectColumn("union(builtin:box, none.obj)", "20: none.obj: no such file");
   expectColumn("union(builtin:box, \"no\nne.obj\")", "20: no ne.obj: no such file");
   expectColumn("union(builtin:box, builtin:sphere,radius=0)", "20: ");

@@ -245,6 +245,33 @@ TEST(Combine, coincidentFacesVanish) {
             1e-12);
 }
 
+/// On the plane where two operands touch, a point is on the surface of each and in neither, yet deep inside their
+/// union.
+TEST(Combine, pointsWhereOperandsTouchAreInside) {
+  const TriangleMesh left = boxBetween({-1, -1, -1}, {0, 1, 1}), right = boxBetween({0, -1, -1}, {1, 1, 1});
+  TriangleMesh overlapping = boxBetween({-1, -1, -1}, {0.5, 1, 1});
+  const TriangleMesh other = boxBetween({0, -1, -1}, {1, 1, 1});
+  for (const Triangle& t : other.triangles) overlapping.triangles.push_back({t[0] + 8, t[1] + 8, t[2] + 8});
+  overlapping.vertices.insert(overlapping.vertices.end(), other.vertices.begin(), other.vertices.end());
+  std::vector<Vector3> lattice;
+  for (int n = 0; n < 17 * 17 * 17; ++n)
+    lattice.emplace_back(Vector3(n % 17 - 8, n / 17 % 17 - 8, n / 289 - 8) / 8 * 0.9375);
+  for (const double degrees : {0.0, 33.0})
+    for (const Expression& solid : {unite(left, right), Expression(overlapping)}) {
+      const CombinedDistance combined(rotated(unite(solid, boxBetween({3, 3, 3}, {4, 4, 4})), {1, 2, 3}, degrees));
+      std::vector<Vector3> places;
+      for (const Vector3& x : lattice)
+        places.push_back(Eigen::AngleAxisd(degrees * M_PI / 180, Vector3(1, 2, 3).normalized()) * x);
+      std::vector<double> values(places.size());
+      combined(places, values);
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        const double exact = shapes::boxDistance(lattice[i], Vector3::Ones());
+        EXPECT_NEAR(values[i], exact, 1e-12) << lattice[i].transpose();
+        EXPECT_NEAR(combined(places[i]), exact, 1e-12) << lattice[i].transpose();
+      }
+    }
+}
+
 TEST(Combine, nothingLeftIsRefused) {
   const TriangleMesh box = support::boxOfTwo();
   const auto refusal = [](const Expression& expression) -> std::string {
@@ -415,6 +442,24 @@ TEST(Combine, fieldsAreLowerBoundsBeyondTheirDomains) {
   }
   const Box box = united.source().box;
   EXPECT_TRUE(box.contains(Box(Vector3(-2.7, -0.7, -0.7), Vector3(2.7, 0.7, 0.7))));
+}
+
+TEST(Combine, fieldsEndAtTheWallsOfTheirDomains) {
+  const auto ballFunction = [](const Vector3& x) { return x.norm() - 0.7; };
+  const Field half = build(ballFunction, Box(Vector3(-1, -1, -1), Vector3(0.2, 1, 1)), {.targetError = 1e-9});
+  const CombinedDistance grown(offset(half, 0.1));
+  EXPECT_NEAR(grown({0.1, 0, 0}), -0.1 - 0.1, 1e-3) << "the wall is the nearest surface";
+  EXPECT_NEAR(grown({0.5, 0.1, 0}), 0.3 - 0.1, 1e-12) << "outside the wall";
+  EXPECT_NEAR(grown({-0.9, 0, 0}), 0.2 - 0.1, 1e-3) << "the ball";
+  const ValueAndGradient atWall = [&] {
+    const Vector3 x(0.15, 0.05, 0);
+    double value = 0;
+    Vector3 gradient;
+    grown.withGradients({&x, 1}, {&value, 1}, {&gradient, 1});
+    return ValueAndGradient{value, gradient};
+  }();
+  EXPECT_EQ(atWall.gradient, Vector3(1, 0, 0));
+  EXPECT_NEAR(grown.source().box.max().x(), 0.3, 1e-9);
 }
 
 std::vector<Expression> someSolids() {

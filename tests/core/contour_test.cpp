@@ -12,10 +12,10 @@
 
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
-#include "hpsdf/detail/crossings.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/shapes.h"
+#include "support/contour_defects.h"
 #include "support/random_field.h"
 
 namespace hpsdf {
@@ -46,31 +46,6 @@ Field exactField(const std::string& shape) {
                {.targetError = 1e-6, .strategy = Strategy::hpx});
 }
 
-/// Returns true if two triangles have corners at the same position.
-bool shareAPosition(const TriangleMesh& mesh, const std::array<std::uint32_t, 2>& triangles) {
-  const auto one = cornersOf(mesh, mesh.triangles[triangles[0]]), other = cornersOf(mesh, mesh.triangles[triangles[1]]);
-  return std::ranges::any_of(one, [&](const Vector3& x) { return std::ranges::find(other, x) != other.end(); });
-}
-
-/// Returns the defects of a mesh in words, or "" for a closed manifold without crossings. If it may be open, edges on
-/// its boundary do not count, and triangles with different vertices at one position do not cross.
-std::string defectsOf(const TriangleMesh& mesh, bool mayBeOpen = false) {
-  Crossings crossings = findCrossings(mesh);
-  if (mayBeOpen)
-    std::erase_if(crossings.found, [&](const Crossing& one) { return shareAPosition(mesh, one.triangles); });
-  const MeshDefects defects = findDefects(mesh, crossings);
-  std::string text;
-  const auto add = [&](DefectKind kind, const char* name) {
-    if (defects.count(kind) > 0) text += std::to_string(defects.count(kind)) + " " + name + "; ";
-  };
-  if (!mayBeOpen) add(DefectKind::boundaryEdge, "boundary edges");
-  add(DefectKind::nonManifoldEdge, "non-manifold edges");
-  add(DefectKind::inconsistentEdge, "inconsistent edges");
-  add(DefectKind::pinchedVertex, "pinched vertices");
-  add(DefectKind::crossing, "crossings");
-  return text;
-}
-
 /// Returns the greatest |f| at vertices, and at the middles of triangles and of their sides.
 double greatestAt(const TriangleMesh& mesh, const std::function<double(const Vector3&)>& f) {
   double greatest = 0;
@@ -85,14 +60,14 @@ double greatestAt(const TriangleMesh& mesh, const std::function<double(const Vec
 TEST(Contour, ofSmoothSurfacesIsAClosedManifoldWithinTheTolerance) {
   for (const double tolerance : {0.03, 0.01, 0.003}) {
     const Contour round = contour(sphereField(), {.tolerance = tolerance});
-    EXPECT_EQ(defectsOf(round.mesh), "") << tolerance;
+    EXPECT_EQ(support::contourDefects(round.mesh), "") << tolerance;
     EXPECT_LE(greatestAt(round.mesh, sphere), 1.05 * tolerance);
     EXPECT_NEAR(signedVolume(round.mesh), 4.0 / 3 * M_PI * 0.343, 6.2 * tolerance);
     EXPECT_EQ(round.unresolved, 0u);
     EXPECT_EQ(round.flawed, 0u);
 
     const Contour ring = contour(torusField(), {.tolerance = tolerance});
-    EXPECT_EQ(defectsOf(ring.mesh), "") << tolerance;
+    EXPECT_EQ(support::contourDefects(ring.mesh), "") << tolerance;
     EXPECT_LE(greatestAt(ring.mesh, torus), 1.05 * tolerance);
     const MeshReport report = inspect(ring.mesh);
     EXPECT_EQ(int(report.vertices) - int(report.faces) / 2, 0) << "the Euler characteristic of a torus";
@@ -113,7 +88,7 @@ TEST(Contour, verticesLieOnTheSurfaceAndNormalsPointAwayFromIt) {
 TEST(Contour, offsetsMoveTheSurface) {
   for (const double offset : {-0.2, 0.1, 0.25}) {
     const Contour moved = contour(sphereField(), {.offset = offset, .tolerance = 0.01});
-    EXPECT_EQ(defectsOf(moved.mesh), "") << offset;
+    EXPECT_EQ(support::contourDefects(moved.mesh), "") << offset;
     EXPECT_LE(greatestAt(moved.mesh, [&](const Vector3& x) { return sphere(x) - offset; }), 0.011);
   }
 }
@@ -121,7 +96,7 @@ TEST(Contour, offsetsMoveTheSurface) {
 TEST(Contour, keepsSharpEdgesAndCorners) {
   const Field box = exactField("box");
   const Contour found = contour(box, {.tolerance = 0.01});
-  EXPECT_EQ(defectsOf(found.mesh), "");
+  EXPECT_EQ(support::contourDefects(found.mesh), "");
   const Box bounds = boundingBox(shapes::mesh("box"));
   EXPECT_NEAR(signedVolume(found.mesh), bounds.volume(), 1e-9);
   for (int corner = 0; corner < 8; ++corner) {
@@ -137,11 +112,23 @@ TEST(Contour, ofPartsWithSharpEdgesIsAClosedManifoldWithinTheTolerance) {
   const ExactDistance distance(shapes::mesh("gear"));
   for (const double tolerance : {0.02, 0.005}) {
     const Contour found = contour(gear, {.tolerance = tolerance});
-    EXPECT_EQ(defectsOf(found.mesh), "") << tolerance;
+    EXPECT_EQ(support::contourDefects(found.mesh), "") << tolerance;
     EXPECT_LE(greatestAt(found.mesh, [&](const Vector3& x) { return distance(x); }), 1.01 * tolerance);
     EXPECT_EQ(found.unresolved, 0u);
     for (const Vector3& vertex : found.mesh.vertices) EXPECT_LE(std::abs(gear.value(vertex)), 1e-3 * tolerance);
   }
+}
+
+/// The command blends fields that jump. Ranges of blended exact leaves are wide, which must not lead to smallest cells
+/// all around the surface.
+TEST(Contour, ofBlendedExactLeavesTakesAboutAsMuchWorkAsOfOthers) {
+  const Field gear = exactField("gear");
+  const Contour plain = contour(gear, {.tolerance = 0.01}), smooth = contour(blended(gear), {.tolerance = 0.01});
+  EXPECT_EQ(support::contourDefects(smooth.mesh), "");
+  EXPECT_LE(smooth.greatestValue, 0.01);
+  EXPECT_LE(smooth.greatestGap, 0.01);
+  EXPECT_EQ(smooth.lostParts, 0u);
+  EXPECT_LT(double(smooth.cells), 4 * double(plain.cells));
 }
 
 /// Random leaves disagree, so that the surface jumps from leaf to leaf, and has parts of all sizes.
@@ -151,13 +138,13 @@ TEST(Contour, ofRandomFieldsIsAClosedManifold) {
     const Field field = randomField(seed);
     for (const Field& one : {field, blended(field, 0.2)}) {
       const Contour found = contour(one, {.tolerance = 0.02 * field.domain().sizes().maxCoeff()});
-      EXPECT_EQ(defectsOf(found.mesh), "") << seed;
+      EXPECT_EQ(support::contourDefects(found.mesh), "") << seed;
       EXPECT_GT(found.mesh.triangles.size(), 100u);
       EXPECT_EQ(found.flawed, 0u);
       fans += found.fans;
       const Contour open =
           contour(one, {.tolerance = 0.02 * field.domain().sizes().maxCoeff(), .domainCut = DomainCut::open});
-      EXPECT_EQ(defectsOf(open.mesh, true), "") << seed;
+      EXPECT_EQ(support::contourDefects(open.mesh, true), "") << seed;
     }
   }
   EXPECT_GT(fans, 0u);
@@ -166,12 +153,12 @@ TEST(Contour, ofRandomFieldsIsAClosedManifold) {
 TEST(Contour, isClosedByAWallOrOpenWhereTheDomainCutsTheSolid) {
   const Field cut = build(sphere, cubeOf(0.6), {.targetError = 1e-8});
   const Contour closed = contour(cut, {.tolerance = 0.01});
-  EXPECT_EQ(defectsOf(closed.mesh), "");
+  EXPECT_EQ(support::contourDefects(closed.mesh), "");
   EXPECT_TRUE(cubeOf(0.6).contains(boundingBox(closed.mesh)));
   EXPECT_NEAR(boundingBox(closed.mesh).max().x(), 0.595, 1e-6);
 
   const Contour open = contour(cut, {.tolerance = 0.01, .domainCut = DomainCut::open});
-  EXPECT_EQ(defectsOf(open.mesh, true), "");
+  EXPECT_EQ(support::contourDefects(open.mesh, true), "");
   EXPECT_GT(inspect(open.mesh).boundaryEdges, 20u);
   EXPECT_LE(greatestAt(open.mesh, sphere), 0.011);
   for (std::size_t i = 0; i < open.normals.size(); ++i)
@@ -180,7 +167,7 @@ TEST(Contour, isClosedByAWallOrOpenWhereTheDomainCutsTheSolid) {
 
 TEST(Contour, ofADomainThatIsAllOutsideIsEmptyAndOfOneAllInsideItsWall) {
   const Contour all = contour(sphereField(), {.offset = 100, .tolerance = 0.01});
-  EXPECT_EQ(defectsOf(all.mesh), "");
+  EXPECT_EQ(support::contourDefects(all.mesh), "");
   EXPECT_NEAR(signedVolume(all.mesh), std::pow(2 - 0.01, 3), 1e-9);
   const Contour none = contour(sphereField(), {.offset = -100});
   EXPECT_TRUE(none.mesh.triangles.empty());
@@ -199,7 +186,7 @@ TEST(Contour, hasUnitNormalsWhereThereIsNoGradient) {
   }
   data.coefficients = std::move(coefficients);
   const Contour found = contour(Field(std::move(data)), {.tolerance = 0.02});
-  EXPECT_EQ(defectsOf(found.mesh), "");
+  EXPECT_EQ(support::contourDefects(found.mesh), "");
   EXPECT_NEAR(signedVolume(found.mesh), std::pow(2.0 / 3, 3), 0.05);
   for (const Vector3& normal : found.normals) EXPECT_NEAR(normal.norm(), 1, 1e-12);
 }
@@ -211,7 +198,7 @@ TEST(Contour, inSinglePrecisionIsAClosedManifoldOfSuchNumbers) {
     const double longest = field.domain().sizes().maxCoeff();
     for (const double tolerance : {0.005 * longest, 20 * least}) {
       const Contour found = contour(field, {.tolerance = tolerance, .singlePrecision = true});
-      EXPECT_EQ(defectsOf(found.mesh), "");
+      EXPECT_EQ(support::contourDefects(found.mesh), "");
       for (const Vector3& vertex : found.mesh.vertices) {
         for (const double coordinate : vertex) EXPECT_EQ(static_cast<float>(coordinate), coordinate);
         EXPECT_LE(std::abs(field.value(vertex)), 1e-3 * tolerance + 1e-12);

@@ -377,6 +377,17 @@ TEST(MeshExport, writesNormalsAndColours) {
   }
 }
 
+TEST(MeshExport, refusesWhatSinglePrecisionCannotHold) {
+  const support::TemporaryDirectory folder;
+  TriangleMesh far = boxOfTwo();
+  far.vertices[3].x() = 1e39;
+  for (const char* name : {"far.stl", "far.glb"}) {
+    EXPECT_THROW(saveMesh(far, folder.path() / name), Error);
+    EXPECT_THROW(saveMesh({}, folder.path() / name), Error);
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / name));
+  }
+}
+
 TEST(MeshExport, refusesVerticesThatSinglePrecisionCannotTellApart) {
   const support::TemporaryDirectory folder;
   const TriangleMesh mesh = moved(boxOfTwo(), Vector3::Constant(1e9));

@@ -108,6 +108,19 @@ TEST_F(ReadLevelSet, refusesGridsThatItCannotUse) {
   expectRefused(write(empty), "no surface");
 }
 
+/// An active tile takes a few bytes of the file, and 4096³ voxels where it is divided.
+TEST_F(ReadLevelSet, refusesTilesThatMemoryCannotHold) {
+  const auto grid = sphere();
+  grid->tree().addTile(3, openvdb::Coord(1 << 14, 0, 0), 0.1f, true);
+  try {
+    vdb::loadVdb(write(grid));
+    ADD_FAILURE() << "the file was read";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::limit);
+    EXPECT_THAT(error.what(), testing::HasSubstr("memory"));
+  }
+}
+
 TEST_F(ReadLevelSet, refusesForeignAndTruncatedFiles) {
   expectRefused(folder_ / "none.vdb", "no such file");
   expectRefused(folder_.path(), "cannot be read");

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <span>
 #include <string_view>
 
@@ -42,7 +43,13 @@ void checkContour(const Arguments& arguments) {
   if (offsets.size() > 1 && output.find(kOffsetMark) == std::string::npos)
     throw Error(fmt::format("output: {} surfaces need a file each; write {} in the name, such as surface-{}.ply",
                             offsets.size(), kOffsetMark, kOffsetMark));
-  for (const double offset : offsets) checkMeshWritable(fileOf(output, offset));
+  std::set<std::string> files;
+  for (const double offset : offsets) {
+    const std::string file = fileOf(output, offset);
+    checkMeshWritable(file);
+    if (!files.insert(file).second)
+      throw Error(fmt::format("offset: {} is given twice; the surfaces would have the same file", offset));
+  }
 }
 
 double toleranceOf(const Arguments& arguments, const Field& field) {
@@ -80,6 +87,7 @@ Json contourJson(const WrittenContour& written) {
           {"volume", signedVolume(made.mesh)},
           {"tolerance", written.tolerance},
           {"greatest_value", made.greatestValue},
+          {"greatest_gap", made.greatestGap},
           {"blended", written.isBlended},
           {"missed", made.unresolved},
           {"cells_with_lost_parts", made.lostParts},
@@ -93,16 +101,16 @@ std::string contourText(const WrittenContour& written) {
   std::string text = fmt::format("{}: {} vertices, {} triangles, {}\n", written.file,
                                  grouped(made.mesh.vertices.size()), grouped(made.mesh.triangles.size()),
                                  bytesText(static_cast<double>(std::filesystem::file_size(written.file))));
-  text += summaryRow("from the surface", fmt::format("the field is {} there at most, for a tolerance of {}",
-                                                     shortNumber(made.greatestValue), shortNumber(written.tolerance)));
+  text += summaryRow(
+      "from the surface",
+      fmt::format("{} at most, and the surface at most {} from the mesh, for a tolerance of {}",
+                  shortNumber(made.greatestValue), shortNumber(made.greatestGap), shortNumber(written.tolerance)));
   if (written.isBlended) text += summaryRow("field", "blended first, so that the mesh has no steps between cells");
   if (made.lostParts > 0)
-    text += summaryRow("lost", fmt::format("parts or gaps thinner than the tolerance, in {} of the smallest cells",
-                                           grouped(made.lostParts)));
+    text += summaryRow("lost", fmt::format("thin parts or gaps of the field, in {} cells", grouped(made.lostParts)));
   if (made.multipleSheets > 0)
-    text +=
-        summaryRow("kept apart", fmt::format("sheets that come closer than the tolerance, in {} of the smallest cells",
-                                             grouped(made.multipleSheets)));
+    text += summaryRow("kept apart", fmt::format("several sheets of the surface, in {} of the smallest cells",
+                                                 grouped(made.multipleSheets)));
   return text;
 }
 
@@ -112,8 +120,9 @@ std::string missedBy(const Contour& made) {
     return fmt::format("{} polygons of the mesh cross others: try another tolerance", grouped(made.flawed));
   if (made.unresolved > 0)
     return fmt::format(
-        "{} triangles are farther from the surface than the tolerance, where it bends within the smallest cells or is "
-        "torn: allow a greater tolerance, or build the field more accurately",
+        "the mesh is farther from the surface than the tolerance in {} places, where it bends within the smallest "
+        "cells "
+        "or is torn: allow a greater tolerance, or build the field more accurately",
         grouped(made.unresolved));
   return "";
 }
@@ -122,7 +131,7 @@ VertexData vertexDataOf(const Arguments& arguments, const Contour& made) {
   return {.normals = arguments.flag("no-normals") ? std::span<const Vector3>{} : std::span(made.normals)};
 }
 
-/// Makes and writes the surface of each offset.
+/// Makes the surfaces of all offsets, and then writes them, so that an error leaves no files behind.
 std::vector<WrittenContour> writeContours(const Session& session, const Arguments& arguments) {
   const Field& current = session.current().field;
   const int threads = arguments.whole("threads");
@@ -143,10 +152,10 @@ std::vector<WrittenContour> writeContours(const Session& session, const Argument
     });
     if (made.mesh.triangles.empty())
       throw Error(
-          fmt::format("offset: the field is above {} everywhere in its domain, so that there is no surface", offset));
-    saveMesh(made.mesh, file, vertexDataOf(arguments, made));
+          fmt::format("offset: the field has no value of {} in its domain, so that there is no surface", offset));
     all.push_back({file, offset, tolerance, blendedField.has_value(), std::move(made)});
   }
+  for (const WrittenContour& made : all) saveMesh(made.contour.mesh, made.file, vertexDataOf(arguments, made.contour));
   return all;
 }
 
@@ -199,8 +208,8 @@ The mesh is a closed manifold without crossings, for any field: each edge belong
 form one fan, and triangles meet at common edges and vertices only. Where the domain cuts the solid, a wall closes the mesh
 half a tolerance within the domain.
 
-The mesh is measured in the middle of each triangle and of its edges. The exit status is 1 where the tolerance is missed; the
-mesh is written all the same.)"),
+The mesh is measured at the corners, in the middle of each triangle and of its edges, and the other way round from points of the
+surface. The exit status is 1 where the tolerance is missed; the mesh is written all the same.)"),
       .examples = {"hpsdf contour bunny.hpsdf -o bunny.ply", "hpsdf contour bunny.hpsdf -o coarse.obj --tolerance 1%",
                    "hpsdf contour bunny.hpsdf -o bunny{offset}.stl --offset 0 --offset 0.02"},
       .parameters = joined({{fieldParameter()}, kContourParameters, {threadsParameter("The mesh is")}}),

@@ -34,6 +34,13 @@ GridDistance readGridSurface(const Console& console, const std::string& file, co
   GridDistance distance =
       isLevelSetName(file) ? readLevelSet(console, file) : readRegularGrid(console, file, placement);
   const InterpolationError error = distance.interpolationError();
+  if (error.samples == 0) {
+    note(console,
+         fmt::format("{}: tricubic between samples; too few of them are within three spacings of the surface to "
+                     "estimate the error of that. Are its distances in the unit of its spacing?",
+                     file));
+    return distance;
+  }
   note(console,
        fmt::format("{}: tricubic between samples; leaving samples out suggests an error of RMS {}, greatest {}, "
                    "near the surface",

@@ -106,22 +106,45 @@ class BooleanNode final : public DistanceNode {
         samples.push_back(i);
       }
     }
-    const std::vector<char> insideOfSamples = insideAtSamples(points, samples);
+    const std::vector<char> insideOfSamples = insideAtSamples(points, magnitudes, samples);
     std::vector<char> inside(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) inside[i] = insideOfSamples[sampleOf[i]];
     return inside;
   }
 
-  std::vector<char> insideAtSamples(std::span<const Vector3> points, const std::vector<std::size_t>& samples) const {
-    std::vector<Vector3> places;
-    for (const std::size_t sample : samples) places.push_back(points[sample]);
-    std::vector<std::vector<double>> distances;
-    for (const MeshSolid& solid : solids_) (*solid.distance)(places, distances.emplace_back(places.size()));
-    std::vector<char> inside(places.size());
-    for (std::size_t i = 0; i < places.size(); ++i)
-      inside[i] = tree_.contains([&](std::uint32_t solid) { return distances[solid][i] < 0; });
+  /// Returns whether each sample is inside. On the surface of a solid, such as a face where two of them touch, rounding
+  /// decides on which side of it a point is. There the sign is that of another place in the ball around the sample.
+  std::vector<char> insideAtSamples(std::span<const Vector3> points, std::span<const double> magnitudes,
+                                    const std::vector<std::size_t>& samples) const {
+    constexpr double kNear = 1e-6;  // distance to a solid's surface, over that to the boundary
+    std::vector<char> inside(samples.size());
+    std::vector<std::size_t> open(samples.size());
+    for (std::size_t i = 0; i < open.size(); ++i) open[i] = i;
+    for (const Vector3& step : kSteps) {
+      std::vector<Vector3> places;
+      for (const std::size_t i : open) places.push_back(points[samples[i]] + magnitudes[samples[i]] * step);
+      std::vector<std::vector<double>> distances;
+      for (const MeshSolid& solid : solids_) (*solid.distance)(places, distances.emplace_back(places.size()));
+      std::vector<std::size_t> doubtful;
+      for (std::size_t k = 0; k < open.size(); ++k) {
+        inside[open[k]] = tree_.contains([&](std::uint32_t solid) { return distances[solid][k] < 0; });
+        const double near = kNear * magnitudes[samples[open[k]]];
+        if (std::ranges::any_of(distances, [&](const auto& ofSolid) { return std::abs(ofSolid[k]) <= near; }))
+          doubtful.push_back(open[k]);
+      }
+      open = std::move(doubtful);
+      if (open.empty()) break;
+    }
     return inside;
   }
+
+  /// Steps within the unit ball, in directions that surfaces hardly have.
+  inline static const std::array<Vector3, 6> kSteps = {Vector3::Zero(),
+                                                       Vector3(0.311, 0.227, 0.173),
+                                                       Vector3(-0.193, 0.307, -0.271),
+                                                       Vector3(0.141, -0.373, 0.263),
+                                                       Vector3(-0.347, -0.149, 0.211),
+                                                       Vector3(0.103, 0.089, -0.457)};
 
   std::vector<MeshSolid> solids_;
   BooleanTree tree_;
@@ -174,21 +197,36 @@ class FieldNode final : public PlacedNode {
     } else {
       field_->values(nearest, out.values);
     }
-    for (std::size_t i = 0; i < points.size(); ++i)
-      if (points[i] != nearest[i]) continueOutside(points[i] - nearest[i], out, i);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (points[i] == nearest[i])
+        endAtWall(points[i], out, i);
+      else
+        continueOutside(points[i] - nearest[i], out, i);
+    }
+  }
+
+  /// Where the solid reaches a wall of the domain, the wall is its surface: the value is at least the negative distance
+  /// to the nearest wall.
+  void endAtWall(const Vector3& x, const Samples& out, std::size_t i) const {
+    const Box& domain = field_->domain();
+    int axis = 0;
+    const double wall = ((x - domain.center()).cwiseAbs() - domain.sizes() / 2).maxCoeff(&axis);
+    if (out.values[i] >= wall) return;
+    out.values[i] = wall;
+    if (out.hasGradients()) out.gradients[i] = Vector3::Unit(axis) * (x[axis] < domain.center()[axis] ? -1 : 1);
   }
 
   /// Turns a sample at the domain's nearest point into one at a point farther outside: a bound of the distance to a
-  /// surface that lies in the domain. Where the solid reaches the domain's wall, it ends there.
+  /// surface that lies in the domain, and the distance to the wall where the solid reaches it.
   static void continueOutside(const Vector3& away, const Samples& out, std::size_t i) {
-    const double distance = away.norm(), value = out.values[i];
-    const double continued = value >= 0 ? std::hypot(distance, value) : distance + value;
+    const double distance = away.norm(), value = std::max(out.values[i], 0.0);
+    const double continued = std::hypot(distance, value);
     out.values[i] = continued;
     if (!out.hasGradients()) return;
     Vector3& gradient = out.gradients[i];
     for (int axis = 0; axis < 3; ++axis)
       if (away[axis] != 0) gradient[axis] = 0;
-    gradient = value >= 0 ? Vector3((away + value * gradient) / continued) : Vector3(away / distance + gradient);
+    gradient = (away + value * gradient) / continued;
   }
 
   std::shared_ptr<const Field> field_;

@@ -23,7 +23,7 @@ constexpr double kLeastFactor = 1e-12;  ///< of a scale; its reciprocal is the g
 void requireCounts(const OperationDescription& row, const Expression::Node& node) {
   const bool fits = row.takesMany ? node.operands.size() >= 2 : node.operands.size() == 1;
   if (fits && node.numbers.size() == row.numbers) return;
-  const std::string form = "is written " + std::string(row.form);
+  const std::string form = "it is written " + std::string(row.form);
   if (row.operation == Operation::scale && node.numbers.size() > 1)
     refuseOperation(row, form + ": different factors along the axes are refused, because they change distances");
   refuseOperation(row, form + ", with " + (row.takesMany ? "two operands or more" : "one operand") +

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "bvh/hierarchy.h"
+#include "bvh/search.h"
 #include "contour/cells/cell_samples.h"
 #include "contour/cells/contour_octree.h"
 #include "contour/cells/implicit_surface.h"
@@ -75,6 +77,7 @@ class Contouring {
       if (divideAsWanted()) continue;
       mesh_.mend();
       wantWhereTooFar();
+      wantWhereSurfaceIsMissed();
       wantWhereWrong();
       if (!divideAsWanted()) break;
     }
@@ -136,9 +139,20 @@ class Contouring {
   /// between triangles.
   void requireMemoryFor(std::size_t cells) const {
     constexpr double kBytesOfEdge = 1500;
-    const double edges = double(mesh_.edges().size()) / double(octree_.cells().size());
+    // There is about one edge for each cell with different signs; the first edges are found later than the first cells.
+    const auto crossed = static_cast<std::size_t>(std::ranges::count_if(samples_, &CellSamples::changesSign));
+    const double edges = double(std::max(mesh_.edges().size(), crossed)) / double(octree_.cells().size());
     const double bytes = double(cells) * (sizeof(ContourCell) + sizeof(CellSamples) + kBytesOfEdge * edges);
     requireMemory("a contour of " + std::to_string(cells) + " cells", bytes, "allow a greater tolerance");
+  }
+
+  /// Returns true if a leaf hides sheets, or if the surface in it bends too much. A certified range alone, which is
+  /// wider than the values, does not lead to the smallest cells: the lattice of a cell twice as large sees all parts
+  /// that are thicker than two tolerances.
+  bool isUnfit(std::int32_t cell) const {
+    const CellSamples& samples = samplesOf(cell);
+    return ((samples.hides || samples.misfit > tolerance_) && canDivide(cell, smallest_)) ||
+           (samples.mayHide && canDivide(cell, 2 * smallest_));
   }
 
   /// Divides leaves while they hide sheets or while the surface in them bends too much.
@@ -148,8 +162,7 @@ class Contouring {
       const std::size_t end = octree_.cells().size();
       for (; first < end; ++first) {
         const auto cell = static_cast<std::int32_t>(first);
-        if ((samplesOf(cell).hides || samplesOf(cell).misfit > tolerance_) && canDivide(cell, smallest_))
-          unfit.push_back(cell);
+        if (isUnfit(cell)) unfit.push_back(cell);
       }
       if (!unfit.empty()) divide(unfit);
     }
@@ -248,10 +261,7 @@ class Contouring {
 
   /// Counts the smallest cells that hold more than the mesh can show.
   void countLosses() {
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const ContourCell& cell = octree_.cells()[i];
-      if (cell.isLeaf() && samples_[i].hides && (samples_[i].changesSign || holdsOtherSign(cell))) ++result_.lostParts;
-    }
+    result_.lostParts = countLostParts();
     const Sheets& sheets = mesh_.sheets();
     for (std::uint32_t sheet = 1; sheet < sheets.size(); ++sheet) {
       const std::int32_t cell = sheets.cellOf(sheet);
@@ -260,10 +270,32 @@ class Contouring {
     }
   }
 
-  /// Returns true if a point of a lattice in the cell has another sign than the cell's corner. The certified range,
-  /// which says that the cell may hold such points, is wider than the values.
-  bool holdsOtherSign(const ContourCell& cell) const {
-    constexpr int kAlong = 7;
+  /// Counts the cells without a sheet that have a point of another sign than their corners, farther from the mesh than
+  /// two tolerances. Nearer ones belong to parts that bulge across a face of the cell.
+  std::size_t countLostParts() const {
+    constexpr std::size_t kMostChecked = 20'000, kAtOnce = 256;
+    std::vector<ContourCell> cells;
+    for (std::size_t i = 0; i < samples_.size(); ++i)
+      if (octree_.cells()[i].isLeaf() && samples_[i].mayHide) cells.push_back(octree_.cells()[i]);
+    const std::size_t stride = cells.size() / kMostChecked + 1;
+    const auto points =
+        detail::listOfChunks<Vector3>(cells.size() / stride, kAtOnce, Progress{.cancelled = progress_.cancelled}, "",
+                                      [&](std::vector<Vector3>& found, std::size_t first, std::size_t count) {
+                                        for (std::size_t i = first; i < first + count; ++i)
+                                          if (const auto point = pointOfOtherSign(cells[i * stride]))
+                                            found.push_back(*point);
+                                      });
+    const DualMesh& made = mesh_.mesh();
+    if (points.empty() || made.triangles.empty()) return points.size();
+    const TriangleMesh mesh{made.vertices, made.triangles, "contour"};
+    const bvh::Hierarchy hierarchy(mesh, boundingBox(mesh));
+    return static_cast<std::size_t>(std::ranges::count_if(
+        points, [&](const Vector3& point) { return bvh::distanceTo(hierarchy, point) > 2 * tolerance_; }));
+  }
+
+  /// Returns the point of a lattice in the cell with the greatest value of another sign than at the cell's corner.
+  std::optional<Vector3> pointOfOtherSign(const ContourCell& cell) const {
+    constexpr int kAlong = 5;
     const Box box = octree_.box(cell);
     std::array<Vector3, kAlong * kAlong * kAlong> points;
     for (int n = 0; n < kAlong * kAlong * kAlong; ++n) {
@@ -272,12 +304,16 @@ class Contouring {
     }
     std::array<double, points.size()> values;
     surface_.values(points, values);
-    return std::ranges::any_of(values, [&](double value) { return isInside(value) != isInside(values[0]); });
+    const auto [least, greatest] = std::ranges::minmax_element(values);
+    const auto other = isInside(values[0]) ? greatest : least;
+    if (isInside(*other) == isInside(values[0])) return std::nullopt;
+    return points[static_cast<std::size_t>(other - values.begin())];
   }
 
   Contour finish() {
     countLosses();
     result_.unresolved = missedPolygons_ + missedCells_;
+    result_.cells = octree_.cells().size();
     result_.fans = mesh_.fans();
     result_.flawed = mesh_.wrong().size();
     const DualMesh& made = mesh_.mesh();

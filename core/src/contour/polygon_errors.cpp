@@ -12,7 +12,7 @@ namespace hpsdf::contouring {
 namespace {
 
 constexpr std::size_t kTrianglesAtOnce = 128;
-constexpr std::size_t kPointsOfTriangle = 4;
+constexpr std::size_t kPointsOfTriangle = 7;
 
 /// Sets the errors of at most kTrianglesAtOnce triangles.
 void findErrors(const ImplicitSurface& surface, const DualMesh& mesh, std::span<const CrossedEdge> edges, bool isOpen,
@@ -23,10 +23,9 @@ void findErrors(const ImplicitSurface& surface, const DualMesh& mesh, std::span<
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const Triangle& t = mesh.triangles[triangles[i]];
     const Vector3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-    points[4 * i] = (a + b + c) / 3;
-    points[4 * i + 1] = (a + b) / 2;
-    points[4 * i + 2] = (b + c) / 2;
-    points[4 * i + 3] = (c + a) / 2;
+    const std::array<Vector3, kPointsOfTriangle> ofTriangle = {a,           b,           c,          (a + b + c) / 3,
+                                                               (a + b) / 2, (b + c) / 2, (c + a) / 2};
+    std::ranges::copy(ofTriangle, &points[kPointsOfTriangle * i]);
   }
   const auto raise = [&](std::size_t i) {
     for (std::size_t k = 0; k < kPointsOfTriangle; ++k)

@@ -9,9 +9,10 @@
 
 namespace hpsdf::contouring {
 
-/// Measures the polygons that have changed: sets their error to the greatest magnitude of the function in the middles
-/// of their triangles and of the triangles' edges. If the wall is left open, polygons that are not at the wall are
-/// measured against the function without it, too, because the boundary of the mesh must lie on the surface.
+/// Measures the polygons that have changed: sets their error to the greatest magnitude of the function at the corners
+/// of their triangles, in the middles of these and of their edges. If the wall is left open, polygons that are not at
+/// the wall are measured against the function without it, too, because the boundary of the mesh must lie on the
+/// surface.
 void measurePolygons(const ImplicitSurface& surface, const DualMesh& mesh, bool isOpen, const Progress& progress,
                      std::span<CrossedEdge> edges);
 

@@ -26,16 +26,18 @@ void SurfaceMesh::connect() {
   const std::optional<Sheets> before = std::exchange(sheets_, std::nullopt);
   sheets_.emplace(octree_, edges_);
   placeChangedVertices(before);
-  gaps_.resize(octree_.cells().size(), kUnknownGap);
-  for (CrossedEdge& edge : edges_) {
-    if (!edge.polygon.isChanged) continue;
-    edge.polygon.isUntested = true;
-    for (const std::int32_t cell : edge.cells)
-      if (cell >= 0) gaps_[static_cast<std::size_t>(cell)] = kUnknownGap;
-  }
+  forgetGapsAtChanges();
+  for (CrossedEdge& edge : edges_) edge.polygon.isUntested |= edge.polygon.isChanged;
   mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {}, options_.accuracy);
   measurePolygons(surface_, mesh_, options_.isOpen, progress_, edges_);
   for (CrossedEdge& edge : edges_) edge.polygon.isChanged = false;
+}
+
+void SurfaceMesh::forgetGapsAtChanges() {
+  gaps_.resize(octree_.cells().size(), kUnknownGap);
+  for (const CrossedEdge& edge : edges_)
+    for (const std::int32_t cell : edge.cells)
+      if (cell >= 0 && edge.polygon.isChanged) gaps_[static_cast<std::size_t>(cell)] = kUnknownGap;
 }
 
 /// Places the vertices in leaves at changed edges, and takes those of other leaves from before. Marks all polygons at
@@ -86,6 +88,7 @@ void SurfaceMesh::mend() {
   }
   fans_ = static_cast<std::size_t>(std::ranges::count(fans, true));
   measurePolygons(surface_, mesh_, options_.isOpen, progress_, edges_);
+  forgetGapsAtChanges();
 }
 
 /// Makes the mesh with fans around the marked edges. Where sheets share a leaf, those of fans have their vertices in

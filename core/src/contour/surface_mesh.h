@@ -53,6 +53,7 @@ class SurfaceMesh {
 
  private:
   void placeChangedVertices(const std::optional<Sheets>& before);
+  void forgetGapsAtChanges();
   void makeFans(const std::vector<bool>& fans);
   std::vector<std::uint32_t> wrongPolygons(const std::vector<bool>& chosen);
   std::vector<bool> untestedTriangles() const;

@@ -70,7 +70,7 @@ GridLayout gridOfVoxels(const Box& box, double voxel) {
   if (!(points.minCoeff() >= 1))
     throw Error(ErrorKind::option, "voxel", "voxels of this size have no point in the domain; give a smaller size");
   grids::requireGridMemory(points.x(), points.y(), points.z(), sizeof(double));
-  GridLayout layout{.points = {}, .origin = first * voxel, .spacing = Vector3::Constant(voxel)};
+  GridLayout layout{.points = {}, .origin = first * voxel + Vector3::Zero(), .spacing = Vector3::Constant(voxel)};
   for (int axis = 0; axis < 3; ++axis) layout.points[axis] = static_cast<std::uint32_t>(points[axis]);
   return layout;
 }

@@ -44,9 +44,10 @@ struct Contour {
   double greatestGap = 0;    ///< greatest distance of points of the surface, some in each cell, from the mesh
   /// Triangles, and cells with points of the surface, that miss the tolerance although the cells are the smallest ones.
   std::size_t unresolved = 0;
-  /// Smallest cells in which the field has a part of the solid, or a gap, that the mesh does not have because it is
-  /// thinner than the cell. Parts thinner than a fifth of the tolerance are not sought.
+  /// Cells in which the field has a part of the solid, or a gap, that the mesh lacks: it is thin, and farther from the
+  /// mesh than two tolerances. At most 20,000 cells are searched, spread evenly over those that may have such parts.
   std::size_t lostParts = 0;
+  std::size_t cells = 0;           ///< cells of the contour's octree
   std::size_t multipleSheets = 0;  ///< smallest cells through which several sheets of the surface pass
   std::size_t fans = 0;            ///< polygons that were divided more finely because they would have crossed others
   std::size_t flawed = 0;  ///< polygons that still cross others, or share an edge with more than one: none are known

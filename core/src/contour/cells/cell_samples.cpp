@@ -85,7 +85,7 @@ void sampleCorners(const ImplicitSurface& surface, const ContourOctree& octree, 
   }
 }
 
-/// Finds out which of the cells whose corners have different signs hide a sheet.
+/// Finds out which of the cells that the surface may pass through hide a sheet.
 void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
                       double bulge, std::span<CellSamples> samples) {
   std::array<Vector3, kCellsAtOnce * kPoints> points;
@@ -98,7 +98,7 @@ void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octre
         for (int x = 0; x < kLattice; ++x) visit(std::array{x, y, z}, x != 1 && y != 1 && z != 1);
   };
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (!samples[i].changesSign) continue;
+    if (!samples[i].changesSign && !samples[i].mayHide) continue;
     const auto& [lower, size, child] = octree[cells[i]];
     forEachPoint([&, lower = lower, half = size / 2](const std::array<int, 3>& at, bool isCorner) {
       if (!isCorner)
@@ -108,13 +108,13 @@ void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octre
   surface.values(std::span(points).first(count), std::span(values).first(count));
   count = 0;
   for (CellSamples& cell : samples) {
-    if (!cell.changesSign) continue;
+    if (!cell.changesSign && !cell.mayHide) continue;
     Lattice lattice;
     forEachPoint([&](const std::array<int, 3>& at, bool isCorner) {
       lattice[latticeIndex(at[0], at[1], at[2])] =
           isCorner ? cell.corners[at[0] / 2 + at[1] / 2 * 2 + at[2] / 2 * 4] : values[count++];
     });
-    cell.hides = hidesSheet(lattice, bulge);
+    cell.hides = hidesSheet(lattice, cell.changesSign ? bulge : 0);
   }
 }
 
@@ -124,7 +124,7 @@ void sampleChunk(const ImplicitSurface& surface, const ContourOctree& octree, st
   sampleCorners(surface, octree, cells, out);
   for (std::size_t i = 0; i < cells.size(); ++i)
     if (!out[i].changesSign)
-      out[i].hides = surface.mayChangeSign(octree.box(octree[cells[i]]), isInside(out[i].corners[0]));
+      out[i].mayHide = surface.mayChangeSign(octree.box(octree[cells[i]]), isInside(out[i].corners[0]));
   findHiddenSheets(surface, octree, cells, bulge, out);
   findMisfits(surface, octree, cells, out);
 }

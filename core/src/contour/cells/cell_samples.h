@@ -11,15 +11,16 @@
 
 namespace hpsdf::contouring {
 
-/// The function at the corners of a cell, and where these have different signs at a lattice of 3 × 3 × 3 points,
+/// The function at the corners of a cell, and where the surface may pass through it at a lattice of 3 × 3 × 3 points,
 /// reduced to what contouring needs.
 struct CellSamples {
   std::array<double, 8> corners = {};  ///< values at the corners, in the order of children
   bool changesSign = false;            ///< the corners have different signs
-  /// A sheet of the surface may pass through the cell that its corners do not see. If the corners have different signs,
-  /// then somewhere in the lattice a point with a clear value lies between two points of the other sign. If they do
-  /// not, the function may clearly have the other sign in the cell.
+  /// A sheet of the surface passes through the cell that its corners do not see: somewhere in the lattice, a point lies
+  /// between two points of the other sign; if the corners have different signs, only a point with a clear value counts.
   bool hides = false;
+  bool mayHide =
+      false;  ///< the corners have the same sign, and the function may clearly have the other one in the cell
   /// The greatest distance between the tangent planes where the surface crosses the cell's edges and the point where
   /// they meet best, about the error of a mesh with a vertex there; 0 if the corners have the same sign.
   double misfit = 0;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -55,6 +56,9 @@ void requireDifferentInSinglePrecision(const TriangleMesh& mesh, const fs::path&
   std::vector<std::pair<Position, std::uint32_t>> sorted(mesh.vertices.size());
   for (std::uint32_t v = 0; v < sorted.size(); ++v) {
     const Vector3& x = mesh.vertices[v];
+    if (!(x.cwiseAbs().maxCoeff() <= double(std::numeric_limits<float>::max())))
+      throw Error(ErrorKind::file, file.string(),
+                  "a coordinate is too large for the single-precision numbers of this format; write .ply or .obj");
     sorted[v] = {{static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])}, v};
   }
   std::ranges::sort(sorted);
@@ -94,6 +98,8 @@ bool isSinglePrecisionMesh(const fs::path& file) { return writtenFormat(file).is
 void saveMesh(const TriangleMesh& mesh, const fs::path& file, const VertexData& data) {
   const WrittenFormat& format = writtenFormat(file);
   if (format.isSingle) requireDifferentInSinglePrecision(mesh, file);
+  if (format.isSingle && mesh.triangles.empty())
+    throw Error(ErrorKind::file, file.string(), "a mesh without triangles is written as .ply or .obj only");
   OutputFile out(file);
   format.write(mesh, data, [&](std::span<const std::byte> bytes) { out.write(bytes); });
   out.commit();

@@ -1,0 +1,68 @@
+// Contours of fields of real meshes and of random combinations of solids: closed manifolds without crossings.
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hpsdf/build.h"
+#include "hpsdf/combine/combined_distance.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_file.h"
+#include "hpsdf/output/contour.h"
+#include "hpsdf/shapes.h"
+#include "support/contour_defects.h"
+#include "support/random_expression.h"
+#include "support/test_mesh.h"
+
+namespace hpsdf {
+namespace {
+
+Box cubeOf(double half) { return Box(Vector3::Constant(-half), Vector3::Constant(half)); }
+
+/// Returns the blended field of a distance.
+Field fieldOf(const DistanceFunction& distance, const Box& domain) {
+  Field field = build(distance, domain, {.targetError = 1e-5});
+  return field.data().blend == 0 ? blended(field) : field;
+}
+
+TEST(ContourMeshes, ofRealMeshesAndTheirOffsetsAreClosedManifolds) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  for (const char* name : {"paper/bunny_69k.obj", "paper/dragon_80k.obj", "cad/fandisk.obj", "cad/rocker-arm.obj",
+                           "cad/wingnut.obj", "cad/cube_12.obj", "cad/1002_tray_bottom.STL"}) {
+    SCOPED_TRACE(name);
+    const ExactDistance distance(normalized(importMesh(support::testMesh(name)).mesh));
+    const Field field = fieldOf(distance, cubeOf(1.1));
+    for (const double offset : {0.0, 0.02, -0.02}) {
+      const Contour made = contour(field, {.offset = offset, .tolerance = 0.008});
+      EXPECT_EQ(support::contourDefects(made.mesh), "") << offset;
+      EXPECT_EQ(made.flawed, 0u);
+    }
+  }
+}
+
+TEST(ContourMeshes, ofRandomCombinationsAreClosedManifolds) {
+  const std::vector<Expression> solids = {shapes::mesh("sphere"), shapes::mesh("box"), shapes::mesh("torus"),
+                                          shapes::mesh("gear")};
+  int made = 0;
+  for (std::uint64_t seed = 1; made < 20; ++seed) {
+    SCOPED_TRACE(seed);
+    try {
+      const CombinedDistance combined(randomExpression(seed, solids));
+      const Box box = combined.source().box;
+      const Vector3 margin = Vector3::Constant(0.1 * box.sizes().maxCoeff());
+      const Field field = fieldOf(combined, Box(Vector3(box.min() - margin), Vector3(box.max() + margin)));
+      const Contour found = contour(field, {.tolerance = 0.01 * box.sizes().maxCoeff()});
+      EXPECT_EQ(support::contourDefects(found.mesh), "");
+      EXPECT_EQ(found.flawed, 0u);
+      if (!found.mesh.triangles.empty()) ++made;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("nothing is left"), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hpsdf
