@@ -85,6 +85,16 @@ void sampleCorners(const ImplicitSurface& surface, const ContourOctree& octree, 
   }
 }
 
+/// Calls visit(numbers along the axes, whether it is a corner) for each point of a lattice.
+template <typename Visit>
+void forEachLatticePoint(const Visit& visit) {
+  for (int z = 0; z < kLattice; ++z)
+    for (int y = 0; y < kLattice; ++y)
+      for (int x = 0; x < kLattice; ++x) visit(std::array{x, y, z}, x != 1 && y != 1 && z != 1);
+}
+
+bool mayHoldSurface(const CellSamples& cell) { return cell.changesSign || cell.mayHide; }
+
 /// Finds out which of the cells that the surface may pass through hide a sheet.
 void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const std::int32_t> cells,
                       double bulge, std::span<CellSamples> samples) {
@@ -92,15 +102,10 @@ void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octre
   std::array<double, kCellsAtOnce * kPoints> values;
   std::size_t count = 0;
   // Corners of the cell are known, all other points of the lattice are evaluated.
-  const auto forEachPoint = [](const auto& visit) {
-    for (int z = 0; z < kLattice; ++z)
-      for (int y = 0; y < kLattice; ++y)
-        for (int x = 0; x < kLattice; ++x) visit(std::array{x, y, z}, x != 1 && y != 1 && z != 1);
-  };
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (!samples[i].changesSign && !samples[i].mayHide) continue;
+    if (!mayHoldSurface(samples[i])) continue;
     const auto& [lower, size, child] = octree[cells[i]];
-    forEachPoint([&, lower = lower, half = size / 2](const std::array<int, 3>& at, bool isCorner) {
+    forEachLatticePoint([&, lower = lower, half = size / 2](const std::array<int, 3>& at, bool isCorner) {
       if (!isCorner)
         points[count++] = octree.position({lower[0] + at[0] * half, lower[1] + at[1] * half, lower[2] + at[2] * half});
     });
@@ -108,9 +113,9 @@ void findHiddenSheets(const ImplicitSurface& surface, const ContourOctree& octre
   surface.values(std::span(points).first(count), std::span(values).first(count));
   count = 0;
   for (CellSamples& cell : samples) {
-    if (!cell.changesSign && !cell.mayHide) continue;
+    if (!mayHoldSurface(cell)) continue;
     Lattice lattice;
-    forEachPoint([&](const std::array<int, 3>& at, bool isCorner) {
+    forEachLatticePoint([&](const std::array<int, 3>& at, bool isCorner) {
       lattice[latticeIndex(at[0], at[1], at[2])] =
           isCorner ? cell.corners[at[0] / 2 + at[1] / 2 * 2 + at[2] / 2 * 4] : values[count++];
     });
