@@ -1,5 +1,5 @@
 #pragma once
-// What benchmarks of contours share: the field, and the measuring of meshes against the bunny.
+// Benchmarks of contours share the field, and the measuring of meshes against the bunny.
 
 #include "hpsdf/output/contour.h"
 #include "scene.h"

@@ -4,13 +4,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <vector>
 
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/shapes.h"
-#include "sign/solid_angle.h"
 #include "support/made_meshes.h"
+#include "support/winding_by_hand.h"
 
 namespace hpsdf {
 namespace closest_point_test {
@@ -36,18 +35,6 @@ std::vector<Vector3> pointsOf(const TriangleMesh& mesh) {
     }
   }
   return points;
-}
-
-/// Returns the winding number as the sum of the solid angles of all triangles.
-double windingByHand(const TriangleMesh& mesh, const Vector3& x) {
-  double sum = 0;
-  for (const Triangle& triangle : mesh.triangles) {
-    const auto [a, b, c] = cornersOf(mesh, triangle);
-    sign::AngleSum half;
-    sign::addHalfSolidAngle(a - x, b - x, c - x, half);
-    sum += half.value();
-  }
-  return sum / (2 * std::numbers::pi);
 }
 
 struct Case {
@@ -135,7 +122,7 @@ TEST(WindingNumber, isTheSumOfSolidAnglesForAnyInsideTest) {
     distance.windingNumbers(points, found);
     const bool isClosed = mesh.triangles.size() != support::openBox().triangles.size();
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double expected = windingByHand(mesh, points[i]);
+      const double expected = support::windingByHand(mesh, points[i]);
       EXPECT_NEAR(found[i], expected, ExactDistance::kWindingError) << points[i].transpose();
       EXPECT_TRUE(!isClosed || found[i] == std::round(expected));
       EXPECT_EQ(distance.windingNumber(points[i]), found[i]);

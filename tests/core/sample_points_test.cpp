@@ -12,16 +12,15 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "hpsdf/build.h"
 #include "hpsdf/hpsdf.h"
-#include "sign/solid_angle.h"
 #include "support/made_meshes.h"
 #include "support/temporary_directory.h"
+#include "support/winding_by_hand.h"
 
 namespace hpsdf {
 namespace sample_points_test {
@@ -169,17 +168,6 @@ TEST(SamplePoints, uniformPointsFillTheEnlargedBox) {
   EXPECT_NEAR(chiSquare(counts, std::vector<double>(64, 1)), 1, 0.7);
 }
 
-bool isInsideByHand(const TriangleMesh& mesh, const Vector3& x) {
-  double sum = 0;
-  for (const Triangle& triangle : mesh.triangles) {
-    const auto [a, b, c] = cornersOf(mesh, triangle);
-    sign::AngleSum half;
-    sign::addHalfSolidAngle(a - x, b - x, c - x, half);
-    sum += half.value();
-  }
-  return sum > std::numbers::pi;
-}
-
 TEST(SamplePoints, haveTheSignsOfTheSumOverAllFaces) {
   for (const TriangleMesh& mesh :
        {shapes::mesh("gear"), support::openBox(),
@@ -191,7 +179,7 @@ TEST(SamplePoints, haveTheSignsOfTheSumOverAllFaces) {
         const volatile float stored = float(coordinate);  // GCC 12 removes conversions that do not go through memory
         EXPECT_EQ(coordinate, double(stored));
       }
-      const bool expected = isInsideByHand(mesh, samples.points[i]);
+      const bool expected = support::windingByHand(mesh, samples.points[i]) > 0.5;
       ASSERT_EQ(samples.distances[i] < 0, expected) << samples.points[i].transpose();
       inside += expected;
     }

@@ -1,5 +1,5 @@
 #pragma once
-// What contours must not have: holes, non-manifold edges and vertices, crossings.
+// Contours must not have the defects that are found here: holes, non-manifold edges and vertices, crossings.
 
 #include <algorithm>
 #include <array>

@@ -44,7 +44,7 @@ void removeLeftovers(const std::filesystem::path& checkpoint, const std::filesys
   OutputFile::removeAbandoned(output);
 }
 
-/// What `reportBuilt` tells of a construction besides the field.
+/// The figures of a construction that `reportBuilt` reports besides those of the field.
 struct BuildFigures {
   double seconds;
   std::optional<MeshReport> mesh;

@@ -1,5 +1,5 @@
 #pragma once
-// What the commands that make a field share: the file it is written to, its construction and the report on it.
+// Commands that make a field share the file it is written to, its construction and the report on it.
 
 #include <filesystem>
 #include <functional>
@@ -33,7 +33,7 @@ void saveMade(Session& session, const Arguments& arguments);
 /// Returns facts about the current field, and the file to which it was saved, as JSON.
 Json madeJson(const Session& session, const Arguments& arguments);
 
-/// What a field is built from.
+/// The source of a construction.
 struct BuildSource {
   std::string name;          ///< for messages, and for the field if there is no output file
   std::string surface = {};  ///< the mesh file or shape; empty if the field is made from anything else

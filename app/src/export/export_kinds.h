@@ -13,7 +13,7 @@
 
 namespace hpsdf::app {
 
-/// What `export` tells about a file that it wrote.
+/// The figures that `export` reports about a file that it wrote.
 struct ExportReport {
   Json figures;          ///< all but the name and the size of the file
   std::string contents;  ///< what the file holds, such as "33 x 33 x 33 points"

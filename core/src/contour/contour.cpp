@@ -31,7 +31,7 @@ constexpr double kRootsAlongLongest = 8;    ///< number of root cells along the 
 constexpr double kAccuracy = 1e-3;          ///< greatest |f| at vertices, in tolerances
 constexpr double kThin = 0.1;               ///< greatest |f| in parts and gaps that need not be found, in tolerances
 constexpr double kBulge = 0.5;              ///< greatest |f| where a surface may bulge across an edge, in tolerances
-/// What |f| at vertices may be before these are rounded to single precision, and how much the rounding may add, as
+/// The greatest |f| at vertices before these are rounded to single precision, and what the rounding may add, as
 /// parts of the accuracy. The position changes by √3/2 of the numbers' spacing.
 constexpr double kBeforeRounding = 0.25, kSpacing = 0.75;
 

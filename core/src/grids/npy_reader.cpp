@@ -12,7 +12,7 @@
 namespace hpsdf::grids {
 namespace {
 
-/// What the header of an array tells.
+/// The contents of an array's header.
 struct NpyHeader {
   bool isDouble = false;
   bool isFortranOrder = false;  ///< the first index runs fastest

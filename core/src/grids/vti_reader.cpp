@@ -220,7 +220,7 @@ std::vector<double> readArray(const Tag& array, const Encoding& encoding, std::s
   return numbersFrom(whole.bytes(count * (isDouble ? 8 : 4)), isDouble, count);
 }
 
-/// What the elements of a file tell, before its arrays are read.
+/// The contents of a file's elements, before its arrays are read.
 struct ImageDescription {
   Encoding encoding;
   RegularGrid grid;

@@ -8,7 +8,7 @@
 
 namespace hpsdf {
 
-/// What a node of an expression does with its operands.
+/// The operation that a node of an expression applies to its operands.
 enum class Operation : std::uint8_t {
   operand,  ///< a leaf of the tree: a solid by itself
   unite,

@@ -13,7 +13,7 @@
 
 namespace hpsdf::contouring {
 
-/// What is known about the polygon around a crossed edge from the last time when polygons were made.
+/// The state of the polygon around a crossed edge after polygons were made for the last time.
 struct PolygonState {
   bool isChanged = true;           ///< it has to be made and measured again
   bool isUntested = true;          ///< it was made after crossings were searched for the last time
