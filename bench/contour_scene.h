@@ -8,7 +8,7 @@ namespace hpsdf::bench {
 
 /// The tolerance at which the mesh is as near to the bunny as OpenVDB's at the voxels and the adaptivity of
 /// openvdb_bench.cpp.
-inline const ContourOptions kContourOptions{.tolerance = 0.007};
+inline const ContourOptions kContourOptions{.tolerance = 0.0095};
 
 /// Returns the bunny's field for the target error τ = 1e-7, blended.
 const Field& contourField();

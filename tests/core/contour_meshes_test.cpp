@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -30,8 +32,9 @@ Field fieldOf(const DistanceFunction& distance, const Box& domain) {
 
 TEST(ContourMeshes, ofRealMeshesAndTheirOffsetsAreClosedManifolds) {
   HPSDF_SKIP_WITHOUT_MESHES();
-  for (const char* name : {"paper/bunny_69k.obj", "paper/dragon_80k.obj", "cad/fandisk.obj", "cad/rocker-arm.obj",
-                           "cad/wingnut.obj", "cad/cube_12.obj", "cad/1002_tray_bottom.STL"}) {
+  for (const char* name :
+       {"paper/bunny_69k.obj", "paper/dragon_80k.obj", "paper/armadillo_100k.obj", "paper/finger_skeletonhand_part.ply",
+        "cad/fandisk.obj", "cad/rocker-arm.obj", "cad/wingnut.obj", "cad/cube_12.obj", "cad/1002_tray_bottom.STL"}) {
     SCOPED_TRACE(name);
     const ExactDistance distance(normalized(importMesh(support::testMesh(name)).mesh));
     const Field field = fieldOf(distance, cubeOf(1.1));
@@ -41,6 +44,46 @@ TEST(ContourMeshes, ofRealMeshesAndTheirOffsetsAreClosedManifolds) {
       EXPECT_EQ(support::contourDefects(made.mesh), "") << offset;
       EXPECT_EQ(made.flawed, 0u);
     }
+  }
+}
+
+/// Returns the vertices of a mesh, and points within its triangles.
+std::vector<Vector3> pointsOf(const TriangleMesh& mesh) {
+  std::vector<Vector3> points = mesh.vertices;
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    for (const Vector3& share : {Vector3(1, 1, 1), Vector3(4, 1, 1), Vector3(1, 4, 1), Vector3(1, 1, 4)})
+      points.emplace_back((share[0] * a + share[1] * b + share[2] * c) / share.sum());
+  }
+  return points;
+}
+
+/// Moves points along the gradient to the surface of a field.
+void moveToSurface(const Field& field, std::vector<Vector3>& points) {
+  for (Vector3& point : points)
+    for (int step = 0; step < 6; ++step) {
+      const auto [value, gradient] = field.valueAndGradient(point);
+      if (gradient.squaredNorm() > 0.01) point -= gradient * (value / gradient.squaredNorm());
+    }
+}
+
+TEST(ContourMeshes, areWithinTheToleranceOfTheSurfaceAtOtherPointsThanTheyWereMeasured) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  const TriangleMesh bunny = normalized(importMesh(support::testMesh("paper/bunny_69k.obj")).mesh);
+  const Field field = fieldOf(ExactDistance(bunny), cubeOf(1.1));
+  std::vector<Vector3> surface = pointsOf(bunny);
+  moveToSurface(field, surface);
+  for (const double tolerance : {0.004, 0.009}) {
+    SCOPED_TRACE(tolerance);
+    const Contour made = contour(field, {.tolerance = tolerance});
+    const ExactDistance distance(made.mesh);
+    double greatestGap = 0, greatestValue = 0;
+    for (const Vector3& point : surface)
+      if (std::abs(field.value(point)) < 1e-9) greatestGap = std::max(greatestGap, std::abs(distance(point)));
+    for (const Vector3& point : pointsOf(made.mesh))
+      greatestValue = std::max(greatestValue, std::abs(field.value(point)));
+    EXPECT_LT(greatestGap, 1.02 * tolerance);
+    EXPECT_LT(greatestValue, 1.02 * tolerance);
   }
 }
 

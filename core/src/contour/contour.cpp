@@ -52,7 +52,8 @@ class Contouring {
         isOpen_(options.domainCut == DomainCut::open),
         progress_(progress),
         mesh_(surface_, octree_, samples_,
-              {.accuracy = kAccuracy * tolerance * (options.singlePrecision ? kBeforeRounding : 1),
+              {.tolerance = tolerance,
+               .accuracy = kAccuracy * tolerance * (options.singlePrecision ? kBeforeRounding : 1),
                .isOpen = isOpen_,
                .isSinglePrecision = options.singlePrecision},
               progress) {

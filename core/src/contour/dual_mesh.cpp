@@ -12,6 +12,9 @@ namespace {
 
 constexpr std::uint32_t kNoPoint = 0xffffffff;
 
+/// The cosine between the normals of a triangle and of the surface below which the triangle counts as folded over.
+constexpr double kFolded = 0.1;
+
 /// Makes the polygons of a dual mesh and divides them into triangles.
 class Polygons {
  public:
@@ -111,7 +114,6 @@ class Polygons {
     for (std::size_t i = 0; i < ring.size(); ++i) add(e, {center, ring[i], ring[(i + 1) % ring.size()]});
   }
 
-  /// Divides quadrilaterals along the diagonal whose middle is nearer to the surface.
   void addQuads() {
     std::vector<std::uint32_t> changed;
     for (std::uint32_t i = 0; i < quads_.size(); ++i)
@@ -128,6 +130,22 @@ class Polygons {
     }
   }
 
+  /// Returns the least cosine between the surface's normal at the quadrilateral's edge and the normals of its two
+  /// triangles if it is divided between corners `k` and `k + 2`.
+  double leastCosine(const Quad& quad, std::size_t k) const {
+    const Vector3& outward = edges_[quad.edge].normal;
+    const auto corner = [&](std::size_t i) -> const Vector3& { return mesh_.vertices[quad.corners[i % 4]]; };
+    double least = 1;
+    for (const std::size_t first : {k, k + 2}) {
+      const Vector3 normal = (corner(first + 1) - corner(first)).cross(corner(first + 2) - corner(first));
+      const double length = normal.norm();
+      least = std::min(least, length > 0 ? normal.dot(outward) / length : -1);
+    }
+    return least;
+  }
+
+  /// Chooses the diagonals whose middles are nearer to the surface, but none that folds a quadrilateral over if the
+  /// other one does not.
   void chooseDiagonals(std::span<const std::uint32_t> quads) {
     constexpr std::size_t kAtOnce = 256;
     detail::forEachChunk(quads.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
@@ -139,9 +157,12 @@ class Polygons {
           points[2 * i + k] = (mesh_.vertices[corners[k]] + mesh_.vertices[corners[k + 2]]) / 2;
         }
       surface_.values(std::span(points).first(2 * count), std::span(values).first(2 * count));
-      for (std::size_t i = 0; i < count; ++i)
-        edges_[quads_[quads[first + i]].edge].polygon.hasSecondDiagonal =
-            std::abs(values[2 * i + 1]) < std::abs(values[2 * i]);
+      for (std::size_t i = 0; i < count; ++i) {
+        const Quad& quad = quads_[quads[first + i]];
+        const bool folds = leastCosine(quad, 0) < kFolded, otherFolds = leastCosine(quad, 1) < kFolded;
+        edges_[quad.edge].polygon.hasSecondDiagonal =
+            folds != otherFolds ? folds : std::abs(values[2 * i + 1]) < std::abs(values[2 * i]);
+      }
     });
   }
 

@@ -11,9 +11,25 @@
 namespace hpsdf::contouring {
 namespace {
 
-constexpr std::size_t kGapLeavesAtOnce = 64;
-constexpr std::size_t kSeedsOfLeaf = 9;  ///< the middles of a leaf and of its eight parts
-constexpr std::size_t kGapPointsAtOnce = kSeedsOfLeaf * kGapLeavesAtOnce;
+constexpr std::size_t kGapPointsAtOnce = 576;
+
+/// A search for the greatest gap in a leaf from a lattice of starting points. The gap of a few points suffices in most
+/// leaves; where it is not far below the tolerance, more points are searched.
+struct GapStage {
+  int along;     ///< starting points along each axis
+  double above;  ///< the least gap known of a leaf, in tolerances, with which this search is made in it
+};
+constexpr std::array<GapStage, 3> kGapStages{{{2, -std::numeric_limits<double>::infinity()}, {4, 0.4}, {8, 0.75}}};
+
+/// Returns the starting points of a search in the unit cube: the middles of its parts, and its own if these are few.
+std::vector<Vector3> seedsOf(const GapStage& stage) {
+  std::vector<Vector3> seeds;
+  const int k = stage.along;
+  for (int n = 0; n < k * k * k; ++n)
+    seeds.push_back((Vector3(n % k, n / k % k, n / (k * k)) + 0.5 * Vector3::Ones()) / k);
+  if (k == 2) seeds.push_back(Vector3::Constant(0.5));
+  return seeds;
+}
 
 /// A leaf with its sheets, which are successive.
 struct LeafSheets {
@@ -87,35 +103,71 @@ double greatestGapOf(const LeafSheets& leaf, const Sheets& sheets, const Triangl
   return std::sqrt(greatest);
 }
 
+/// Searches leaves for points of the surface.
+class GapSearch {
+ public:
+  GapSearch(const ImplicitSurface& surface, const ContourOctree& octree, const Sheets& sheets, const DualMesh& mesh,
+            std::size_t edges, double accuracy, const Progress& progress)
+      : surface_(surface),
+        octree_(octree),
+        sheets_(sheets),
+        mesh_(mesh),
+        trianglesOfEdges_(edges, mesh.edgeOfTriangle),
+        accuracy_(accuracy),
+        progress_(progress) {}
+
+  /// Raises the gaps of leaves to the greatest distances of the points that are found from these starting points.
+  void search(std::span<const LeafSheets> leaves, std::span<const Vector3> seeds, std::vector<double>& gaps) const {
+    const std::size_t leavesAtOnce = kGapPointsAtOnce / seeds.size();
+    detail::forEachChunk(leaves.size(), leavesAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      progress_.throwIfCancelled();
+      searchSome(leaves.subspan(first, count), seeds, gaps);
+    });
+  }
+
+ private:
+  void searchSome(std::span<const LeafSheets> leaves, std::span<const Vector3> seeds, std::vector<double>& gaps) const {
+    std::array<Vector3, kGapPointsAtOnce> memory;
+    std::array<bool, kGapPointsAtOnce> counts;
+    const std::span points = std::span(memory).first(seeds.size() * leaves.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Box box = octree_.box(octree_[leaves[i / seeds.size()].cell]);
+      points[i] = box.min() + seeds[i % seeds.size()].cwiseProduct(box.sizes());
+    }
+    moveToSurface(surface_, points, accuracy_, counts);
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      const Box box = octree_.box(octree_[leaves[i].cell]);
+      const std::span ours = points.subspan(seeds.size() * i, seeds.size());
+      const std::span isOurs = std::span(counts).subspan(seeds.size() * i, seeds.size());
+      for (std::size_t k = 0; k < ours.size(); ++k) isOurs[k] = isOurs[k] && box.contains(ours[k]);
+      double& gap = gaps[static_cast<std::size_t>(leaves[i].cell)];
+      gap = std::max(gap, greatestGapOf(leaves[i], sheets_, trianglesOfEdges_, mesh_, ours, isOurs));
+    }
+  }
+
+  const ImplicitSurface& surface_;
+  const ContourOctree& octree_;
+  const Sheets& sheets_;
+  const DualMesh& mesh_;
+  TrianglesOfEdges trianglesOfEdges_;
+  double accuracy_;
+  const Progress& progress_;
+};
+
 }  // namespace
 
 void findSurfaceGaps(const ImplicitSurface& surface, const ContourOctree& octree, std::span<const CrossedEdge> edges,
-                     const Sheets& sheets, const DualMesh& mesh, double accuracy, const Progress& progress,
+                     const Sheets& sheets, const DualMesh& mesh, const GapLimits& limits, const Progress& progress,
                      std::vector<double>& gaps) {
-  const std::vector<LeafSheets> leaves = leavesOf(sheets, gaps);
-  const TrianglesOfEdges trianglesOfEdges(edges.size(), mesh.edgeOfTriangle);
-  detail::forEachChunk(leaves.size(), kGapLeavesAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
-    progress.throwIfCancelled();
-    std::array<Vector3, kGapPointsAtOnce> memory;
-    std::array<bool, kGapPointsAtOnce> counts;
-    const std::span points = std::span(memory).first(kSeedsOfLeaf * count);
-    const auto boxOf = [&](std::size_t i) { return octree.box(octree[leaves[first + i].cell]); };
-    for (std::size_t i = 0; i < count; ++i) {
-      const Box box = boxOf(i);
-      for (int n = 0; n < 8; ++n)
-        points[kSeedsOfLeaf * i + n] = (box.center() + box.corner(static_cast<Box::CornerType>(n))) / 2;
-      points[kSeedsOfLeaf * i + 8] = box.center();
-    }
-    moveToSurface(surface, points, accuracy, counts);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Box box = boxOf(i);
-      const std::span ours = points.subspan(kSeedsOfLeaf * i, kSeedsOfLeaf);
-      const std::span isOurs = std::span(counts).subspan(kSeedsOfLeaf * i, kSeedsOfLeaf);
-      for (std::size_t k = 0; k < kSeedsOfLeaf; ++k) isOurs[k] = isOurs[k] && box.contains(ours[k]);
-      gaps[static_cast<std::size_t>(leaves[first + i].cell)] =
-          greatestGapOf(leaves[first + i], sheets, trianglesOfEdges, mesh, ours, isOurs);
-    }
-  });
+  const GapSearch search(surface, octree, sheets, mesh, edges.size(), limits.accuracy, progress);
+  std::vector<LeafSheets> leaves = leavesOf(sheets, gaps);
+  for (const GapStage& stage : kGapStages) {
+    std::erase_if(leaves, [&](const LeafSheets& leaf) {
+      const double gap = gaps[static_cast<std::size_t>(leaf.cell)];
+      return gap > limits.tolerance || gap < stage.above * limits.tolerance;
+    });
+    search.search(leaves, seedsOf(stage), gaps);
+  }
 }
 
 }  // namespace hpsdf::contouring

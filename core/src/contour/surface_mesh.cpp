@@ -29,7 +29,7 @@ void SurfaceMesh::connect() {
   forgetGapsAtChanges();
   for (CrossedEdge& edge : edges_) edge.polygon.isUntested |= edge.polygon.isChanged;
   mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {}, options_.accuracy);
-  measurePolygons(surface_, mesh_, options_.isOpen, progress_, edges_);
+  measurePolygons(surface_, mesh_, options_.isOpen, options_.tolerance, progress_, edges_);
   for (CrossedEdge& edge : edges_) edge.polygon.isChanged = false;
 }
 
@@ -71,7 +71,8 @@ void SurfaceMesh::round(std::vector<Vector3>& vertices) const {
 }
 
 const std::vector<double>& SurfaceMesh::findGaps() {
-  findSurfaceGaps(surface_, octree_, edges_, *sheets_, mesh_, options_.accuracy, progress_, gaps_);
+  findSurfaceGaps(surface_, octree_, edges_, *sheets_, mesh_, {options_.tolerance, options_.accuracy}, progress_,
+                  gaps_);
   return gaps_;
 }
 
@@ -87,7 +88,7 @@ void SurfaceMesh::mend() {
     wrong_ = wrongPolygons(trianglesOfFans());
   }
   fans_ = static_cast<std::size_t>(std::ranges::count(fans, true));
-  measurePolygons(surface_, mesh_, options_.isOpen, progress_, edges_);
+  measurePolygons(surface_, mesh_, options_.isOpen, options_.tolerance, progress_, edges_);
   forgetGapsAtChanges();
 }
 

@@ -17,6 +17,7 @@
 namespace hpsdf::contouring {
 
 struct SurfaceMeshOptions {
+  double tolerance;
   double accuracy;         ///< greatest magnitude of the function at vertices before they are rounded
   bool isOpen;             ///< the wall will be removed
   bool isSinglePrecision;  ///< vertices are rounded to single precision
