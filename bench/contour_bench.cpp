@@ -6,15 +6,26 @@
 namespace hpsdf::bench {
 namespace {
 
-void contourOfBunny(benchmark::State& state) {
+void contourOfBunny(benchmark::State& state, bool simplify) {
   const Field& field = contourField();
+  ContourOptions options = kContourOptions;
+  options.simplify = simplify;
   Contour made;
-  for ([[maybe_unused]] auto _ : state) made = contour(field, kContourOptions);
+  for ([[maybe_unused]] auto _ : state) made = contour(field, options);
   countMesh(state, made.mesh);
   state.counters["missed"] = double(made.unresolved + made.flawed);
 }
 
-BENCHMARK(contourOfBunny)->Name("contour/ours")->MeasureProcessCPUTime()->UseRealTime()->Iterations(1);
+BENCHMARK_CAPTURE(contourOfBunny, ours, false)
+    ->Name("contour/ours")
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Iterations(1);
+BENCHMARK_CAPTURE(contourOfBunny, simplified, true)
+    ->Name("contour/simplified")
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Iterations(1);
 
 }  // namespace
 }  // namespace hpsdf::bench

@@ -16,13 +16,15 @@
 #include "hpsdf/output/contour.h"
 #include "hpsdf/shapes.h"
 #include "support/contour_defects.h"
+#include "support/contour_fields.h"
 #include "support/random_expression.h"
 #include "support/test_mesh.h"
 
 namespace hpsdf {
 namespace {
 
-Box cubeOf(double half) { return Box(Vector3::Constant(-half), Vector3::Constant(half)); }
+using support::cubeOf;
+using support::pointsOf;
 
 /// Returns the blended field of a distance.
 Field fieldOf(const DistanceFunction& distance, const Box& domain) {
@@ -47,17 +49,6 @@ TEST(ContourMeshes, ofRealMeshesAndTheirOffsetsAreClosedManifolds) {
   }
 }
 
-/// Returns the vertices of a mesh, and points within its triangles.
-std::vector<Vector3> pointsOf(const TriangleMesh& mesh) {
-  std::vector<Vector3> points = mesh.vertices;
-  for (const Triangle& triangle : mesh.triangles) {
-    const auto [a, b, c] = cornersOf(mesh, triangle);
-    for (const Vector3& share : {Vector3(1, 1, 1), Vector3(4, 1, 1), Vector3(1, 4, 1), Vector3(1, 1, 4)})
-      points.emplace_back((share[0] * a + share[1] * b + share[2] * c) / share.sum());
-  }
-  return points;
-}
-
 /// Moves points along the gradient to the surface of a field.
 void moveToSurface(const Field& field, std::vector<Vector3>& points) {
   for (Vector3& point : points)
@@ -71,7 +62,7 @@ TEST(ContourMeshes, areWithinTheToleranceOfTheSurfaceAtOtherPointsThanTheyWereMe
   HPSDF_SKIP_WITHOUT_MESHES();
   const TriangleMesh bunny = normalized(importMesh(support::testMesh("paper/bunny_69k.obj")).mesh);
   const Field field = fieldOf(ExactDistance(bunny), cubeOf(1.1));
-  std::vector<Vector3> surface = pointsOf(bunny);
+  std::vector<Vector3> surface = pointsOf(bunny, 3);
   moveToSurface(field, surface);
   for (const double tolerance : {0.004, 0.009}) {
     SCOPED_TRACE(tolerance);
@@ -80,7 +71,7 @@ TEST(ContourMeshes, areWithinTheToleranceOfTheSurfaceAtOtherPointsThanTheyWereMe
     double greatestGap = 0, greatestValue = 0;
     for (const Vector3& point : surface)
       if (std::abs(field.value(point)) < 1e-9) greatestGap = std::max(greatestGap, std::abs(distance(point)));
-    for (const Vector3& point : pointsOf(made.mesh))
+    for (const Vector3& point : pointsOf(made.mesh, 7))
       greatestValue = std::max(greatestValue, std::abs(field.value(point)));
     EXPECT_LT(greatestGap, 1.02 * tolerance);
     EXPECT_LT(greatestValue, 1.02 * tolerance);

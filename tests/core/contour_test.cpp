@@ -16,34 +16,22 @@
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/shapes.h"
 #include "support/contour_defects.h"
+#include "support/contour_fields.h"
 #include "support/random_field.h"
 
 namespace hpsdf {
 namespace {
 
+using support::cubeOf;
+using support::exactField;
+using support::torus;
+using support::torusField;
+
 double sphere(const Vector3& x) { return x.norm() - 0.7; }
-
-double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.6, x.z()) - 0.25; }
-
-Box cubeOf(double half = 1) { return Box(Vector3::Constant(-half), Vector3::Constant(half)); }
 
 const Field& sphereField() {
   static const Field field = build(sphere, cubeOf(), {.targetError = 1e-9});
   return field;
-}
-
-const Field& torusField() {
-  static const Field field = build(torus, cubeOf(), {.targetError = 1e-9});
-  return field;
-}
-
-/// Returns the field of a built-in shape, with exact leaves near the surface.
-Field exactField(const std::string& shape) {
-  const ExactDistance distance(shapes::mesh(shape));
-  const Box box = distance.source().box;
-  const Vector3 margin = 0.1 * box.sizes();
-  return build(distance, Box(Vector3(box.min() - margin), Vector3(box.max() + margin)),
-               {.targetError = 1e-6, .strategy = Strategy::hpx});
 }
 
 /// Returns the greatest |f| at vertices, and at the middles of triangles and of their sides.

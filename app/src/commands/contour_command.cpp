@@ -146,6 +146,7 @@ std::vector<WrittenContour> writeContours(const Session& session, const Argument
                                  .tolerance = tolerance,
                                  .domainCut = arguments.text("cut") == "open" ? DomainCut::open : DomainCut::wall,
                                  .singlePrecision = isSinglePrecisionMesh(file),
+                                 .simplify = arguments.flag("simplify"),
                                  .threads = threads};
     Contour made = withProgress(session.console(), [&](const Progress& progress) {
       return contour(blendedField ? *blendedField : current, options, progress);
@@ -187,6 +188,9 @@ const std::vector<Parameter> kContourParameters = {
      "of the domain; 0.1% by default. Parts and gaps thinner than twice this may be lost."},
     {"resolution", wholeNumber("N").atLeast(8),
      "The tolerance as the N-th part of the longest side of the domain, e.g. 500 instead of 0.2%."},
+    {"simplify", flag(),
+     "Merge vertices as far as the tolerance allows. The mesh has a fifth to a tenth of the triangles, of different "
+     "shapes, and takes about five times as long."},
     {"no-normals", flag(), "Leave the normals of vertices out of the file. They are the field's gradients."},
     {"cut", choice({"wall", "open"}).byDefault("wall"),
      "What happens where the domain cuts the solid: a wall closes the mesh, or the mesh stays open there."},

@@ -16,6 +16,7 @@
 #include "contour/cells/cell_samples.h"
 #include "contour/cells/contour_octree.h"
 #include "contour/cells/implicit_surface.h"
+#include "contour/edits/improvement.h"
 #include "contour/open_mesh.h"
 #include "contour/surface_mesh.h"
 #include "hpsdf/detail/memory.h"
@@ -31,6 +32,8 @@ constexpr double kRootsAlongLongest = 8;    ///< number of root cells along the 
 constexpr double kAccuracy = 1e-3;          ///< greatest |f| at vertices, in tolerances
 constexpr double kThin = 0.1;               ///< greatest |f| in parts and gaps that need not be found, in tolerances
 constexpr double kBulge = 0.5;              ///< greatest |f| where a surface may bulge across an edge, in tolerances
+/// The errors up to which triangles are merged, in tolerances. Errors at points that were not searched are greater.
+constexpr double kSimplified = 0.8;
 /// The greatest |f| at vertices before these are rounded to single precision, and what the rounding may add, as
 /// parts of the accuracy. The position changes by √3/2 of the numbers' spacing.
 constexpr double kBeforeRounding = 0.25, kSpacing = 0.75;
@@ -50,6 +53,8 @@ class Contouring {
         octree_(field.domain(), field.domain().sizes().maxCoeff() / kRootsAlongLongest),
         tolerance_(tolerance),
         isOpen_(options.domainCut == DomainCut::open),
+        isSinglePrecision_(options.singlePrecision),
+        simplifies_(options.simplify),
         progress_(progress),
         mesh_(surface_, octree_, samples_,
               {.tolerance = tolerance,
@@ -87,7 +92,7 @@ class Contouring {
 
  private:
   void sample(std::span<const std::int32_t> cells) {
-    progress_.update("meshing", 1 - missedShare_);
+    progress_.update("meshing", finished_);
     sampleCells(surface_, octree_, cells, kBulge * tolerance_, progress_, samples_);
   }
 
@@ -187,7 +192,10 @@ class Contouring {
       ++missedPolygons_;
       wantAround(edge, edge.polygon.error);
     }
-    missedShare_ = double(missedPolygons_) / double(std::max<std::size_t>(mesh_.edges().size(), 1));
+    // Each round removes a part of the polygons that miss the tolerance, so that their logarithm tells how many rounds
+    // are left.
+    const double all = std::log1p(double(mesh_.edges().size())), missed = std::log1p(double(missedPolygons_));
+    if (all > 0) finished_ = std::max(finished_, 1 - missed / all);
   }
 
   /// Asks that leaves be divided around polygons that cross others even as fans.
@@ -311,6 +319,23 @@ class Contouring {
     return points[static_cast<std::size_t>(other - values.begin())];
   }
 
+  /// Turns over triangles of the finished mesh that are folded, merges others if that was asked for, and measures the
+  /// mesh again.
+  void improve() {
+    if (result_.mesh.triangles.empty()) return;
+    EditLimits limits{tolerance_, kAccuracy * tolerance_, isSinglePrecision_};
+    EditedMesh mesh = editedMesh(surface_, limits, std::move(result_.mesh));
+    unfold(surface_, limits, progress_, mesh);
+    if (simplifies_) {
+      limits.tolerance = kSimplified * tolerance_;
+      simplify(surface_, limits, progress_, mesh);
+    }
+    const MeshErrors errors = measure(surface_, tolerance_, progress_, mesh);
+    result_.greatestValue = simplifies_ ? errors.value : std::max(result_.greatestValue, errors.value);
+    result_.greatestGap = simplifies_ ? errors.gap : std::max(result_.greatestGap, errors.gap);
+    result_.mesh = std::move(mesh).finish();
+  }
+
   Contour finish() {
     countLosses();
     result_.unresolved = missedPolygons_ + missedCells_;
@@ -326,6 +351,7 @@ class Contouring {
         isKept[i] = !surface_.isAtWall(mesh_.edges()[made.edgeOfTriangle[i]].point);
       removeTriangles(isKept, result_.mesh.vertices, result_.mesh.triangles);
     }
+    improve();
     findNormals();
     return std::move(result_);
   }
@@ -334,11 +360,13 @@ class Contouring {
   ContourOctree octree_;
   double tolerance_;
   bool isOpen_;
+  bool isSinglePrecision_;
+  bool simplifies_;
   std::int32_t smallest_;
   std::int32_t finest_;  ///< size of the smallest cells where the mesh misses the tolerance
   const Progress& progress_;
   std::vector<CellSamples> samples_;
-  double missedShare_ = 1;  ///< share of the polygons that missed the tolerance when they were last measured
+  double finished_ = 0;  ///< estimated share of the work that is done
   std::vector<std::int32_t> fresh_;
   std::vector<std::pair<std::int32_t, std::int32_t>> wanted_;  ///< leaves to be divided, and into which size
   SurfaceMesh mesh_;

@@ -5,15 +5,13 @@
 #include <cmath>
 
 #include "contour/cells/bisection.h"
+#include "contour/cells/triangle_errors.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
 namespace {
 
 constexpr std::uint32_t kNoPoint = 0xffffffff;
-
-/// The cosine between the normals of a triangle and of the surface below which the triangle counts as folded over.
-constexpr double kFolded = 0.1;
 
 /// Makes the polygons of a dual mesh and divides them into triangles.
 class Polygons {

@@ -81,8 +81,8 @@ void placeVertices(const ImplicitSurface& surface, const ContourOctree& octree, 
       const std::uint32_t sheet = chosen[first + i];
       rooms[i] = roomOf(octree, sheets.cellOf(sheet), accuracy);
       listPlanes(sheets, sheet, edges, planes);
-      const Vector3 meeting = meetingPointOf(planes);
-      const Vector3 start = rooms[i].contains(meeting) ? meeting : middleOf(planes);
+      const Vector3 middle = middleOf(planes), meeting = meetingPointOf(planes, middle);
+      const Vector3 start = rooms[i].contains(meeting) ? meeting : middle;
       placed[i] = start.cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
     }
     const std::array<double, kSheetsAtOnce> values = project(surface, placed, std::span(rooms).first(count), accuracy);

@@ -63,7 +63,7 @@ void findMisfits(const ImplicitSurface& surface, const ContourOctree& octree, st
         const Vector3 normal = found[n].gradient / length;
         planes.push_back({points[n] - normal * (found[n].value / length), normal});
       }
-    if (!planes.empty()) samples[i].misfit = greatestDistance(meetingPointOf(planes), planes);
+    if (!planes.empty()) samples[i].misfit = greatestDistance(meetingPointOf(planes, middleOf(planes)), planes);
   }
 }
 

@@ -12,11 +12,10 @@ Vector3 middleOf(std::span<const TangentPlane> planes) {
   return sum / double(planes.size());
 }
 
-Vector3 meetingPointOf(std::span<const TangentPlane> planes) {
+Vector3 meetingPointOf(std::span<const TangentPlane> planes, const Vector3& middle) {
   // Directions in which the planes differ less than this hardly determine the point. The number is the square of the
   // sine of half the angle between two planes at a sharp edge, about 8 degrees.
   constexpr double kSharp = 0.005;
-  const Vector3 middle = middleOf(planes);
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   Vector3 right = Vector3::Zero();
   for (const TangentPlane& plane : planes) {

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "contour/cells/implicit_surface.h"
+#include "contour/cells/meeting_point.h"
+#include "contour/edits/edited_mesh.h"
+#include "contour/edits/mesh_editor.h"
+
+namespace hpsdf::contouring {
+
+/// A place for the vertex into which the ends of an edge are merged.
+struct MergedVertex {
+  Vector3 position;
+  double cost;  ///< greatest distance of the position from the planes of the triangles at both ends
+};
+
+/// Returns the point that fits the planes of the triangles at both ends of an edge best. It is near the surface.
+MergedVertex mergedVertex(const EditedMesh& mesh, std::uint32_t a, std::uint32_t b);
+
+/// Returns the edit that merges the ends of an edge into a vertex on the surface, or std::nullopt if the mesh would be
+/// no manifold afterwards, or if an end is at the mesh's boundary.
+std::optional<Edit> collapseOf(const ImplicitSurface& surface, const EditLimits& limits, const EditedMesh& mesh,
+                               std::uint32_t a, std::uint32_t b);
+
+}  // namespace hpsdf::contouring

@@ -1,0 +1,128 @@
+#include "contour/edits/edited_mesh.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "mesh/connectivity.h"
+
+namespace hpsdf::contouring {
+namespace {
+
+constexpr std::uint32_t kNoNumber = 0xffffffff;
+
+/// Sorts items by their groups: sets `first`, by group, to the place of its first item in `items`. `forEach` calls a
+/// function with the group and the number of each item.
+template <typename ForEach>
+void groupItems(std::size_t groups, const ForEach& forEach, std::vector<std::uint32_t>& first,
+                std::vector<std::uint32_t>& items) {
+  first.assign(groups + 1, 0);
+  forEach([&](std::uint32_t group, std::uint32_t) { ++first[group + 1]; });
+  for (std::size_t group = 0; group < groups; ++group) first[group + 1] += first[group];
+  items.resize(first.back());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  forEach([&](std::uint32_t group, std::uint32_t item) { items[next[group]++] = item; });
+}
+
+}  // namespace
+
+EditedMesh::EditedMesh(std::vector<Vector3> vertices, std::vector<Triangle> triangles, std::vector<Vector3> points,
+                       std::vector<std::uint32_t> triangleOf)
+    : vertices_(std::move(vertices)),
+      triangles_(std::move(triangles)),
+      points_(std::move(points)),
+      triangleOf_(std::move(triangleOf)) {
+  listTriangles();
+  listPoints();
+}
+
+void EditedMesh::listTriangles() {
+  groupItems(
+      vertices_.size(),
+      [&](const auto& visit) {
+        for (std::uint32_t n = 0; n < triangles_.size(); ++n)
+          for (const std::uint32_t vertex : triangles_[n]) visit(vertex, n);
+      },
+      firstAt_, trianglesAt_);
+  isAtBoundary_.assign(vertices_.size(), false);
+  const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(triangles_);
+  mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> side) {
+    if (side.size() == 2) return;
+    for (const std::uint32_t end : {side[0].low(), side[0].high()}) isAtBoundary_[end] = true;
+  });
+}
+
+void EditedMesh::listPoints() {
+  groupItems(
+      triangles_.size(),
+      [&](const auto& visit) {
+        for (std::uint32_t n = 0; n < points_.size(); ++n) visit(triangleOf_[n], n);
+      },
+      firstPoint_, pointsOf_);
+}
+
+std::array<Vector3, 3> EditedMesh::cornersAfter(const Edit& edit, const Triangle& triangle) const {
+  std::array<Vector3, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k) corners[k] = triangle[k] == edit.vertex ? edit.position : vertices_[triangle[k]];
+  return corners;
+}
+
+void EditedMesh::make(std::span<const Edit> edits) {
+  std::vector<bool> isRemoved(triangles_.size());
+  for (const Edit& edit : edits) {
+    std::vector<std::array<Vector3, 3>> added;
+    for (const Triangle& triangle : edit.added) added.push_back(cornersAfter(edit, triangle));
+    const NearTriangles near(added);
+    for (const std::uint32_t n : edit.removed) {
+      isRemoved[n] = true;
+      // Triangles that are added take the places of those that are removed.
+      for (const std::uint32_t point : pointsOf(n))
+        triangleOf_[point] = edit.removed[near.nearestTo(points_[point]).first];
+    }
+  }
+  for (const Edit& edit : edits) {
+    if (edit.vertex) vertices_[*edit.vertex] = edit.position;
+    for (std::size_t i = 0; i < edit.added.size(); ++i) {
+      triangles_[edit.removed[i]] = edit.added[i];
+      isRemoved[edit.removed[i]] = false;
+    }
+  }
+  std::vector<std::uint32_t> number(triangles_.size());
+  std::uint32_t kept = 0;
+  for (std::uint32_t n = 0; n < triangles_.size(); ++n) {
+    number[n] = kept;
+    if (!isRemoved[n]) triangles_[kept++] = triangles_[n];
+  }
+  triangles_.resize(kept);
+  for (std::uint32_t& triangle : triangleOf_) triangle = number[triangle];
+  listTriangles();
+  listPoints();
+}
+
+TriangleMesh EditedMesh::finish() && {
+  std::vector<std::uint32_t> number(vertices_.size(), kNoNumber);
+  std::vector<Vector3> used;
+  for (std::uint32_t vertex = 0; vertex < vertices_.size(); ++vertex) {
+    if (trianglesAt(vertex).empty()) continue;
+    number[vertex] = static_cast<std::uint32_t>(used.size());
+    used.push_back(vertices_[vertex]);
+  }
+  for (Triangle& triangle : triangles_)
+    for (std::uint32_t& vertex : triangle) vertex = number[vertex];
+  return {std::move(used), std::move(triangles_), "contour"};
+}
+
+NearTriangles::NearTriangles(std::span<const std::array<Vector3, 3>> triangles) {
+  for (const auto& corners : triangles) frames_.push_back(bvh::makeFrame(corners, 0));
+}
+
+std::pair<std::size_t, double> NearTriangles::nearestTo(const Vector3& point) const {
+  std::pair<std::size_t, double> nearest{0, std::numeric_limits<double>::infinity()};
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    const double squared = bvh::squaredDistance(frames_[i], point);
+    if (squared < nearest.second) nearest = {i, squared};
+  }
+  return nearest;
+}
+
+}  // namespace hpsdf::contouring

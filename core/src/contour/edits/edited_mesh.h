@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "bvh/triangle_frame.h"
+#include "hpsdf/triangle_mesh.h"
+#include "hpsdf/types.h"
+
+namespace hpsdf::contouring {
+
+/// A change of a mesh: some triangles are replaced by others, of which there are as many or fewer.
+struct Edit {
+  std::vector<std::uint32_t> removed;  ///< indices of triangles
+  std::vector<Triangle> added;
+  std::optional<std::uint32_t> vertex;  ///< a corner of triangles that are added, and of no others, which moves
+  Vector3 position = Vector3::Zero();   ///< the vertex's new position
+};
+
+/// A mesh that is changed in many places at once, with the triangles at each vertex, and with points of the surface
+/// that the mesh approximates.
+class EditedMesh {
+ public:
+  /// `points` are points of the surface. `triangleOf` tells for each the triangle to which it is nearest.
+  EditedMesh(std::vector<Vector3> vertices, std::vector<Triangle> triangles, std::vector<Vector3> points,
+             std::vector<std::uint32_t> triangleOf);
+
+  std::span<const Vector3> vertices() const { return vertices_; }
+  std::span<const Triangle> triangles() const { return triangles_; }
+
+  std::span<const std::uint32_t> trianglesAt(std::uint32_t vertex) const {
+    return std::span(trianglesAt_).subspan(firstAt_[vertex], firstAt_[vertex + 1] - firstAt_[vertex]);
+  }
+
+  /// Returns true for a vertex on an edge of one triangle only, or on one of more than two.
+  bool isAtBoundary(std::uint32_t vertex) const { return isAtBoundary_[vertex]; }
+
+  /// Returns the numbers of the points of the surface that are nearest to a triangle.
+  std::span<const std::uint32_t> pointsOf(std::uint32_t triangle) const {
+    return std::span(pointsOf_).subspan(firstPoint_[triangle], firstPoint_[triangle + 1] - firstPoint_[triangle]);
+  }
+  const Vector3& point(std::uint32_t number) const { return points_[number]; }
+
+  std::array<Vector3, 3> corners(std::uint32_t triangle) const {
+    const Triangle& t = triangles_[triangle];
+    return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]};
+  }
+
+  /// Returns the corners of a triangle after an edit.
+  std::array<Vector3, 3> cornersAfter(const Edit& edit, const Triangle& triangle) const;
+
+  /// Makes edits, which have no triangle in common. The points of triangles that an edit removes become those of the
+  /// nearest triangle that it adds.
+  void make(std::span<const Edit> edits);
+
+  /// Removes vertices that no triangle uses, and returns the mesh.
+  TriangleMesh finish() &&;
+
+ private:
+  void listTriangles();
+  void listPoints();
+
+  std::vector<Vector3> vertices_;
+  std::vector<Triangle> triangles_;
+  std::vector<Vector3> points_;
+  std::vector<std::uint32_t> triangleOf_;  ///< by point
+  std::vector<std::uint32_t> firstAt_, trianglesAt_;
+  std::vector<std::uint32_t> firstPoint_, pointsOf_;
+  std::vector<bool> isAtBoundary_;
+};
+
+/// Triangles whose distances from many points are needed.
+class NearTriangles {
+ public:
+  explicit NearTriangles(std::span<const std::array<Vector3, 3>> triangles);
+
+  /// Returns the place of the triangle that is nearest to a point, and the squared distance.
+  std::pair<std::size_t, double> nearestTo(const Vector3& point) const;
+
+ private:
+  std::vector<bvh::TriangleFrame> frames_;
+};
+
+}  // namespace hpsdf::contouring

@@ -1,0 +1,125 @@
+// Meshes of contours after vertices were merged and folded triangles turned over.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "hpsdf/build.h"
+#include "hpsdf/continuity.h"
+#include "hpsdf/exact_distance.h"
+#include "hpsdf/mesh_report.h"
+#include "hpsdf/output/contour.h"
+#include "hpsdf/shapes.h"
+#include "support/contour_defects.h"
+#include "support/contour_fields.h"
+#include "support/random_field.h"
+
+namespace hpsdf {
+namespace {
+
+using support::exactField;
+using support::pointsOf;
+using support::torusField;
+
+/// Expects a mesh and a field's surface, of which points are given, to be within a distance of each other.
+void expectWithin(double tolerance, const TriangleMesh& mesh, const Field& field, const std::vector<Vector3>& surface) {
+  double greatestValue = 0, greatestGap = 0;
+  for (const Vector3& point : pointsOf(mesh, 7)) greatestValue = std::max(greatestValue, std::abs(field.value(point)));
+  const ExactDistance distance(mesh);
+  for (const Vector3& point : surface) greatestGap = std::max(greatestGap, std::abs(distance(point)));
+  EXPECT_LE(greatestValue, tolerance);
+  EXPECT_LE(greatestGap, tolerance);
+}
+
+TEST(ContourEdits, simplifiedMeshesAreClosedManifoldsWithinTheToleranceOfFewerTriangles) {
+  const Field gear = exactField("gear");
+  for (const Field& field : {torusField(), gear}) {
+    const std::vector<Vector3> surface = contour(field, {.tolerance = 0.002}).mesh.vertices;
+    for (const double tolerance : {0.03, 0.01}) {
+      SCOPED_TRACE(tolerance);
+      const Contour all = contour(field, {.tolerance = tolerance});
+      const Contour few = contour(field, {.tolerance = tolerance, .simplify = true});
+      EXPECT_EQ(support::contourDefects(few.mesh), "");
+      EXPECT_LT(few.mesh.triangles.size(), 0.5 * double(all.mesh.triangles.size()));
+      EXPECT_EQ(few.normals.size(), few.mesh.vertices.size());
+      EXPECT_LE(few.greatestValue, tolerance);
+      EXPECT_LE(few.greatestGap, tolerance);
+      expectWithin(tolerance, few.mesh, field, surface);
+      for (const Vector3& vertex : few.mesh.vertices) EXPECT_LE(std::abs(field.value(vertex)), 1e-3 * tolerance);
+    }
+  }
+}
+
+TEST(ContourEdits, aSimplifiedBoxHasTwelveTriangles) {
+  const Contour found = contour(exactField("box"), {.tolerance = 0.01, .simplify = true});
+  EXPECT_EQ(support::contourDefects(found.mesh), "");
+  EXPECT_EQ(found.mesh.triangles.size(), 12u);
+  EXPECT_NEAR(signedVolume(found.mesh), boundingBox(shapes::mesh("box")).volume(), 1e-9);
+}
+
+/// Random leaves disagree, so that the surface jumps from leaf to leaf, and has parts of all sizes.
+TEST(ContourEdits, simplifiedMeshesOfRandomFieldsAreClosedManifoldsOrOpenOnes) {
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    SCOPED_TRACE(seed);
+    const Field field = blended(randomField(seed), 0.2);
+    const double tolerance = 0.02 * field.domain().sizes().maxCoeff();
+    for (const DomainCut cut : {DomainCut::wall, DomainCut::open}) {
+      const Contour all = contour(field, {.tolerance = tolerance, .domainCut = cut});
+      const Contour few = contour(field, {.tolerance = tolerance, .domainCut = cut, .simplify = true});
+      EXPECT_EQ(support::contourDefects(few.mesh, cut == DomainCut::open), "");
+      EXPECT_EQ(inspect(few.mesh).boundaryEdges, inspect(all.mesh).boundaryEdges);
+      EXPECT_LT(few.mesh.triangles.size(), all.mesh.triangles.size());
+    }
+  }
+}
+
+TEST(ContourEdits, simplifiedMeshesInSinglePrecisionHaveSuchVertices) {
+  const Contour found = contour(torusField(), {.tolerance = 0.01, .singlePrecision = true, .simplify = true});
+  EXPECT_EQ(support::contourDefects(found.mesh), "");
+  for (const Vector3& vertex : found.mesh.vertices) {
+    for (const double coordinate : vertex) EXPECT_EQ(static_cast<float>(coordinate), coordinate);
+    EXPECT_LE(std::abs(torusField().value(vertex)), 1e-5);
+  }
+}
+
+TEST(ContourEdits, doNotDependOnThreads) {
+  const auto simplified = [](int threads) {
+    return contour(torusField(), {.tolerance = 0.01, .simplify = true, .threads = threads});
+  };
+  const Contour one = simplified(1), two = simplified(2);
+  EXPECT_EQ(fingerprint(one.mesh), fingerprint(two.mesh));
+  EXPECT_EQ(one.normals, two.normals);
+  EXPECT_EQ(one.greatestGap, two.greatestGap);
+}
+
+/// Returns the share of triangles whose normals point away from the field's gradient in their middle.
+double foldedShare(const TriangleMesh& mesh, const Field& field) {
+  const auto folded = std::ranges::count_if(mesh.triangles, [&](const Triangle& triangle) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    return (b - a).cross(c - a).dot(field.valueAndGradient((a + b + c) / 3).gradient) < 0;
+  });
+  return double(folded) / double(mesh.triangles.size());
+}
+
+TEST(ContourEdits, leaveHardlyAnyTriangleFolded) {
+  const Field gear = exactField("gear");
+  EXPECT_EQ(foldedShare(contour(torusField(), {.tolerance = 0.001}).mesh, torusField()), 0);
+  EXPECT_LT(foldedShare(contour(gear, {.tolerance = 0.005}).mesh, gear), 2e-4);
+  EXPECT_LT(foldedShare(contour(gear, {.tolerance = 0.005, .simplify = true}).mesh, gear), 1e-3);
+}
+
+TEST(ContourEdits, canBeCancelledWhileVerticesAreMerged) {
+  std::size_t checks = 0, limit = ~std::size_t{0};
+  const Progress counting{.report = {}, .cancelled = [&] { return ++checks > limit; }};
+  contour(torusField(), {.tolerance = 0.01, .threads = 1}, counting);
+  limit = checks + 20;
+  checks = 0;
+  EXPECT_THROW(contour(torusField(), {.tolerance = 0.01, .simplify = true, .threads = 1}, counting), Cancelled);
+}
+
+}  // namespace
+}  // namespace hpsdf
