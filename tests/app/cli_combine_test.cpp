@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "cli_fixture.h"
+#include "construction/operands.h"
+#include "files/text_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
@@ -43,6 +45,46 @@ TEST_F(Combine, meshesGiveExactDistances) {
             ContainsRegex("distances +exact everywhere\n"), Not(HasSubstr("fingerprint"))));
   EXPECT_EQ(Json::parse(run({{"info", at("c.hpsdf"), "--json"}}).out).at("exact"), "everywhere");
   EXPECT_TRUE(Json::parse(run({{"info", field(), "--json"}}).out).at("exact").is_null());
+}
+
+TEST(Operands, haveTheTransformsThatActOnThem) {
+  const auto operandsOf = [](const std::string& text) {
+    std::string result;
+    for (const Expression& operand : booleanOperands(parseExpression(text))) result += textOf(operand) + "; ";
+    return result;
+  };
+  EXPECT_EQ(operandsOf("a.obj"), "a.obj; ");
+  EXPECT_EQ(operandsOf("move(shell(a.obj, 0.1), 1, 0, 0)"), "move(a.obj, 1, 0, 0); ");
+  EXPECT_EQ(operandsOf("difference(offset(a.obj, 0.1), move(b.obj, 0, 0, 1))"),
+            "offset(a.obj, 0.1); move(b.obj, 0, 0, 1); ");
+  EXPECT_EQ(operandsOf("scale(union(a.obj, rotate(intersection(b.obj, c.obj), 0, 0, 1, 90)), 2)"),
+            "scale(a.obj, 2); scale(rotate(b.obj, 0, 0, 1, 90), 2); scale(rotate(c.obj, 0, 0, 1, 90), 2); ");
+  EXPECT_EQ(operandsOf("offset(smooth-union(a.obj, b.obj, 0.1), 0.2)"), "a.obj; b.obj; ");
+}
+
+TEST_F(Combine, slicesOutlineTheOperands) {
+  saveMesh(shapes::mesh("box"), at("box.ply"));
+  ASSERT_EQ(combine("union(" + at("box.ply") + ", move(builtin:sphere, 3, 0, 0))", {"--normalize"}).status, 0);
+  const auto slice = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"slice", at("c.hpsdf"), "-o", at("c.png"), "--cpu", "--size", "200x160"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run({.words = words});
+  };
+  // The box is found beside the field, although the program runs in another folder.
+  const Outcome own = slice({"--operands", "own"});
+  ASSERT_EQ(own.status, 0) << own.err;
+  const std::string outlined = readTextFile(at("c.png"));
+  ASSERT_EQ(slice({}).status, 0);
+  EXPECT_NE(readTextFile(at("c.png")), outlined);
+  ASSERT_EQ(slice({"--operands", "difference(" + at("box.ply") + ", move(builtin:sphere, 3, 0, 0))"}).status, 0);
+  EXPECT_EQ(readTextFile(at("c.png")), outlined) << "the same operands";
+
+  EXPECT_THAT(slice({"--operands", "union(" + at("no.ply") + ", builtin:box)"}).err, HasSubstr("no such file"));
+  std::filesystem::remove(at("box.ply"));
+  EXPECT_EQ(slice({"--operands", "own"}).status, 2);
+  EXPECT_THAT(run({{"slice", field(), "-o", at("c.png"), "--operands", "own"}}).err,
+              HasSubstr("not built by 'combine'"));
+  EXPECT_THAT(run({{"slice", field(), "-o", at("c.csv"), "--operands", "own"}}).err, HasSubstr("no outlines"));
 }
 
 TEST_F(Combine, fieldsGiveBounds) {

@@ -58,7 +58,8 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
   bench.run(std::string(kTorus) +
             "camera 41.3,-17.25,0.7 target=0.1,0.2,-0.05 up=z projection=orthographic\n"
             "surface offset=0.03125 cracks=true defects=builtin:box clip=y clip-offset=0.1 shown=false\n"
-            "cells boxes degrees=2,4-6 depths=0-2 ; arrows 31 ; plane in-space=true\n"
+            "cells boxes degrees=2,4-6 depths=0-2 ; arrows 31 ; plane in-space=true operands=builtin:box\n"
+            "triangles shown=true tolerance=2.5%\n"
             "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
             "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
             "worst by=gradient on=surface page=2 mark=0.1,0.25,-0.5 ; panel build=false bar=false left-scroll=3\n"
@@ -358,6 +359,55 @@ std::optional<render::Pick> middleAfter(Bench& bench, const std::string& kind, c
   bench.explorer().frame();
   const auto& picture = *bench.explorer().picture();
   return render::pickAt(bench.session.current().field, picture, picture.image.width / 2, picture.image.height / 2);
+}
+
+TEST(Explorer, theTrianglesOfTheContourAreShownAndCounted) {
+  Bench bench;
+  bench.run(kTorus);
+  const render::Image without = bench.explorer().frame();
+  EXPECT_EQ(bench.explorer().shownContour(), nullptr);
+  bench.run("triangles shown=true tolerance=1%");
+  const Contour* coarse = bench.explorer().shownContour();
+  ASSERT_NE(coarse, nullptr) << "the command made it";
+  EXPECT_FALSE(same(bench.explorer().frame(), without));
+  EXPECT_EQ(bench.explorer().shownContour(), coarse) << "it is kept from frame to frame";
+  const std::size_t triangles = coarse->mesh.triangles.size();
+
+  // It is that of the command `contour`.
+  const support::TemporaryDirectory folder;
+  bench.run("contour output=" + (folder / "t.ply").string() + " tolerance=1%");
+  EXPECT_EQ(readMesh(folder / "t.ply").triangles.size(), triangles);
+
+  // It follows the tolerance, the offset and the field; rough frames of a moving view do not wait for it.
+  bench.run("triangles tolerance=0.3%");
+  EXPECT_GT(bench.explorer().shownContour()->mesh.triangles.size(), triangles);
+  bench.run("surface offset=0.05");
+  bench.explorer().frame(4);
+  EXPECT_EQ(bench.explorer().shownContour(), nullptr);
+  bench.explorer().frame();
+  ASSERT_NE(bench.explorer().shownContour(), nullptr);
+  bench.run("build analytic:torus target-error=1e-3 estimator=embedded");
+  EXPECT_EQ(bench.explorer().shownContour(), nullptr);
+  EXPECT_THAT(bench.failure("triangles tolerance=0"), HasSubstr("tolerance"));
+  EXPECT_THAT(bench.failure("triangles tolerance=1e-9"), HasSubstr("tolerance"));
+  EXPECT_EQ(bench.view().trianglesTolerance, "0.3%") << "a tolerance that fails changes nothing";
+}
+
+TEST(Explorer, slicesOutlineOperands) {
+  Bench bench;
+  bench.run(std::string(kTorus) + "show slice");
+  EXPECT_THAT(bench.failure("plane operands=own"), HasSubstr("not built by 'combine'"));
+  EXPECT_THAT(bench.failure("plane operands=union(builtin:box"), HasSubstr("column"));
+  bench.run("combine \"union(builtin:torus, move(builtin:sphere,radius=0.3, 0, 0, 0.2))\" target-error=1e-2");
+  const render::Image without = bench.explorer().frame();
+  bench.run("plane operands=own");
+  EXPECT_FALSE(same(bench.explorer().frame(), without));
+  const auto& lines = bench.explorer().picture()->legend.lines;
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_EQ(lines[0].name, "builtin:torus");
+  EXPECT_EQ(lines[1].name, "move(builtin:sphere,radius=0.3, 0, 0, 0.2)");
+  bench.run("plane operands=none");
+  EXPECT_TRUE(same(bench.explorer().frame(), without));
 }
 
 TEST(Explorer, flyingLooksAtTheInterface) {

@@ -45,7 +45,9 @@ field, an open mesh, an offset, a shell or a smooth operation, some values are l
 
 All other options are those of 'hpsdf build', with their meaning: the field approximates the distance of the expression
 within the tolerance or target error that is given here. Cutting two meshes of 70,000 triangles takes about
-two seconds. Sharp creases of the result take more bytes than smooth surfaces, because no leaf of the field is exact.)");
+two seconds. Sharp creases of the result take more bytes than smooth surfaces, because no leaf of the field is exact.
+
+'hpsdf slice --operands own' shows where the operands of a field lie, and what of their surfaces the result has.)");
 }
 
 const std::vector<Parameter> kCombineParameters = {

@@ -1,5 +1,6 @@
 #include "construction/operands.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "construction/file_kind.h"
@@ -24,7 +25,34 @@ Expression loadedMesh(const Console& console, const std::string& name, InsideTes
   return std::move(imported.mesh);
 }
 
+bool isBoolean(Operation operation) { return operation != Operation::operand && descriptionOf(operation).takesMany; }
+
+bool isTransform(Operation operation) {
+  return operation == Operation::move || operation == Operation::rotate || operation == Operation::scale;
+}
+
+bool hasBoolean(const Expression& expression) {
+  const Expression::Node& node = expression.node();
+  return isBoolean(node.operation) || std::ranges::any_of(node.operands, hasBoolean);
+}
+
 }  // namespace
+
+std::vector<Expression> booleanOperands(const Expression& expression) {
+  const Expression::Node& node = expression.node();
+  if (node.operation == Operation::operand) return {expression};
+  std::vector<Expression> operands;
+  for (const Expression& part : node.operands) {
+    if (isBoolean(node.operation) && !hasBoolean(part)) {
+      operands.push_back(part);
+      continue;
+    }
+    for (const Expression& operand : booleanOperands(part))
+      operands.push_back(isTransform(node.operation) ? Expression::operation(node.operation, {operand}, node.numbers)
+                                                     : operand);
+  }
+  return operands;
+}
 
 Expression withLoadedOperands(const Console& console, const Expression& expression, InsideTest insideTest,
                               const std::string& proof) {

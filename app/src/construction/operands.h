@@ -2,6 +2,7 @@
 // Makes expressions of meshes, shapes and fields from text.
 
 #include <string>
+#include <vector>
 
 #include "console/console.h"
 #include "hpsdf/combine/expression.h"
@@ -15,5 +16,11 @@ namespace hpsdf::app {
 /// column of its name, and `Cancelled` after Ctrl-C.
 Expression withLoadedOperands(const Console& console, const Expression& expression, InsideTest insideTest,
                               const std::string& proof = "");
+
+/// Returns the operands of the Boolean operations in an expression, each with its own moves, rotations, scales, offsets
+/// and shells, and moved, rotated and scaled as the result of its operation is. An offset or a shell of such a result
+/// is left out, because it is none of a single operand. An expression without Boolean operations has one operand,
+/// without its offsets and shells.
+std::vector<Expression> booleanOperands(const Expression& expression);
 
 }  // namespace hpsdf::app

@@ -29,8 +29,8 @@ std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.
 /// the same names, the second line alone has the effect of both lines. Returns "" for a command whose effect depends on
 /// the explorer's previous state.
 std::string kindOf(const std::string& line) {
-  constexpr std::array kSetters = {"show",   "camera", "surface", "plane", "cells",
-                                   "arrows", "color",  "panel",   "worst", "settings"};
+  constexpr std::array kSetters = {"show",      "camera", "surface", "plane", "cells",   "arrows",
+                                   "triangles", "color",  "panel",   "worst", "settings"};
   std::istringstream words(line);
   std::string kind, word;
   words >> kind;
@@ -454,11 +454,28 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
 render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData reference,
                                    const render::ScaleOptions& scale, int shrink) {
   if (reference.jumps != nullptr) reference.jumps = &session_.otherJumps(view_.beside);
+  reference.mesh = {};  // it is the contour of the current field
   try {
     return drawn(session_.otherRenderer(view_.beside, view_.backend), other, reference, scale, shrink);
   } catch (const Error& error) {
     throw Error(view_.beside + ": " + error.what());
   }
+}
+
+/// Returns the contour whose triangles the picture shows. A rough picture of a moving view does not wait for a contour
+/// that is not known yet.
+render::ShownMesh Explorer::contourToDraw(int shrink) {
+  if (!view_.triangles) return {};
+  const double tolerance = contourTolerance(view_, session_.current().field);
+  if (shrink > 1 && !session_.knowsContour(view_.surfaceOffset, tolerance)) return {};
+  return {&session_.contour(view_.surfaceOffset, tolerance).mesh, tolerance};
+}
+
+const Contour* Explorer::shownContour() {
+  if (!view_.triangles) return nullptr;
+  const double tolerance = contourTolerance(view_, session_.current().field);
+  if (!session_.knowsContour(view_.surfaceOffset, tolerance)) return nullptr;
+  return &session_.contour(view_.surfaceOffset, tolerance);
 }
 
 std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const Field* other, int shrink) {
@@ -467,6 +484,8 @@ std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const 
   render::ScaleOptions scale = colors.scale;
   render::ReferenceData reference = session_.reference(colors.by, colors.mesh, colors.other);
   if (!view_.slice && !view_.defects.empty()) reference.defects = &session_.defects(view_.defects);
+  if (view_.slice && !view_.operands.empty()) reference.outlined = session_.operands(view_.operands);
+  reference.mesh = contourToDraw(shrink);
   if (other != nullptr && (colors.by == render::ColorBy::degree || colors.by == render::ColorBy::depth)) {
     std::set<int> levels;
     for (const FieldStatistics& all : {figures(), session_.otherFigures(view_.beside)})

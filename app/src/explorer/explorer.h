@@ -126,6 +126,9 @@ class Explorer final : public SessionExtension {
   /// of all interfaces, or of those at the surface, as `view` has it. Returns `count` indices or more, unless there are
   /// fewer interfaces.
   const std::vector<std::size_t>& worst(std::size_t count);
+  /// Returns the contour whose triangles the picture shows, or nullptr if it shows none or if the contour is not known
+  /// yet.
+  const Contour* shownContour();
   /// Returns the field's values at the mouse pointer, or std::nullopt if the pointer is not over the field.
   std::optional<Readout> readout();
 
@@ -155,6 +158,7 @@ class Explorer final : public SessionExtension {
   std::optional<std::string> clickCommand();
   std::string wheelCommand(double notches) const;
   std::string dragCommand(double dx, double dy) const;
+  render::ShownMesh contourToDraw(int shrink);
   render::Drawn drawBeside(const Field& other, render::ReferenceData reference, const render::ScaleOptions& scale,
                            int shrink);
   /// Draws the pictures of the current field and of the second field, if there is one, in a common colour scale.

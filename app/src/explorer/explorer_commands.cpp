@@ -214,9 +214,9 @@ void addHistoryCommands(Registry& registry) {
   registry.addForScripts({
       .name = "undo",
       .summary = "Take back the last change of what the explorer shows.",
-      .help =
-          "Changes by show (but for the frame's size and renderer), camera, surface, plane, cells, arrows, color, "
-          "panel, worst and fly; what the mouse does in one go is one change. The field itself is not changed back.",
+      .help = "Changes by show (but for the frame's size and renderer), camera, surface, plane, cells, arrows, "
+              "triangles, color, panel, worst and fly; what the mouse does in one go is one change. The field itself "
+              "is not changed back.",
       .examples = {"undo"},
       .action = runUndo,
   });

@@ -19,7 +19,8 @@ void addUiCommand(Registry& registry);
 /// all changes of one action.
 std::function<void(Session&, const Arguments&)> changing(void (*change)(ViewState&, const Arguments&, Session&));
 
-/// Adds the commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows and beside.
+/// Adds the commands that choose what the picture shows: show, camera, surface, plane, color, cells, arrows,
+/// triangles and beside.
 void addExplorerPictureCommands(Registry& registry);
 
 }  // namespace hpsdf::app

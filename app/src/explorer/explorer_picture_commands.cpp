@@ -5,6 +5,7 @@
 #include "explorer/explorer.h"
 #include "explorer/explorer_commands.h"
 #include "pictures/picture_arguments.h"
+#include "session/field_operands.h"
 
 namespace hpsdf::app {
 namespace {
@@ -77,7 +78,7 @@ void changeSurface(ViewState& view, const Arguments& arguments, Session& session
   }
 }
 
-void changePlane(ViewState& view, const Arguments& arguments, Session&) {
+void changePlane(ViewState& view, const Arguments& arguments, Session& session) {
   if (arguments.given("through")) {
     const auto n = arguments.numbers("through");
     view.plane = render::FreePlane{Vector3(n[0], n[1], n[2]), Vector3(n[3], n[4], n[5])};
@@ -94,9 +95,14 @@ void changePlane(ViewState& view, const Arguments& arguments, Session&) {
   if (arguments.given("in-space")) view.planeInSpace = arguments.flag("in-space");
   if (arguments.given("zoom")) view.zoom = arguments.number("zoom");
   if (arguments.given("target")) view.sliceTarget = targetOf(arguments);
+  if (arguments.given("operands")) {
+    view.operands = textOrNone(arguments, "operands");
+    if (!view.operands.empty()) session.operands(view.operands);  // reports an unreadable file now
+  }
 }
 
 void checkPlane(const Arguments& arguments) {
+  if (arguments.given("operands") && arguments.text("operands") != "none") checkOperands(arguments.text("operands"));
   if (arguments.given("through") && (arguments.given("axis") || arguments.given("offset")))
     throw Error("through: excludes axis and offset; give one or the other");
 }
@@ -134,6 +140,14 @@ void changeCells(ViewState& view, const Arguments& arguments, Session&) {
   };
   if (arguments.given("degrees")) view.cells.degrees = levels("degrees", kMaxDegree);
   if (arguments.given("depths")) view.cells.depths = levels("depths", kMaxDepth);
+}
+
+void changeTriangles(ViewState& view, const Arguments& arguments, Session& session) {
+  if (arguments.given("shown")) view.triangles = arguments.flag("shown");
+  if (arguments.given("tolerance")) view.trianglesTolerance = arguments.text("tolerance");
+  if (!view.triangles || !session.hasField()) return;
+  // The contour is made here, where it can be cancelled, and not while a frame is drawn.
+  session.contour(view.surfaceOffset, contourTolerance(view, session.current().field));
 }
 
 void changeArrows(ViewState& view, const Arguments& arguments, Session&) { view.arrows = arguments.whole("apart"); }
@@ -220,7 +234,10 @@ void addPlaneAndColorCommands(Registry& registry) {
                      {"in-space", flag(""), "Whether the plane stands in the surface's picture too."},
                      {"zoom", number().above(0), "How many times larger than with the whole section in the picture."},
                      targetParameter("The point in the picture's middle, moved into the plane; center is the "
-                                     "section's middle.")},
+                                     "section's middle."),
+                     {"operands", text("EXPRESSION|own|none").under(kDrawn).advanced(),
+                      "Outline the operands of this expression, as 'slice' does; own for the one from which 'combine' "
+                      "built the field."}},
       .action = changing(changePlane),
       .check = checkPlane,
   });
@@ -241,6 +258,25 @@ void addPlaneAndColorCommands(Registry& registry) {
                      {"mesh", text("MESH"),
                       "For error: what the field was made from, where it does not know that; or none."}},
       .action = changing(changeColor),
+  });
+}
+
+void addTrianglesCommand(Registry& registry) {
+  registry.addForScripts({
+      .name = "triangles",
+      .summary = "Show the triangles that 'contour' would write.",
+      .help =
+          "The picture of the surface shows their edges, a slice the line in which its plane cuts them, with dots "
+          "where "
+          "the line bends if there is room. They are made for the offset of 'surface', which can take seconds, and "
+          "kept until the field, the offset or the tolerance changes. The statistics say how many there are and how "
+          "far they are from the surface.",
+      .examples = {"triangles shown=true", "triangles tolerance=0.5%"},
+      .parameters = {{"shown", flag(""), "Whether they are drawn."},
+                     {"tolerance", number().above(0).orShare().in("field units"),
+                      "As 'contour' has it: a length, or a percentage of the longest side of the domain; 0.1% at "
+                      "first."}},
+      .action = changing(changeTriangles),
   });
 }
 
@@ -294,6 +330,7 @@ void addExplorerPictureCommands(Registry& registry) {
   addSurfaceCommands(registry);
   addPlaneAndColorCommands(registry);
   addCellsAndArrowsCommands(registry);
+  addTrianglesCommand(registry);
 }
 
 }  // namespace hpsdf::app

@@ -49,16 +49,14 @@ void drawColorBar(const render::Legend& legend) {
   ImGui::Dummy({widthLeft(), height + 20});
 }
 
-void drawDefectSwatches(const std::vector<render::Legend::Defects>& defects) {
+void drawSwatch(const render::Color& color, const std::string& name) {
   constexpr float kRow = 18, kSide = 10;
-  for (const auto& [name, count, color] : defects) {
-    ImDrawList& list = *ImGui::GetWindowDrawList();
-    const ImVec2 from = ImGui::GetCursorScreenPos();
-    list.AddRectFilled(from, {from.x + kSide, from.y + kSide}, kTick);
-    list.AddRectFilled({from.x + 1, from.y + 1}, {from.x + kSide - 1, from.y + kSide - 1}, packed(color));
-    textAt(from.x + kSide + 8, from.y - 2, name + ": " + count, kInk);
-    ImGui::Dummy({widthLeft(), kRow});
-  }
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  list.AddRectFilled(from, {from.x + kSide, from.y + kSide}, kTick);
+  list.AddRectFilled({from.x + 1, from.y + 1}, {from.x + kSide - 1, from.y + kSide - 1}, packed(color));
+  textAt(from.x + kSide + 8, from.y - 2, name, kInk);
+  ImGui::Dummy({widthLeft(), kRow});
 }
 
 /// Draws one column of a histogram, with its percentage above it and its level (a degree or depth) below it. `bottom`
@@ -101,7 +99,8 @@ void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& share
 void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
   if (!picture) return;
   const render::Legend& legend = picture->legend;
-  drawDefectSwatches(legend.defects);
+  for (const auto& [name, count, color] : legend.defects) drawSwatch(color, name + ": " + count);
+  for (const auto& [name, color] : legend.lines) drawSwatch(color, name);
   if (legend.title.empty()) {
     if (legend.defects.empty()) ui.text("light only: choose a color", true);
     return;
@@ -131,8 +130,21 @@ void drawHistograms(Ui& ui, Explorer& explorer) {
 
 namespace {
 
-/// Draws a table of statistics of a field. `jumps` is null while the jumps of the field are unknown.
-void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures, const Jumps* jumps) {
+/// Returns what is known of a contour: how fine it is, and how far it and the surface are from each other.
+std::vector<std::pair<std::string, std::string>> contourFacts(const Contour& contour) {
+  std::vector<std::pair<std::string, std::string>> rows = {
+      {"triangles", grouped(contour.mesh.triangles.size())},
+      {"greatest gap, mesh to surface", shortNumber(contour.greatestValue)},
+      {"greatest gap, surface to mesh", shortNumber(contour.greatestGap)}};
+  if (contour.unresolved > 0) rows.emplace_back("places beyond the tolerance", grouped(contour.unresolved));
+  if (contour.lostParts > 0) rows.emplace_back("cells with lost parts", grouped(contour.lostParts));
+  return rows;
+}
+
+/// Draws a table of statistics of a field. `jumps` is null while the jumps of the field are unknown, and `contour` is
+/// null if the picture shows none.
+void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures, const Jumps* jumps,
+                      const Contour* contour) {
   std::vector<std::pair<std::string, std::string>> rows = {
       {"cells", grouped(figures.leaves)},
       {"coefficients", grouped(figures.coefficients)},
@@ -159,6 +171,8 @@ void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures
     rows.emplace_back("jump of f, RMS", shortNumber(jumps->value.rms));
     rows.emplace_back("jump of gradient, RMS", shortNumber(jumps->gradient.rms));
   }
+  if (contour != nullptr)
+    for (auto& row : contourFacts(*contour)) rows.push_back(std::move(row));
   ui.facts(rows);
 }
 
@@ -168,11 +182,12 @@ void drawStatistics(Ui& ui, Explorer& explorer) {
   Session& session = explorer.session();
   const std::string& beside = explorer.view().beside;
   if (!beside.empty()) ui.text("left: " + fileName(session.current().name));
-  drawStatisticsOf(ui, session.current().field, explorer.figures(), session.knowsJumps() ? &session.jumps() : nullptr);
+  drawStatisticsOf(ui, session.current().field, explorer.figures(), session.knowsJumps() ? &session.jumps() : nullptr,
+                   explorer.shownContour());
   if (beside.empty() || !explorer.pictureBeside()) return;
   ui.text("right: " + fileName(beside));
   const Session::Other& other = session.other(beside);
-  drawStatisticsOf(ui, other.field, session.otherFigures(beside), other.jumps ? &*other.jumps : nullptr);
+  drawStatisticsOf(ui, other.field, session.otherFigures(beside), other.jumps ? &*other.jumps : nullptr, nullptr);
 }
 
 void drawWorst(const Controls& controls, Explorer& explorer) {

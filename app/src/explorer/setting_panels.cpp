@@ -56,6 +56,7 @@ void drawPlane(const Controls& controls, const ViewState& view, const Field& fie
   drawPlaneOffset(controls, view, field);
   controls.slider("view/zoom", "zoom", view.zoom, 1, 32, "plane zoom=", "%.3g");
   controls.button("view/whole", "whole section", "plane zoom=1 target=center", view.sliceTarget || view.zoom != 1);
+  controls.field("view/operands", "operands", view.operands, "plane operands=", true);
 }
 
 /// Draws the controls that show or hide the surface, a plane and the cells of the octree in the picture of a surface.
@@ -68,6 +69,12 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Fi
   if (view.cells.style == render::CellStyle::none) return;
   controls.field("view/degrees", "of degrees", levelText(view.cells.degrees), "cells degrees=");
   controls.field("view/depths", "of depths", levelText(view.cells.depths), "cells depths=");
+}
+
+/// Draws the controls of the triangles that the command `contour` would write.
+void drawTriangles(const Controls& controls, const ViewState& view) {
+  controls.checkbox("view/triangles", "triangles", view.triangles, "triangles shown=");
+  if (view.triangles) controls.field("view/tolerance", "tolerance", view.trianglesTolerance, "triangles tolerance=");
 }
 
 /// Draws the controls for the limits of the colour scale. `automatic` holds the limits that the present picture uses.
@@ -168,6 +175,7 @@ void drawViewPanel(const Controls& controls, Explorer& explorer) {
     drawSurface(controls, view, field.domain());
     drawPlaneAndCells(controls, view, field);
   }
+  drawTriangles(controls, view);
   if (const auto v = controls.ui.slider("view/arrows", "arrows", view.arrows, 0, 120, "%.0f"))
     controls.commands.push_back(fmt::format("arrows {:.0f}", *v));
   drawColors(controls, view, explorer.picture());

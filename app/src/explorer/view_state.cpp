@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "hpsdf/output/contour.h"
 #include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {
@@ -18,8 +19,8 @@ std::string planeLine(const ViewState& view) {
   else
     line += fmt::format("axis={} offset={}", "xyz"[view.axis],
                         view.planeOffset ? fmt::format("{}", *view.planeOffset) : "auto");
-  return line + fmt::format(" in-space={} zoom={} target={}\n", view.planeInSpace, view.zoom,
-                            view.sliceTarget ? textOf(*view.sliceTarget) : "center");
+  return line + fmt::format(" in-space={} zoom={} target={} operands={}\n", view.planeInSpace, view.zoom,
+                            view.sliceTarget ? textOf(*view.sliceTarget) : "center", wordOrNone(view.operands));
 }
 
 std::string cameraLine(const render::OrbitCamera& camera) {
@@ -63,6 +64,15 @@ render::Plane planeOf(const ViewState& view, const Field& field) {
 
 }  // namespace
 
+std::string defaultContourTolerance() { return fmt::format("{}%", 100 * kDefaultContourTolerance); }
+
+double contourTolerance(const ViewState& view, const Field& field) {
+  const std::string& text = view.trianglesTolerance;
+  const bool isShare = text.ends_with('%');
+  const double number = parseNumber(isShare ? text.substr(0, text.size() - 1) : text).value();
+  return isShare ? number / 100 * field.domain().sizes().maxCoeff() : number;
+}
+
 std::string levelText(const std::vector<int>& levels) {
   if (levels.empty()) return "all";
   std::vector<std::string> names;
@@ -100,6 +110,7 @@ std::string scriptOf(const ViewState& view) {
   return fmt::format("show {} size={}x{} samples={} {}\n", view.slice ? "slice" : "surface", view.width, view.height,
                      view.samples, backendText(view.backend)) +
          cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + cellsLine(view.cells) +
+         fmt::format("triangles shown={} tolerance={}\n", view.triangles, view.trianglesTolerance) +
          fmt::format("arrows {}\n", view.arrows) + colorLine(view.surfaceColors, "surface") +
          colorLine(view.sliceColors, "slice") + fmt::format("beside {}\n", wordOrNone(view.beside)) +
          fmt::format("worst by={} on={} page={} mark={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",

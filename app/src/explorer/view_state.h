@@ -25,6 +25,9 @@ struct Coloring {
   std::string mesh = {};   ///< surface of the field, for `ColorBy::error`; if empty, the surface that the field names
 };
 
+/// Returns the default tolerance of contours as a percentage.
+std::string defaultContourTolerance();
+
 struct ViewState {
   bool slice = false;  ///< true shows a slice of the field, false the surface in space
 
@@ -33,7 +36,9 @@ struct ViewState {
   std::optional<render::FreePlane> plane;  ///< if set, used instead of `axis` and `planeOffset`
   bool planeInSpace = false;               ///< also draws the plane in the picture of the surface
   double zoom = 1;                         ///< magnification of the slice; 1 shows the whole section
-  std::optional<Vector3> sliceTarget;      ///< centre of the slice's picture; by default the centre of the section
+  /// Expression of which the slice outlines the operands, "own" for the one from which the field was built, or empty.
+  std::string operands;
+  std::optional<Vector3> sliceTarget;  ///< centre of the slice's picture; by default the centre of the section
 
   render::OrbitCamera camera;
   double surfaceOffset = 0;  ///< value of the level set that is drawn, world units
@@ -42,7 +47,9 @@ struct ViewState {
   std::string defects = {};  ///< mesh whose defects are marked, "own" for the field's own mesh, or empty
   bool surface = true;       ///< draws the surface
   render::ShownCells cells;
-  int arrows = 0;  ///< spacing of gradient arrows in pixels; 0 for none
+  bool triangles = false;                                      ///< draws the triangles of the surface's contour
+  std::string trianglesTolerance = defaultContourTolerance();  ///< as text, such as "0.002" or "0.1%"
+  int arrows = 0;                                              ///< spacing of gradient arrows in pixels; 0 for none
 
   std::string beside;  ///< file of another field, drawn beside the current one with the same settings, or empty
 
@@ -68,6 +75,9 @@ struct ViewState {
 /// samples.
 render::SlicePicture slicePicture(const ViewState& view, const Field& field);
 render::SurfacePicture surfacePicture(const ViewState& view, const Field& field);
+
+/// Returns the tolerance of the contour that the explorer shows, in the units of the field.
+double contourTolerance(const ViewState& view, const Field& field);
 
 /// Returns a list of degrees or depths as text: "2,4", or "all" for an empty list.
 std::string levelText(const std::vector<int>& levels);

@@ -293,7 +293,11 @@ void noteOddSurface(const Console& console, const Field& field, const render::Su
 
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SlicePicture& picture) {
-  return session.reference(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+  render::ReferenceData reference =
+      session.reference(picture.color, arguments.textOr("mesh", ""), arguments.textOr("other", ""));
+  const std::string operands = arguments.textOr("operands", "");
+  if (!operands.empty()) reference.outlined = session.operands(operands);
+  return reference;
 }
 
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,

@@ -11,6 +11,7 @@
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/field_argument.h"
+#include "session/field_operands.h"
 #include "session/session.h"
 #include "text/text.h"
 
@@ -77,6 +78,8 @@ void runSlice(Session& session, const Arguments& arguments) {
     throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
   if (format != SliceFormat::png && picture.arrows != 0)
     throw Error(fmt::format("{}: raw values have no arrows; leave out arrows", file));
+  if (format != SliceFormat::png && arguments.given("operands"))
+    throw Error(fmt::format("{}: raw values have no outlines; leave out operands", file));
   if (format == SliceFormat::png) render::checkPictureSize(picture.width, picture.height, picture.samples);
   const Backend chosen = backend(arguments);
   checkWritable(file);
@@ -201,6 +204,17 @@ const std::vector<Parameter> kSizeSamplesArrows = {
      "Distance between arrows that show the gradient, at least 4; 0 draws none. An arrow is 0.8 of that long where the "
      "gradient has length 1 and lies in the plane of the picture."}};
 
+const std::vector<Parameter> kSliceDrawn = {
+    {"operands", text("EXPRESSION|own"),
+     "Draws the outlines of the operands of an expression, each in a colour of its own: solid where the field's "
+     "surface "
+     "follows them, dashed elsewhere. own is the expression from which 'combine' built the field; its files are read "
+     "again, from the folder of the field or the current one."}};
+
+void checkSlice(const Arguments& arguments) {
+  if (arguments.given("operands")) checkOperands(arguments.text("operands"));
+}
+
 Command sliceCommand() {
   return {
       .name = "slice",
@@ -217,15 +231,18 @@ cell is the word exact in a .csv and the number 31 in a .pfm.)"),
                    "hpsdf slice bunny.hpsdf -o distance.png --axis x --offset 0.2 --color distance",
                    "hpsdf slice bunny.hpsdf -o oblique.png --plane 0,0,0,1,1,0 --color depth",
                    "hpsdf slice bunny.hpsdf -o error.png --color error --mesh bunny.obj --range 1e-6,1e-3",
+                   "hpsdf slice twins.hpsdf -o operands.png --color distance --operands own",
                    "hpsdf slice bunny.hpsdf -o values.csv --size 64x64"},
       .parameters = joined(
           {{fieldParameter(), {"output", outputFile().as('o').required(), "File to write: *.png, *.pfm or *.csv."}},
            under("Plane", kSlicePlane),
+           under(kDrawn, kSliceDrawn),
            under(kColours,
                  colorParameters(ColorBy::normal, "degree and depth show the cells, distance iso-lines.", "degree")),
            kSizeSamplesArrows,
            backendParameters()}),
       .action = runSlice,
+      .check = checkSlice,
   };
 }
 

@@ -5,8 +5,10 @@
 #include "console/long_work.h"
 #include "construction/reference_surface.h"
 #include "construction/surface.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
+#include "session/field_operands.h"
 #include "session/field_surface.h"
 
 namespace hpsdf::app {
@@ -27,6 +29,8 @@ Session::~Session() = default;
 void Session::setField(CurrentField field) {
   renderer_.reset();
   defects_.reset();
+  operands_.reset();
+  contour_.reset();
   jumps_.reset();
   exact_.reset();
   exactOfArgument_.reset();
@@ -113,6 +117,26 @@ const MeshDefects& Session::defects(const std::string& surface) {
     defectsOf_ = surface;
   }
   return *defects_;
+}
+
+const std::vector<render::OutlinedSolid>& Session::operands(const std::string& expression) {
+  if (!operands_ || expression != operandsOf_) {
+    operands_ = loadedOperands(console_, current(), expression);
+    operandsOf_ = expression;
+  }
+  return *operands_;
+}
+
+const Contour& Session::contour(double offset, double tolerance) {
+  if (!knowsContour(offset, tolerance)) {
+    const Field& field = current().field;
+    contour_ = withProgress(console_, [&](const Progress& progress) {
+      const ContourOptions options{.offset = offset, .tolerance = tolerance};
+      return hpsdf::contour(field.data().blend == 0 ? blended(field) : field, options, progress);
+    });
+    contourOf_ = {offset, tolerance};
+  }
+  return *contour_;
 }
 
 Session::Other& Session::other(const std::string& file) {

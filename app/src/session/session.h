@@ -11,6 +11,7 @@
 #include "console/console.h"
 #include "hpsdf/field.h"
 #include "hpsdf/jumps.h"
+#include "hpsdf/output/contour.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/render/renderer.h"
 #include "language/registry.h"
@@ -130,6 +131,18 @@ class Session {
   /// the mesh is unknown or cannot be read.
   const MeshDefects& defects(const std::string& surface);
 
+  /// Returns the solids whose outlines slices show: the operands of an expression, or of the current field's own
+  /// expression for the word "own". They are kept for later calls. Throws as `loadedOperands` does.
+  const std::vector<render::OutlinedSolid>& operands(const std::string& expression);
+
+  /// Returns the contour that the command `contour` would write: of the blended field if the field jumps between cells.
+  /// The last one is kept. `offset` and `tolerance` are in the field's units. Throws as `hpsdf::contour` does.
+  const Contour& contour(double offset, double tolerance);
+  /// True if `contour` would return the contour that is kept.
+  bool knowsContour(double offset, double tolerance) const {
+    return contour_ && contourOf_ == std::pair(offset, tolerance);
+  }
+
   /// Returns a renderer of the current field. The renderer is kept for later calls, because uploading the field
   /// takes longer than drawing most pictures.
   render::Renderer& renderer(const Backend& backend);
@@ -145,7 +158,11 @@ class Session {
   std::optional<render::Drawn> picture_;
   std::optional<Explanation> explanation_;
   std::optional<MeshDefects> defects_;
-  std::string defectsOf_;                                    // surface argument of the call that computed `defects_`
+  std::string defectsOf_;  // surface argument of the call that computed `defects_`
+  std::optional<std::vector<render::OutlinedSolid>> operands_;
+  std::string operandsOf_;  // argument of the call that loaded `operands_`
+  std::optional<Contour> contour_;
+  std::pair<double, double> contourOf_;                      // offset and tolerance of `contour_`
   std::vector<std::unique_ptr<Other>> others_;               // most recently used first; renderers keep references
   std::shared_ptr<const DistanceFunction> exact_;            // distance to the field's own surface
   std::shared_ptr<const DistanceFunction> exactOfArgument_;  // distance to `surfaceArgument_`

@@ -345,13 +345,15 @@ void addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string>
   }
 }
 
+double swatchHeight(const Frame& frame) { return 1.6 * std::max(kSmallestText, 0.8 * frame.textSize); }
+
 void addSwatches(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
                  std::span<const Swatch> swatches) {
   if (frame.panel.empty()) return;
   const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em), side = 0.9 * small;
   Column column(overlay, frame, titles);
   for (const Swatch& swatch : swatches) {
-    const double height = 1.6 * small + (swatch.count.empty() ? 0 : 1.6 * em);
+    const double height = swatchHeight(frame) + (swatch.count.empty() ? 0 : 1.6 * em);
     if (column.top + height > column.bottom) return;
     const double left = std::round(column.left), top = std::round(column.top), text = left + side + 0.5 * em;
     overlay.boxes.push_back({left, top, left + side, top + side, kTick});

@@ -95,6 +95,9 @@ struct Swatch {
 void addSwatches(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
                  std::span<const Swatch> swatches);
 
+/// The height of a swatch's row without a count, in pixels.
+double swatchHeight(const Frame& frame);
+
 /// Adds the caption below the view: the name, then as many of the details as fit. The details are sorted, the
 /// most important first.
 void addCaption(Overlay& overlay, const Frame& frame, const std::string& name, std::span<const std::string> details);

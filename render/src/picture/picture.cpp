@@ -17,9 +17,11 @@
 #include "picture/defect_marks.h"
 #include "picture/describe.h"
 #include "picture/legend.h"
+#include "picture/slice_lines.h"
 #include "scene/body_view.h"
 #include "scene/cell_boxes.h"
 #include "scene/cell_lines.h"
+#include "scene/mesh_lines.h"
 #include "scene/section.h"
 #include "view/view_buffers.h"
 #include "view/view_checks.h"
@@ -112,7 +114,7 @@ SliceView sectionView(const Box& domain, const Plane& plane, int width, int heig
 struct Scene {
   SurfaceView view;
   ViewBuffers buffers;
-  std::vector<float> lines = {};  ///< share of each sample, 0 to 1, that edges of cells cover; empty if none are drawn
+  std::vector<float> lines = {};  ///< share of each sample, 0 to 1, that lines cover; empty if none are drawn
 
   /// Returns true if any pixel shows a cell of the field or a line along the edge of a cell.
   bool showsField() const {
@@ -121,11 +123,17 @@ struct Scene {
   }
 };
 
+/// Adds lines to those that a scene already has. Where both cover a sample, the stronger ones are seen.
+void addLines(std::vector<float> added, std::vector<float>& lines) {
+  for (std::size_t i = 0; i < lines.size(); ++i) added[i] = std::max(added[i], lines[i]);
+  lines = std::move(added);
+}
+
 /// Renders a view of width × height pixels, with `picture.samples` samples along each side of a pixel. Lines
-/// along cells are `lineWidth` pixels wide. Throws `Error` if the camera, the offset or the clipping plane is
-/// out of range.
-Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& picture, int width, int height,
-                  double lineWidth) {
+/// along cells and along the edges of `mesh` are `lineWidth` pixels wide. Throws `Error` if the camera, the offset or
+/// the clipping plane is out of range.
+Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& picture, const ShownMesh& mesh,
+                  int width, int height, double lineWidth) {
   checkOffset(picture.offset);
   checkClip(picture.clip);
   const ShownBodies& bodies = picture.bodies;
@@ -145,6 +153,8 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   if (picture.cells.style == CellStyle::boxes) addBoxes(field, view, cells, scene.buffers);
   if (bodies.renderer) addBodies(bodies.renderer->view(view.camera, bodies.bodies, width, height), scene.buffers);
   if (picture.cells.style == CellStyle::lines) scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
+  if (mesh.mesh != nullptr)
+    addLines(meshLines(*mesh.mesh, mesh.tolerance, field.domain(), view, scene.buffers, lineWidth), scene.lines);
   return scene;
 }
 
@@ -245,7 +255,9 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   const Sampling sampling{samples, frame.lineWidth(), view.right.norm() / buffers.width};
   const FieldStatistics figures = statistics(field);
   const std::string plane = describePlane("slice", picture.plane);
+  const std::vector<Legend::Line> lines = lineLegend(reference);
   Overlay overlay;
+  addLineLegend(overlay, frame, lines);
   drawn.image = Image(picture.width, picture.height, paperColor());
   if (picture.color == ColorBy::distance) {
     const DistanceScale scale = distanceScaleFor(buffers, picture.scale);
@@ -265,7 +277,12 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
     if (!key.range.empty()) drawn.details.push_back(key.range);
   }
 
-  // Add the arrows, the axes and the caption to the picture.
+  // Add the lines, the arrows, the axes and the caption to the picture.
+  paintSliceLines(drawn.image, field, view, section, frame.view.width(), frame.view.height(), reference,
+                  frame.lineWidth());
+  drawn.legend.lines = lines;
+  if (!reference.outlined.empty())
+    drawn.details.insert(drawn.details.begin() + 2, "dashed off the surface");
   addArrows(drawn.image, frame, field, view, buffers, samples, picture.arrows);
   addAxesOf(overlay, frame, view, section);
   addFieldDetails(field, figures, drawn.details);
@@ -282,7 +299,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   checkArrows(picture.arrows);
   const int samples = picture.samples;
   const Sampling sampling{samples, frame.lineWidth(), 1};
-  Scene scene = renderScene(renderer, field, picture, frame.view.width(), frame.view.height(), sampling.lineWidth);
+  Scene scene = renderScene(renderer, field, picture, reference.mesh, frame.view.width(), frame.view.height(),
+                            sampling.lineWidth);
   const ViewBuffers& buffers = scene.buffers;
   const Camera& camera = scene.view.camera;
   Drawn drawn{.image = {},

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +18,7 @@
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/shown_cells.h"
 #include "hpsdf/render/view.h"
+#include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf::render {
 
@@ -48,6 +50,21 @@ struct ColorMode {
 /// Returns all colour modes, in the order of `ColorBy`.
 std::span<const ColorMode> colorModes();
 
+/// A mesh that approximates a surface of the field, such as its contour. Pictures of the surface show the mesh's edges,
+/// slices the line in which the plane cuts the mesh.
+struct ShownMesh {
+  const TriangleMesh* mesh = nullptr;  ///< triangles face outward; nullptr for no mesh
+  double tolerance = 0;                ///< greatest distance between the mesh and the surface, world units
+};
+
+/// A solid whose outline a slice shows, such as an operand of a Boolean operation. The outline is solid where the
+/// field's surface lies within two pixels of it, and dashed elsewhere.
+struct OutlinedSolid {
+  std::string name;  ///< for the legend
+  /// Signed distance, negative inside. Its values may be lower bounds: no value is farther from 0 than the surface is.
+  std::shared_ptr<const DistanceFunction> distance;
+};
+
 /// The data, besides the field, from which some quantities are computed. The objects must exist while a picture is
 /// drawn.
 struct ReferenceData {
@@ -56,6 +73,8 @@ struct ReferenceData {
   const Field* other = nullptr;             ///< the field to compare with, which is continued outside of its domain
   /// The defects of the mesh, in the field's units. Pictures of the field's surface mark these defects.
   const MeshDefects* defects = nullptr;
+  ShownMesh mesh = {};                           ///< drawn as lines
+  std::span<const OutlinedSolid> outlined = {};  ///< solids whose outlines slices show
 };
 
 /// The range of values that the colours represent. Pictures of different views or fields are comparable if they use the
@@ -150,6 +169,11 @@ struct Legend {
     Color color;
   };
   std::vector<Defects> defects = {};  ///< the kinds of mesh defects that the picture marks
+  struct Line {
+    std::string name;  ///< e.g. the name of a solid
+    Color color;
+  };
+  std::vector<Line> lines = {};  ///< the lines that a slice shows: outlines of solids, the section of a mesh
 };
 
 }  // namespace hpsdf::render

@@ -1,0 +1,62 @@
+#include "session/field_operands.h"
+
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include "console/long_work.h"
+#include "construction/operands.h"
+#include "construction/surface.h"
+#include "hpsdf/combine/combined_distance.h"
+#include "hpsdf/error.h"
+
+namespace hpsdf::app {
+namespace {
+
+constexpr const char* kOwn = "own";
+
+/// Returns the path of a file that a field names, in the folder of the field's file or else as it is.
+std::string fileBeside(const CurrentField& current, const std::string& name) {
+  const std::filesystem::path beside = std::filesystem::path(current.name).parent_path() / name;
+  std::error_code ignored;
+  return !isShape(name) && std::filesystem::is_regular_file(beside, ignored) ? beside.string() : name;
+}
+
+/// Returns the expression from which the field was built, with the paths of its files.
+Expression ownExpression(const CurrentField& current) {
+  const Source& source = current.field.metadata().source;
+  if (!source.exactness)
+    throw Error("operands: the field was not built by 'combine'; give an expression, such as 'union(a.obj, b.obj)'");
+  return withOperands(parseExpression(source.name),
+                      [&](const std::string& name) { return Expression::named(fileBeside(current, name)); });
+}
+
+Expression inUnitsOf(const Source& source, Expression expression) {
+  const auto& [center, scale] = source.normalization;
+  if (source.normalization.isIdentity()) return expression;
+  return combine::scaled(combine::moved(std::move(expression), -center), scale);
+}
+
+}  // namespace
+
+std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const CurrentField& current,
+                                                  const std::string& expression) {
+  const Source& source = current.field.metadata().source;
+  const DistanceOptions options{.insideTest = source.insideTest};
+  const Expression loaded = withLoadedOperands(
+      console, expression == kOwn ? ownExpression(current) : parseExpression(expression), options.insideTest);
+  std::vector<render::OutlinedSolid> solids;
+  for (const Expression& operand : booleanOperands(loaded)) {
+    DistanceFunction distance = withProgress(console, [&](const Progress& progress) -> DistanceFunction {
+      return CombinedDistance(inUnitsOf(source, operand), options, progress);
+    });
+    solids.push_back({textOf(operand), std::make_shared<const DistanceFunction>(std::move(distance))});
+  }
+  return solids;
+}
+
+void checkOperands(const std::string& expression) {
+  if (expression != kOwn) parseExpression(expression);
+}
+
+}  // namespace hpsdf::app

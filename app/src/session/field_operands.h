@@ -1,0 +1,23 @@
+#pragma once
+// The solids that were combined into a field, for slices that show their outlines.
+
+#include <string>
+#include <vector>
+
+#include "console/console.h"
+#include "hpsdf/render/picture_settings.h"
+#include "session/current_field.h"
+
+namespace hpsdf::app {
+
+/// Loads the operands of an expression, in the units of the current field. The word "own" stands for the expression
+/// from which `combine` built the field; its files are looked for beside the field's file and in the current folder.
+/// Throws `Error` for a field that `combine` did not build, for mistakes in the expression and for files that cannot be
+/// read, and `Cancelled` after Ctrl-C.
+std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const CurrentField& current,
+                                                  const std::string& expression);
+
+/// Throws `Error` if the text is neither "own" nor an expression. It opens no files.
+void checkOperands(const std::string& expression);
+
+}  // namespace hpsdf::app
