@@ -95,6 +95,37 @@ TEST_F(Sampling, contoursAreWrittenAsClosedMeshes) {
   expectRefused({{"contour", field(), "-o", at("none/x.ply")}}, "none/x.ply", before);
 }
 
+TEST_F(Sampling, contoursHaveTheColoursOfPictures) {
+  const auto colored = [&](const std::string& file, const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"contour", field(), "-o", at(file), "--tolerance", "1%", "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run({.words = words});
+  };
+  const Outcome outcome = colored("degree.ply", {"--color", "degree"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(Json::parse(outcome.out).at("color").at("by"), "degree");
+  const Field torus = load(field());
+  EXPECT_EQ(Json::parse(outcome.out).at("color").at("levels").size(), statistics(torus).degreeVolume.size());
+  ASSERT_EQ(colored("plain.ply", {}).status, 0);
+  const std::size_t vertices = readMesh(at("plain.ply")).vertices.size();
+  const std::size_t header = std::string_view("property uchar red\nproperty uchar green\nproperty uchar blue\n").size();
+  EXPECT_EQ(readFile(at("degree.ply")).size(), readFile(at("plain.ply")).size() + 3 * vertices + header);
+
+  const Outcome error = colored("error.glb", {"--color", "error", "--range", "1e-6,1e-3"});
+  ASSERT_EQ(error.status, 0) << error.err;
+  EXPECT_EQ(Json::parse(error.out).at("color").at("range"), Json({1e-6, 1e-3}));
+  ASSERT_EQ(colored("other.glb", {"--color", "error", "--range", "1e-5,1e-3"}).status, 0);
+  EXPECT_NE(readFile(at("error.glb")), readFile(at("other.glb")));
+  EXPECT_THAT(run({{"contour", field(), "-o", at("e.glb"), "--tolerance", "1%", "--color", "slope"}}).out,
+              ContainsRegex("colours +slope from [^ ]+ to [^ ]+, logarithmic"));
+
+  const std::set<std::string> before = namesIn(folder_.path());
+  expectRefused({{"contour", field(), "-o", at("x.stl"), "--color", "degree"}}, "no colours", before);
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--range", "1,2"}}, "needs color", before);
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--color", "degree", "--range", "1,2"}}, "range", before);
+  expectRefused({{"contour", field(), "-o", at("x.ply"), "--color", "normal"}}, "color", before);
+}
+
 TEST_F(Sampling, cubicGridsAreExportedAndMeasured) {
   const Outcome outcome = run({{"export", field(), "-o", at("grid.cdf"), "--resolution", "20", "--json"}});
   ASSERT_EQ(outcome.status, 0) << outcome.err;

@@ -92,6 +92,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"probe", "probe from=-0.9,0,0.24 to=0.9,0,0.24 samples=50 output=$out/line.csv"},
     {"probe", "probe from=-0.9,0,0.24 to=0.9,0,0.24 samples=50 size=320x240 output=$out/line.png"},
     {"contour", "contour output=$out/surface.ply tolerance=1%"},
+    {"contour", "contour output=$out/colored.glb tolerance=1% color=degree"},
     {"export", "export resolution=4 points=100 output=$out/grid.cdf"},
     {"sample", "sample surface=100 near=100 uniform=100 output=$out/samples.csv"},
     {"export", "export resolution=4 gradients=true output=$out/grid.vti"},

@@ -371,8 +371,10 @@ TEST(MeshExport, writesNormalsAndColours) {
       EXPECT_LT((Vector3(normal.x, normal.y, normal.z) - Vector3(x.x, x.y, x.z).normalized()).norm(), 1e-6) << name;
       const aiColor4D& color = read.mColors[0][i];
       EXPECT_NEAR(color.r, x.x > 0 ? 1 : 0, 1e-6) << name;
-      EXPECT_NEAR(color.g, 0.2, 1e-6);
-      EXPECT_NEAR(color.b, 0.4, 1e-6);
+      // GLB holds linear light: the sRGB values 51/255 and 102/255 are 0.033105 and 0.132868 there.
+      const bool isLinear = file.extension() == ".glb";
+      EXPECT_NEAR(color.g, isLinear ? 0.033105 : 0.2, isLinear ? 1e-5 : 1e-6) << name;
+      EXPECT_NEAR(color.b, isLinear ? 0.132868 : 0.4, isLinear ? 1e-5 : 1e-6) << name;
     }
   }
 }

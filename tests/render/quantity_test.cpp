@@ -6,6 +6,7 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/render/picture.h"
+#include "hpsdf/render/point_colors.h"
 #include "support/random_field.h"
 
 namespace hpsdf::render {
@@ -25,6 +26,43 @@ Vector3 pointOf(const SliceView& view, int x, int y, int width, int height) {
 TEST(ColorModes, standInTheOrderOfTheirEnumerators) {
   for (std::size_t i = 0; i < colorModes().size(); ++i) EXPECT_EQ(std::size_t(colorModes()[i].color), i);
   EXPECT_EQ(colorModes().size(), std::size_t(ColorBy::cellError) + 1) << "one for each enumerator; name the last here";
+}
+
+TEST(PointColors, areThoseOfAPictureWithTheSameScale) {
+  const Seen seen;
+  const auto renderer = makeCpuRenderer(seen.field);
+  for (const ColorBy color :
+       {ColorBy::degree, ColorBy::depth, ColorBy::valueJump, ColorBy::slope, ColorBy::error, ColorBy::cellError}) {
+    // A slice far from the surface, so that no line covers its colours.
+    const SlicePicture picture{.plane = AxisPlane{2, 0.95}, .color = color, .width = 40, .height = 40, .bare = true};
+    const Drawn drawn = drawSlice(*renderer, seen.field, picture, seen.reference);
+    std::vector<Vector3> points;
+    std::vector<Color> expected;
+    for (int y = 0; y < 40; ++y)
+      for (int x = 0; x < 40; ++x) {
+        const std::size_t i = std::size_t(y) * 40 + x;
+        const auto isOther = [&](std::size_t k) { return drawn.buffers.cell[k] != drawn.buffers.cell[i]; };
+        if (x < 3 || y < 3 || isOther(i - 1) || isOther(i - 2) || isOther(i - 40) || isOther(i - 80)) continue;
+        points.push_back(pointAt(std::get<SliceView>(drawn.view), drawn.buffers, x, y));
+        expected.push_back(drawn.image.at(x, y));
+      }
+    ASSERT_GT(points.size(), 50U);
+    const PointColors made = pointColors(seen.field, points, color, drawn.scale, seen.reference);
+    std::size_t same = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      int most = 0;
+      for (int k = 0; k < 3; ++k) most = std::max(most, std::abs(made.colors[i][k] - expected[i][k]));
+      same += most <= 2;
+    }
+    EXPECT_GT(double(same), 0.9 * double(points.size())) << "color " << int(color);
+    ScaleOptions other = drawn.scale;
+    if (other.limits) {
+      (*other.limits)[0] *= 0.01;
+      EXPECT_NE(pointColors(seen.field, points, color, other, seen.reference).colors, made.colors);
+    }
+  }
+  EXPECT_THROW(pointColors(seen.field, {}, ColorBy::normal), Error);
+  EXPECT_THROW(pointColors(seen.field, {}, ColorBy::error), Error);
 }
 
 TEST(Quantity, ofASliceIsThatOfItsPoints) {

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "commands/commands.h"
+#include "commands/contour_colors.h"
 #include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
@@ -47,6 +48,7 @@ void checkContour(const Arguments& arguments) {
   for (const double offset : offsets) {
     const std::string file = fileOf(output, offset);
     checkMeshWritable(file);
+    checkVertexColors(arguments, file);
     if (!files.insert(file).second)
       throw Error(fmt::format("offset: {} is given twice; the surfaces would have the same file", offset));
   }
@@ -74,9 +76,10 @@ struct WrittenContour {
   double tolerance;
   bool isBlended;  ///< the field was blended for the contour
   Contour contour;
+  std::optional<render::PointColors> colors;
 };
 
-Json contourJson(const WrittenContour& written) {
+Json contourJson(const Arguments& arguments, const WrittenContour& written) {
   const Contour& made = written.contour;
   return {{"output", written.file},
           {"file_bytes", std::filesystem::file_size(written.file)},
@@ -93,10 +96,11 @@ Json contourJson(const WrittenContour& written) {
           {"cells_with_lost_parts", made.lostParts},
           {"cells_with_multiple_sheets", made.multipleSheets},
           {"divided_polygons", made.fans},
-          {"crossing", made.flawed}};
+          {"crossing", made.flawed},
+          {"color", vertexColorJson(arguments, written.colors)}};
 }
 
-std::string contourText(const WrittenContour& written) {
+std::string contourText(const Arguments& arguments, const WrittenContour& written) {
   const Contour& made = written.contour;
   std::string text = fmt::format("{}: {} vertices, {} triangles, {}\n", written.file,
                                  grouped(made.mesh.vertices.size()), grouped(made.mesh.triangles.size()),
@@ -106,6 +110,7 @@ std::string contourText(const WrittenContour& written) {
       fmt::format("{} at most, and the surface at most {} from the mesh, for a tolerance of {}",
                   shortNumber(made.greatestValue), shortNumber(made.greatestGap), shortNumber(written.tolerance)));
   if (written.isBlended) text += summaryRow("field", "blended first, so that the mesh has no steps between cells");
+  if (written.colors) text += summaryRow("colours", vertexColorText(arguments, *written.colors));
   if (made.lostParts > 0)
     text += summaryRow("lost", fmt::format("thin parts or gaps of the field, in {} cells", grouped(made.lostParts)));
   if (made.multipleSheets > 0)
@@ -127,15 +132,19 @@ std::string missedBy(const Contour& made) {
   return "";
 }
 
-VertexData vertexDataOf(const Arguments& arguments, const Contour& made) {
-  return {.normals = arguments.flag("no-normals") ? std::span<const Vector3>{} : std::span(made.normals)};
+VertexData vertexDataOf(const Arguments& arguments, const WrittenContour& written) {
+  VertexData data;
+  if (!arguments.flag("no-normals")) data.normals = written.contour.normals;
+  if (written.colors) data.colors = written.colors->colors;
+  return data;
 }
 
 /// Makes the surfaces of all offsets, and then writes them, so that an error leaves no files behind.
-std::vector<WrittenContour> writeContours(const Session& session, const Arguments& arguments) {
+std::vector<WrittenContour> writeContours(Session& session, const Arguments& arguments) {
   const Field& current = session.current().field;
   const int threads = arguments.whole("threads");
   const double tolerance = toleranceOf(arguments, current);
+  const render::ReferenceData colorData = vertexColorData(session, arguments);
   std::optional<Field> blendedField;
   if (current.data().blend == 0 && !arguments.flag("keep-jumps"))
     blendedField = withThreads(threads, [&] { return blended(current); });
@@ -148,15 +157,16 @@ std::vector<WrittenContour> writeContours(const Session& session, const Argument
                                  .singlePrecision = isSinglePrecisionMesh(file),
                                  .simplify = arguments.flag("simplify"),
                                  .threads = threads};
-    Contour made = withProgress(session.console(), [&](const Progress& progress) {
-      return contour(blendedField ? *blendedField : current, options, progress);
-    });
+    const Field& field = blendedField ? *blendedField : current;
+    Contour made =
+        withProgress(session.console(), [&](const Progress& progress) { return contour(field, options, progress); });
     if (made.mesh.triangles.empty())
       throw Error(
           fmt::format("offset: the field has no value of {} in its domain, so that there is no surface", offset));
-    all.push_back({file, offset, tolerance, blendedField.has_value(), std::move(made)});
+    auto colors = vertexColors(arguments, field, made.mesh, colorData);
+    all.push_back({file, offset, tolerance, blendedField.has_value(), std::move(made), std::move(colors)});
   }
-  for (const WrittenContour& made : all) saveMesh(made.contour.mesh, made.file, vertexDataOf(arguments, made.contour));
+  for (const WrittenContour& made : all) saveMesh(made.contour.mesh, made.file, vertexDataOf(arguments, made));
   return all;
 }
 
@@ -167,10 +177,10 @@ void runContour(Session& session, const Arguments& arguments) {
   std::ostream& result = session.console().out;
   if (session.wantsJson(arguments)) {
     Json surfaces = Json::array();
-    for (const WrittenContour& written : all) surfaces.push_back(contourJson(written));
+    for (const WrittenContour& written : all) surfaces.push_back(contourJson(arguments, written));
     printJson(result, all.size() == 1 ? surfaces[0] : Json{{"surfaces", surfaces}});
   } else {
-    for (const WrittenContour& written : all) result << contourText(written);
+    for (const WrittenContour& written : all) result << contourText(arguments, written);
   }
   for (const WrittenContour& written : all)
     if (const std::string missed = missedBy(written.contour); !missed.empty()) throw Failed(missed);
@@ -215,8 +225,10 @@ half a tolerance within the domain.
 The mesh is measured at the corners, in the middle of each triangle and of its edges, and the other way round from points of the
 surface. The exit status is 1 where the tolerance is missed; the mesh is written all the same.)"),
       .examples = {"hpsdf contour bunny.hpsdf -o bunny.ply", "hpsdf contour bunny.hpsdf -o coarse.obj --tolerance 1%",
+                   "hpsdf contour bunny.hpsdf -o degrees.glb --color degree",
                    "hpsdf contour bunny.hpsdf -o bunny{offset}.stl --offset 0 --offset 0.02"},
-      .parameters = joined({{fieldParameter()}, kContourParameters, {threadsParameter("The mesh is")}}),
+      .parameters = joined(
+          {{fieldParameter()}, kContourParameters, vertexColorParameters(registry), {threadsParameter("The mesh is")}}),
       .action = runContour,
       .check = checkContour,
   });

@@ -39,34 +39,6 @@ constexpr NamedView kViews[] = {{"front", 0, 0},
                                 {"bottom", 0, -90},
                                 {"corner", 45, 35.264389682754654}};
 
-render::ScaleOptions scaleOptions(const Arguments& arguments) {
-  render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
-  const ColorBy color = colorNamed(arguments.text("color"));
-  for (const char* name : {"range", "scale"})
-    if (arguments.given(name) && !render::isQuantity(color) &&
-        !(color == ColorBy::distance && name == std::string_view("range")))
-      throw Error(
-          fmt::format("{}: the colours of {} have none; it is for {}", name, arguments.text("color"), quantityNames()));
-  if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
-    throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
-  if (arguments.given("mesh") && color != ColorBy::error)
-    throw Error(fmt::format("mesh: is for color error, not {}", arguments.text("color")));
-  if (arguments.given("other") && color != ColorBy::difference)
-    throw Error(fmt::format("other: is for color difference, not {}", arguments.text("color")));
-  if (!arguments.given("other") && color == ColorBy::difference)
-    throw Error("color difference: needs other, the file of the field to compare with");
-  if (arguments.given("range")) {
-    const auto limits = arguments.numbers("range");
-    options.limits = {limits[0], limits[1]};
-  }
-  if (arguments.given("levels")) {
-    const auto ends = arguments.numbers("levels");
-    for (int level = int(ends[0]); level <= int(ends[1]); ++level) options.levels.push_back(level);
-    if (options.levels.empty()) throw Error("levels: expected LOWEST,HIGHEST with LOWEST not above HIGHEST");
-  }
-  return options;
-}
-
 render::ShownCells shownCells(const Arguments& arguments) {
   const std::string style = arguments.text("cells");
   for (const char* name : {"degrees", "depths"})
@@ -191,6 +163,34 @@ std::vector<int> levelList(const std::string& text, const char* name, int most) 
 Vector3 pointOf(const Arguments& arguments, const char* name) {
   const auto p = arguments.numbers(name);
   return {p[0], p[1], p[2]};
+}
+
+render::ScaleOptions scaleOptions(const Arguments& arguments) {
+  render::ScaleOptions options{.logarithmic = arguments.text("scale") == "log"};
+  const ColorBy color = colorNamed(arguments.text("color"));
+  for (const char* name : {"range", "scale"})
+    if (arguments.given(name) && !render::isQuantity(color) &&
+        !(color == ColorBy::distance && name == std::string_view("range")))
+      throw Error(
+          fmt::format("{}: the colours of {} have none; it is for {}", name, arguments.text("color"), quantityNames()));
+  if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
+    throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
+  if (arguments.given("mesh") && color != ColorBy::error)
+    throw Error(fmt::format("mesh: is for color error, not {}", arguments.text("color")));
+  if (arguments.given("other") && color != ColorBy::difference)
+    throw Error(fmt::format("other: is for color difference, not {}", arguments.text("color")));
+  if (!arguments.given("other") && color == ColorBy::difference)
+    throw Error("color difference: needs other, the file of the field to compare with");
+  if (arguments.given("range")) {
+    const auto limits = arguments.numbers("range");
+    options.limits = {limits[0], limits[1]};
+  }
+  if (arguments.given("levels")) {
+    const auto ends = arguments.numbers("levels");
+    for (int level = int(ends[0]); level <= int(ends[1]); ++level) options.levels.push_back(level);
+    if (options.levels.empty()) throw Error("levels: expected LOWEST,HIGHEST with LOWEST not above HIGHEST");
+  }
+  return options;
 }
 
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& box) {

@@ -47,6 +47,10 @@ Vector3 pointOf(const Arguments& arguments, const char* name);
 /// A placeholder for the result of `shownBox`, with which arguments can be checked before the field is loaded.
 inline const Box kAnyBox(Vector3::Constant(-1), Vector3::Constant(1));
 
+/// Returns the colour scale from the arguments `range`, `scale` and `levels`. Throws `Error` if one of them, or `mesh`
+/// or `other`, is not for the quantity that `color` names, or if that needs another argument.
+render::ScaleOptions scaleOptions(const Arguments& arguments);
+
 /// Returns the settings of a picture from the arguments of `slice`. If no offset is given, the plane is at
 /// `defaultOffset` of `box`. Throws `Error` if both a plane and an axis are given.
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& box = kAnyBox);

@@ -61,7 +61,8 @@ TriangleMesh loadMesh(const std::string& fileOrShape, const Progress& progress =
 
 /// Writes a mesh as OBJ, binary PLY, binary STL or GLB (binary glTF 2.0), depending on the file's extension. OBJ and
 /// PLY keep coordinates in full double precision; STL and GLB hold single-precision numbers, and STL no data of
-/// vertices. Coordinates keep their axes, also in GLB, where other programs take y for upward.
+/// vertices. Coordinates keep their axes, also in GLB, where other programs take y for upward. Colours are sRGB in all
+/// files but GLB, which holds them in linear light.
 ///
 /// The file appears whole or not at all. Throws `Error` (of the kind `file`) for another extension, for vertices of
 /// different positions that single precision cannot tell apart, and as `OutputFile` does.
@@ -72,6 +73,9 @@ void writePly(const TriangleMesh& mesh, const std::function<void(std::span<const
 
 /// Tells whether a mesh file with this name would hold single-precision numbers: STL and GLB.
 bool isSinglePrecisionMesh(const std::filesystem::path& file);
+
+/// Tells whether a mesh file with this name would hold `VertexData`: all but STL.
+bool holdsVertexData(const std::filesystem::path& file);
 
 /// Throws the `Error` that `saveMesh` would throw for this file, as far as it can be foreseen. A caller thus learns
 /// before long work that it could not write the file.

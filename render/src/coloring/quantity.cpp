@@ -154,6 +154,16 @@ std::vector<float> quantityOfSamples(const Field& field, const ViewBuffers& buff
   return result;
 }
 
+std::vector<float> quantityOfPoints(const Field& field, std::span<const Vector3> points, ColorBy quantity,
+                                    const ReferenceData& reference, const std::vector<double>& ofCells) {
+  std::vector<double> values(points.size());
+  if (ofCells.empty())
+    measure(field, quantity, reference, points, values);
+  else
+    for (std::size_t i = 0; i < points.size(); ++i) values[i] = ofCells[field.cellAt(points[i]).id];
+  return {values.begin(), values.end()};
+}
+
 ColorScale colorScale(const ScaleOptions& options, const Field& field, const std::vector<double>& ofCells,
                       const std::vector<float>& ofSamples) {
   if (options.limits) {

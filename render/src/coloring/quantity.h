@@ -27,6 +27,10 @@ std::vector<float> quantityOfSamples(const Field& field, const ViewBuffers& buff
                                      const std::function<Vector3(int, int)>& pointAt, ColorBy quantity,
                                      const ReferenceData& reference, const std::vector<double>& ofCells);
 
+/// The value of the quantity at each point. `ofCells` is the result of `quantityOfCells`.
+std::vector<float> quantityOfPoints(const Field& field, std::span<const Vector3> points, ColorBy quantity,
+                                    const ReferenceData& reference, const std::vector<double>& ofCells);
+
 /// The colour scale for a quantity. If the options set no limits, the limits are chosen from `ofCells`, or from
 /// `ofSamples` if `ofCells` is empty. Throws `Error` if the limits make no valid scale.
 ColorScale colorScale(const ScaleOptions& options, const Field& field, const std::vector<double>& ofCells,

@@ -95,6 +95,8 @@ void checkMeshWritable(const fs::path& file) {
 
 bool isSinglePrecisionMesh(const fs::path& file) { return writtenFormat(file).isSingle; }
 
+bool holdsVertexData(const fs::path& file) { return writtenFormat(file).extension != std::string_view(".stl"); }
+
 void saveMesh(const TriangleMesh& mesh, const fs::path& file, const VertexData& data) {
   const WrittenFormat& format = writtenFormat(file);
   if (format.isSingle) requireDifferentInSinglePrecision(mesh, file);

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -10,9 +11,17 @@ namespace {
 
 // Numbers of the glTF 2.0 specification.
 constexpr std::uint32_t kGlbMagic = 0x46546c67, kGlbVersion = 2, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
-constexpr int kUnsignedByte = 5121, kUnsignedInt = 5125, kFloat = 5126;
+constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126;
 constexpr int kVertexBuffer = 34962, kIndexBuffer = 34963;
 constexpr std::size_t kChunkHeader = 8, kFileHeader = 12;
+
+/// Converts a channel of an sRGB colour to linear light (IEC 61966-2-1), in which glTF has colours of vertices, as a
+/// 16-bit number. With 8 bits, dark colours would be rounded visibly.
+std::uint16_t linearChannel(std::uint8_t channel) {
+  const double c = channel / 255.0;
+  const double linear = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+  return static_cast<std::uint16_t>(std::lround(65535 * linear));
+}
 
 /// The description of a file with one mesh, and the bytes of its binary part.
 class Document {
@@ -24,7 +33,7 @@ class Document {
     addBounds(mesh);
     if (!data.normals.empty()) attributes["NORMAL"] = addAccessor(kFloat, "VEC3", vertices, 12, kVertexBuffer);
     if (!data.colors.empty()) {
-      attributes["COLOR_0"] = addAccessor(kUnsignedByte, "VEC4", vertices, 4, kVertexBuffer);
+      attributes["COLOR_0"] = addAccessor(kUnsignedShort, "VEC4", vertices, 8, kVertexBuffer);
       json_["accessors"].back()["normalized"] = true;
     }
     const int indices = addAccessor(kUnsignedInt, "SCALAR", 3 * mesh.triangles.size(), 4, kIndexBuffer);
@@ -32,7 +41,13 @@ class Document {
     json_["scene"] = 0;
     json_["scenes"] = {{{"nodes", {0}}}};
     json_["nodes"] = {{{"mesh", 0}}};
-    json_["meshes"] = {{{"primitives", {{{"attributes", attributes}, {"indices", indices}}}}}};
+    nlohmann::ordered_json primitive = {{"attributes", attributes}, {"indices", indices}};
+    if (!data.colors.empty()) {
+      // Without a material, glTF's default is metal, whose colours viewers show as dark reflections.
+      json_["materials"] = {{{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 0.8}}}}};
+      primitive["material"] = 0;
+    }
+    json_["meshes"] = {{{"primitives", {primitive}}}};
     json_["buffers"] = {{{"byteLength", bytes_}}};
   }
 
@@ -90,7 +105,7 @@ void writeGlb(const TriangleMesh& mesh, const VertexData& data, const WriteBytes
   addVectors(mesh.vertices);
   addVectors(data.normals);
   for (const auto& [red, green, blue] : data.colors)
-    for (const std::uint8_t channel : {red, green, blue, std::uint8_t{255}}) out.addBytesOf(channel);
+    for (const std::uint8_t channel : {red, green, blue, std::uint8_t{255}}) out.addBytesOf(linearChannel(channel));
   for (const Triangle& triangle : mesh.triangles) out.addBytesOf(triangle);
   out.finish();
 }
