@@ -1,5 +1,7 @@
-"""Blender, without a display, imports the contour of a field from a GLB file and a level set from a .vdb file."""
+"""Blender, without a display, imports contours of fields from GLB files, also with colours, and a level set from a .vdb
+file, and renders a picture."""
 
+import json
 import math
 import shutil
 import subprocess
@@ -9,16 +11,83 @@ from pathlib import Path
 # Blender runs this file a second time, with its own interpreter, and the words after "--".
 inside = "--" in sys.argv
 
+
+def imported(file):
+    """Returns the object that Blender makes of a GLB file, in an empty scene."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.import_scene.gltf(filepath=file)
+    return next(one for one in bpy.data.objects if one.type == "MESH")
+
+
+def check_colors(file, expected):
+    """Each corner of a triangle has one of the colours of the field's degrees, which are given in linear light."""
+    mesh = imported(file).data
+    colors = mesh.color_attributes[0].data
+    worst = max(min(max(abs(a - b) for a, b in zip(one.color, known)) for known in expected) for one in colors)
+    assert len(colors) > 1000 and worst < 0.01, worst
+
+
+def aimed(name, data, position):
+    """Adds a camera or a lamp at a position to the scene, which looks at the origin."""
+    from mathutils import Vector
+    added = bpy.data.objects.new(name, data)
+    added.location = position
+    added.rotation_euler = (-Vector(position)).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(added)
+    return added
+
+
+def draw(file, picture):
+    """Renders a file on the CPU, in the light of suns alone, so that the picture has no noise."""
+    imported(file)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device = "CPU"
+    scene.cycles.samples = 64
+    scene.cycles.use_denoising = False
+    scene.cycles.max_bounces = 0
+    scene.view_settings.view_transform = "Standard"
+    scene.render.resolution_x, scene.render.resolution_y = 400, 300
+    scene.render.filepath = picture
+    scene.render.image_settings.color_mode = "RGB"
+    scene.render.image_settings.compression = 100
+    scene.world = bpy.data.worlds.new("white")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1, 1, 1, 1)
+    scene.world.cycles_visibility.diffuse = scene.world.cycles_visibility.glossy = False
+    for energy, position in ((3.0, (1, -2, 3)), (1.2, (2.5, -3.5, -0.5)), (1.0, (-3, -3, 1))):
+        sun = bpy.data.lights.new("sun", "SUN")
+        sun.energy, sun.angle = energy, 0
+        aimed("sun", sun, position)
+    camera = bpy.data.cameras.new("camera")
+    camera.angle = 0.62
+    scene.camera = aimed("camera", camera, (1.8, -4.0, 1.4))  # Blender's z is upward
+    bpy.ops.render.render(write_still=True)
+
+
+def linear(channel):
+    """Converts a channel of an sRGB colour, 0 to 255, to linear light."""
+    c = channel / 255
+    return c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
+
+
+def linear_colors(ply):
+    """Returns the colours of the vertices of a binary PLY file of ours, each once, in linear light."""
+    header, _, body = Path(ply).read_bytes().partition(b"end_header\n")
+    count = next(int(line.split()[2]) for line in header.splitlines() if line.startswith(b"element vertex"))
+    width = 24 + 12 + 3  # position in double, normal in single precision, and the colour
+    colors = {tuple(body[n * width + 36:n * width + 39]) for n in range(count)}
+    return [[linear(channel) for channel in color] for color in colors]
+
+
 if inside:
     import bpy
     import numpy
 
     # Debian 12's NumPy lacks a name that the importer of its Blender 3.4 uses.
     numpy.bool = bool
-    glb, vdb = sys.argv[sys.argv.index("--") + 1:]
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.import_scene.gltf(filepath=glb)
-    mesh = next(one for one in bpy.data.objects if one.type == "MESH").data
+    glb, vdb, body, expected, picture = sys.argv[sys.argv.index("--") + 1:]
+    mesh = imported(glb).data
     edges = {}
     for polygon in mesh.polygons:
         for key in polygon.edge_keys:
@@ -33,9 +102,11 @@ if inside:
         volume = next(one for one in bpy.data.objects if one.type == "VOLUME").data
         volume.grids.load()
         assert [grid.name for grid in volume.grids] == ["surface"], [grid.name for grid in volume.grids]
+    check_colors(body, json.loads(expected))
+    draw(body, picture)
     print("Blender read all files")
 else:
-    from client import Program, skip
+    from client import Program, check_picture, skip
 
     if not shutil.which("blender"):
         skip("blender is not installed")
@@ -47,7 +118,12 @@ else:
         if "without OpenVDB" not in str(error):
             raise
         volume = "none"
+    program.combine_body()
+    for name in ("body.glb", "body.ply"):
+        program.run("contour", program.at("body.hpsdf"), "-o", program.at(name), "--tolerance", "0.3%", "--color", "degree")
+    files = [program.at("torus.glb"), volume, program.at("body.glb"), json.dumps(linear_colors(program.at("body.ply"))),
+             program.at("blender.png")]
     made = subprocess.run(["blender", "--background", "--factory-startup", "--python-exit-code", "1", "--python",
-                           str(Path(__file__)), "--", program.at("torus.glb"), volume], capture_output=True, text=True,
-                          timeout=100)
+                           str(Path(__file__)), "--", *files], capture_output=True, text=True, timeout=100)
     assert made.returncode == 0 and "Blender read all files" in made.stdout, made.stdout[-2000:] + made.stderr[-2000:]
+    check_picture(program.at("blender.png"), "blender.png")

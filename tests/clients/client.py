@@ -1,6 +1,8 @@
 """What the tests of other programs share: a field, the program's commands, and how a test is skipped."""
 
 import importlib
+import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -9,6 +11,10 @@ from pathlib import Path
 # The torus of the tests: around the z axis, with these radii.
 MAJOR, MINOR = 0.7, 0.25
 SHAPE = f"analytic:torus,major={MAJOR},minor={MINOR}"
+
+# The body of the pictures of docs/pipelines.md: a gear with a spherical recess, and from where it is seen.
+BODY = "difference(builtin:gear, move(builtin:sphere,radius=0.5, 0.55, 0.5, 0.35))"
+EYE_OF_PICTURES = (1.8, 1.4, 4.0)  # y is upward
 
 SKIPPED = 77
 
@@ -43,6 +49,10 @@ class Program:
         assert made.returncode == 0, made.stderr
         return made.stdout
 
+    def combine_body(self):
+        """Builds the field of the body in pictures, body.hpsdf."""
+        self.run("combine", BODY, "-o", self.at("body.hpsdf"), "--target-error", "1e-6")
+
     def export(self, name, *options):
         """Exports the torus and returns the path of the file."""
         self.run("export", self.at("torus.hpsdf"), "-o", self.at(name), *options)
@@ -60,6 +70,30 @@ class Program:
         Path(self.at("points.txt")).write_text(lines)
         rows = self.run("query", self.at(field), self.at("points.txt")).splitlines()[1:]
         return [float(row.split(",")[3]) for row in rows]
+
+
+def pixels(file):
+    """Returns the colours of a picture, the lowest row first."""
+    reader = module("vtkmodules.vtkIOImage", "python3-vtk9").vtkPNGReader()
+    reader.SetFileName(str(file))
+    reader.Update()
+    image = reader.GetOutput()
+    width, height, _ = image.GetDimensions()
+    colors = module("vtkmodules.util.numpy_support", "python3-vtk9").vtk_to_numpy(image.GetPointData().GetScalars())
+    return colors.reshape(height, width, -1)[:, :, :3].astype(int)
+
+
+def check_picture(file, name):
+    """Checks that a picture is about that of docs/pictures: versions of programs and devices light it a bit differently. If
+    the environment variable HPSDF_PICTURES names a folder, the picture is copied there, to become the new one of docs."""
+    if "HPSDF_PICTURES" in os.environ:
+        shutil.copy(file, Path(os.environ["HPSDF_PICTURES"]) / name)
+    actual, expected = pixels(file), pixels(Path(__file__).parents[2] / "docs/pictures" / name)
+    assert actual.shape == expected.shape, (name, actual.shape, expected.shape)
+    difference = abs(actual - expected).mean()
+    moved = abs(actual - expected[:, ::-1]).mean()  # a mirrored picture must be noticed
+    print(f"{name} differs by {difference:.2f} of 255, its mirror image by {moved:.2f}")
+    assert difference < 4 < moved, (name, difference, moved)
 
 
 def distance(x, y, z):

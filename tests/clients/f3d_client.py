@@ -6,34 +6,45 @@ import math
 import shutil
 import subprocess
 
-from client import Program, module, skip
+from client import EYE_OF_PICTURES, Program, check_picture, module, pixels, skip
 
 numpy = module("numpy", "python3-numpy")
-vtk_image = module("vtkmodules.vtkIOImage", "python3-vtk9")
-vtk_arrays = module("vtkmodules.util.numpy_support", "python3-vtk9")
 
 EYE = (2.0, -2.0, 2.0)
 
 
-def pixels(file):
-    """Returns the colours of a picture, the lowest row first."""
-    reader = vtk_image.vtkPNGReader()
-    reader.SetFileName(file)
-    reader.Update()
-    image = reader.GetOutput()
-    width, height, _ = image.GetDimensions()
-    colors = vtk_arrays.vtk_to_numpy(image.GetPointData().GetScalars())
-    return colors.reshape(height, width, -1)[:, :, :3].astype(int)
+def run_f3d(program, file, picture, eye, *options):
+    command = ["xvfb-run", "-a", "f3d", program.at(file), "--output", program.at(picture), "--camera-position",
+               ",".join(map(str, eye)), "--camera-focal-point", "0,0,0", "--axis=0", "--grid=0", "--filename=0", *options]
+    made = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    assert made.returncode == 0, made.stderr
+    return program.at(picture)
 
 
 def drawn_by_f3d(program, eye):
     """Returns which pixels of f3d's picture show the body."""
-    command = ["xvfb-run", "-a", "f3d", program.at("torus.glb"), "--output", program.at("f3d.png"), "--resolution", "600,600",
-               "--camera-position", ",".join(map(str, eye)), "--camera-focal-point", "0,0,0", "--camera-view-up", "0,0,1",
-               "--camera-view-angle", "40", "--axis=0", "--grid=0", "--filename=0", "--bg-color", "0,0,1"]
-    made = subprocess.run(command, capture_output=True, text=True, timeout=100)
-    assert made.returncode == 0, made.stderr
-    return (pixels(program.at("f3d.png")) != (0, 0, 255)).any(axis=2)
+    picture = run_f3d(program, "torus.glb", "f3d.png", eye, "--resolution", "600,600", "--camera-view-up", "0,0,1",
+                      "--camera-view-angle", "40", "--bg-color", "0,0,1")
+    return (pixels(picture) != (0, 0, 255)).any(axis=2)
+
+
+def check_colors(program):
+    """A body of one colour has this hue in f3d's picture: the numbers of the file are taken as linear light. All slopes lie
+    below the range, so that each vertex has the dark end of the colour map, whose red, green and blue are 84, 41, 126."""
+    program.run("contour", program.at("torus.hpsdf"), "-o", program.at("dark.glb"), "--tolerance", "0.01", "--color", "slope",
+                "--range", "10,20", "--scale", "linear")
+    colors = pixels(run_f3d(program, "dark.glb", "dark.png", EYE, "--resolution", "300,300", "--bg-color", "0,1,0"))
+    body = colors[(colors != (0, 255, 0)).any(axis=2)]
+    red, green, blue = ((body.mean(axis=0) / 255) ** 2.2).tolist()
+    print(f"linear green and red over blue are {green / blue:.3f} and {red / blue:.3f}")
+    assert green / blue < 0.24 and 0.25 < red / blue < 0.6, (red, green, blue)
+
+
+def draw_for_docs(program):
+    program.combine_body()
+    program.run("contour", program.at("body.hpsdf"), "-o", program.at("body.glb"), "--tolerance", "0.6%")
+    check_picture(run_f3d(program, "body.glb", "body.png", EYE_OF_PICTURES, "--resolution", "400,300", "--up", "+Y",
+                          "--camera-view-angle", "30", "--edges", "--bg-color", "1,1,1"), "f3d.png")
 
 
 def drawn_by_us(program, eye):
@@ -76,3 +87,5 @@ assert overlap > 0.98 and abs(aspect - 1) < 0.01, (overlap, aspect)
 overlap, aspect = likeness(drawn_by_f3d(program, (2.0, -2.0, 1.6)), ours)
 print(f"from another camera by {overlap:.4f}, {aspect:.4f}")
 assert overlap < 0.95 or abs(aspect - 1) > 0.05, (overlap, aspect)
+check_colors(program)
+draw_for_docs(program)
