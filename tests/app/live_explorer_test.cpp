@@ -412,6 +412,25 @@ TEST(LiveWork, measurementsForAFrameCannotBeCancelled) {
   EXPECT_GE(frames, 1);
 }
 
+/// Cancels all work.
+class Canceller final : public WorkListener {
+ public:
+  void report(std::string_view, double) override {}
+  bool wantsCancel() override { return true; }
+  void ended() override {}
+};
+
+TEST(LiveWork, theContourOfShownTrianglesCanBeCancelled) {
+  Desk desk;
+  Canceller canceller;
+  desk.session().setListener(&canceller);
+  EXPECT_THROW(desk.run("triangles shown=true"), Cancelled);
+  desk.session().setListener(nullptr);
+  EXPECT_FALSE(desk.explorer().view().triangles) << "nothing has changed";
+  desk.run("triangles shown=true");
+  EXPECT_NE(desk.explorer().shownContour(), nullptr);
+}
+
 TEST(Registry, theWindowIsForTheCommandLine) {
   const Registry registry = makeRegistry();
   try {

@@ -37,9 +37,27 @@ def aimed(name, data, position):
     return added
 
 
-def draw(file, picture):
-    """Renders a file on the CPU, in the light of suns alone, so that the picture has no noise."""
-    imported(file)
+def surface_of_volume(file):
+    """Adds the surface of a level set to an empty scene, as Blender's modifier finds it."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.object.volume_import(filepath=file)
+    volume = next(one for one in bpy.data.objects if one.type == "VOLUME")
+    volume.rotation_euler.x = math.pi / 2  # Blender's z is upward, and it turns no .vdb
+    volume.hide_render = True
+    surface = bpy.data.objects.new("surface", bpy.data.meshes.new("surface"))
+    bpy.context.scene.collection.objects.link(surface)
+    modifier = surface.modifiers.new("surface", "VOLUME_TO_MESH")
+    clay = bpy.data.materials.new("clay")
+    clay.diffuse_color = (0.55, 0.25, 0.12, 1)
+    surface.data.materials.append(clay)
+    modifier.object, modifier.grid_name, modifier.threshold = volume, "surface", 0
+    bpy.context.view_layer.update()
+    found = surface.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert len(found.data.polygons) > 1000 and max(found.dimensions) < 2.1, found.dimensions
+
+
+def draw(picture):
+    """Renders the scene on the CPU, in the light of suns alone, so that the picture has no noise."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
@@ -86,7 +104,7 @@ if inside:
 
     # Debian 12's NumPy lacks a name that the importer of its Blender 3.4 uses.
     numpy.bool = bool
-    glb, vdb, body, expected, picture = sys.argv[sys.argv.index("--") + 1:]
+    glb, vdb, body, expected, picture, body_vdb, picture_of_vdb = sys.argv[sys.argv.index("--") + 1:]
     mesh = imported(glb).data
     edges = {}
     for polygon in mesh.polygons:
@@ -103,7 +121,11 @@ if inside:
         volume.grids.load()
         assert [grid.name for grid in volume.grids] == ["surface"], [grid.name for grid in volume.grids]
     check_colors(body, json.loads(expected))
-    draw(body, picture)
+    imported(body)
+    draw(picture)
+    if body_vdb != "none":
+        surface_of_volume(body_vdb)
+        draw(picture_of_vdb)
     print("Blender read all files")
 else:
     from client import Program, check_picture, skip
@@ -119,11 +141,16 @@ else:
             raise
         volume = "none"
     program.combine_body()
+    body_vdb = "none" if volume == "none" else program.at("body.vdb")
+    if body_vdb != "none":
+        program.run("export", program.at("body.hpsdf"), "-o", body_vdb, "--voxel", "0.03")
     for name in ("body.glb", "body.ply"):
         program.run("contour", program.at("body.hpsdf"), "-o", program.at(name), "--tolerance", "0.3%", "--color", "degree")
     files = [program.at("torus.glb"), volume, program.at("body.glb"), json.dumps(linear_colors(program.at("body.ply"))),
-             program.at("blender.png")]
+             program.at("blender.png"), body_vdb, program.at("openvdb.png")]
     made = subprocess.run(["blender", "--background", "--factory-startup", "--python-exit-code", "1", "--python",
                            str(Path(__file__)), "--", *files], capture_output=True, text=True, timeout=100)
     assert made.returncode == 0 and "Blender read all files" in made.stdout, made.stdout[-2000:] + made.stderr[-2000:]
     check_picture(program.at("blender.png"), "blender.png")
+    if body_vdb != "none":
+        check_picture(program.at("openvdb.png"), "openvdb.png")
