@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -163,6 +164,67 @@ TEST(WindingNumber, isPreparedAtTheFirstCallByAnyThread) {
   const double perTriangle = double(distance.bytes() - before) / double(distance.source().faces);
   EXPECT_GT(perTriangle, 100);
   EXPECT_LT(perTriangle, 300);
+}
+
+/// Returns points in random directions at a distance from the origin.
+std::vector<Vector3> pointsAt(double distance) {
+  std::vector<Vector3> points = placesIn(Box(Vector3::Constant(-1), Vector3::Constant(1)), 300);
+  for (Vector3& x : points) x = x.normalized() * distance;
+  return points;
+}
+
+TEST(ClosestPoint, hasTheRightSignAndDistanceFarAway) {
+  std::vector<Case> all = cases();
+  all.push_back({support::reversed(shapes::mesh("gear")), {}});
+  // From a thousand times their size on, the two faces of this wall are equally far to rounding.
+  all.push_back({boxBetween({-1, -1, -1e-13}, {1, 1, 1e-13}), {}});
+  for (const auto& [mesh, options] : all) {
+    const ExactDistance distance(mesh, options);
+    const double side = signedVolume(mesh) < 0 ? -1 : 1, size = boundingBox(mesh).sizes().norm();
+    for (const double away : {1e3, 1e7, 1e9, 1e12, 1e15, 1e20, 1e100, 1e200, 1e307}) {
+      const std::vector<Vector3> points = pointsAt(away);
+      std::vector<ClosestPoint> found(points.size());
+      std::vector<double> distances(points.size()), windings(points.size());
+      distance.closestPoints(points, found);
+      distance(points, distances);
+      distance.windingNumbers(points, windings);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        ASSERT_NEAR(distances[i] * side, away, size + 1e-15 * away) << points[i].transpose();
+        ASSERT_EQ(found[i].signedDistance, distances[i]);
+        ASSERT_EQ(distance(points[i]), distances[i]);
+        ASSERT_NEAR((points[i] - found[i].point).stableNorm() - options.thickness / 2, distances[i] * side,
+                    1e-7 * size + 1e-15 * away);
+        ASSERT_NEAR(windings[i], 0, 1e-4);
+      }
+    }
+  }
+}
+
+TEST(ClosestPoint, isTheFarthestVertexOfAGearInTheDirectionOfAFarPoint) {
+  const TriangleMesh mesh = shapes::mesh("gear");
+  const ExactDistance distance(mesh);
+  for (const double away : {1e5, 1e9, 1e15, 1e30})
+    for (const Vector3& x : pointsAt(away)) {
+      const Vector3 direction = x.normalized();
+      double farthest = -HUGE_VAL;
+      for (const Vector3& vertex : mesh.vertices) farthest = std::max(farthest, direction.dot(vertex));
+      ASSERT_NEAR(direction.dot(distance.closestPoint(x).point), farthest, 1e-4) << x.transpose();
+    }
+}
+
+TEST(ClosestPoint, gradientsAreUnitVectorsToFarPoints) {
+  for (const auto& [mesh, options] : cases()) {
+    const ExactDistance distance(mesh, options);
+    if (!distance.hasGradients()) continue;
+    for (const double away : {1e9, 1e15, 1e100, 1e300}) {
+      const std::vector<Vector3> points = pointsAt(away);
+      std::vector<double> distances(points.size());
+      std::vector<Vector3> gradients(points.size());
+      distance.withGradients(points, distances, gradients);
+      for (std::size_t i = 0; i < points.size(); ++i)
+        ASSERT_NEAR((gradients[i] - points[i] / away).norm(), 0, 1e-8) << points[i].transpose();
+    }
+  }
 }
 
 }  // namespace closest_point_test

@@ -63,8 +63,9 @@ struct DistanceOptions {
 ///
 /// A triangle is degenerate if its height is within the rounding errors of its coordinates. The distance to a
 /// degenerate triangle is the distance to its edges. Degenerate triangles do not contribute to pseudonormals. A point
-/// that is not finite gets a value that is not finite. Signs are lost at distances of about 10¹⁵ times the mesh's size,
-/// where all triangles are equally near.
+/// that is not finite gets a value that is not finite. Points farther than 2²⁷ times the mesh's size have the closest
+/// point of a nearer point in the same direction, because rounding hides which triangle is nearest to them; distances
+/// and signs are right there, too.
 ///
 /// Objects are const and thread-safe after construction. They keep no reference to the mesh.
 class ExactDistance {

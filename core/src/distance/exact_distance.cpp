@@ -17,6 +17,7 @@
 #include "bvh/triangle_frame.h"
 #include "distance/candidate_search.h"
 #include "distance/exact_leaf_signs.h"
+#include "distance/far_points.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "mesh/connectivity.h"
@@ -42,6 +43,7 @@ namespace {
 
 using bvh::Hierarchy;
 using distance::ChosenInsideTest;
+using distance::FarPoints;
 using distance::kTooNear;
 using sign::BoundaryEdges;
 using sign::Pseudonormals;
@@ -191,6 +193,12 @@ struct ExactDistance::Data {
       reduceToOuterHull(mesh, progress);
     }
     source.insideTest = inside.choice.insideTest;
+    far = FarPoints(source.box);
+    // Chosen pseudonormals tell the same sign all around the mesh.
+    if (options.insideTest == InsideTest::automatic && source.insideTest == InsideTest::pseudonormal) {
+      const Vector3 x = far.pointAround();
+      isInsideAround = resolve(hierarchy, x, nearestTriangle(hierarchy, x)).signedDistance < 0;
+    }
     signs.emplace(hierarchy, source.insideTest, inside.winding);
     candidates.emplace(hierarchy, *signs, source.thickness / 2);
   }
@@ -334,9 +342,17 @@ struct ExactDistance::Data {
     });
   }
 
+  /// Gives all points around a mesh the same side. Pseudonormals do not tell it far away, where the triangles of two
+  /// walls are equally near to rounding.
+  void applySideAround(std::span<const Vector3> points, std::span<double> distances) const {
+    if (!isInsideAround) return;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (far.isAround(points[i])) distances[i] = std::copysign(distances[i], *isInsideAround ? -1 : 1);
+  }
+
   /// Turns the distances from `toTriangles` into signed distances according to the chosen inside test.
   void applyInsideTest(std::span<const Vector3> points, std::span<double> distances) const {
-    if (inside.choice.insideTest == InsideTest::pseudonormal) return;
+    if (inside.choice.insideTest == InsideTest::pseudonormal) return applySideAround(points, distances);
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
     if (inside.choice.insideTest == InsideTest::outerHull) {
       // Compute the distances to the whole mesh, which count for points outside. A triangle that is nearer than the
@@ -347,6 +363,55 @@ struct ExactDistance::Data {
       inside.winding.applyTo(distances, points, clearances);
     } else if (inside.choice.insideTest == InsideTest::winding) {
       inside.winding.applyTo(distances, points);
+    }
+  }
+
+  /// Evaluates the signed distances of points, none of which is far, and the gradients of the unsigned ones unless
+  /// `directions` is empty.
+  void evaluateNear(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> directions) const {
+    toTriangles(hierarchy, points, out, directions);
+    applyInsideTest(points, out);
+  }
+
+  /// Evaluates the signed distances of any points, and the gradients of the unsigned ones unless `directions` is empty.
+  void evaluate(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> directions = {}) const {
+    if (!far.areAnyFar(points)) return evaluateNear(points, out, directions);
+    const std::vector<Vector3> nearer = far.nearer(points);
+    evaluateNear(nearer, out, directions);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!far.isFar(points[i])) continue;
+      if (!directions.empty()) directions[i] = continuedDirection(directions[i], out[i], points[i], nearer[i]);
+      out[i] = continued(out[i], points[i], nearer[i]);
+    }
+  }
+
+  /// Returns the signed distance of a far point x from that of its nearer point.
+  double continued(double distance, const Vector3& x, const Vector3& nearer) const {
+    const double more = (x - nearer).stableNorm();
+    const bool isInside = distance < 0 && inside.choice.insideTest != InsideTest::shell;
+    return isInside ? distance - more : distance + more;
+  }
+
+  /// Returns the unit vector to a far point x from the triangle nearest to it. Its nearer point has this signed
+  /// distance and this direction.
+  Vector3 continuedDirection(const Vector3& direction, double distance, const Vector3& x, const Vector3& nearer) const {
+    const double toTriangle =
+        inside.choice.insideTest == InsideTest::shell ? distance + source.thickness / 2 : std::abs(distance);
+    const Vector3 away = (x - nearer) + toTriangle * direction;
+    return (away / away.cwiseAbs().maxCoeff()).normalized();
+  }
+
+  /// Finds the closest points of points, none of which is far.
+  void closestPointsNear(std::span<const Vector3> points, std::span<ClosestPoint> out) const {
+    constexpr std::size_t kPointsAtOnce = 512;  // enough for the inside test to derive signs from each other
+    std::array<double, kPointsAtOnce> distances;
+    forEachNearest(hierarchy, points,
+                   [&](std::size_t i, const bvh::Nearest& nearest) { out[i] = closestOf(points[i], nearest); });
+    for (std::size_t first = 0; first < points.size(); first += kPointsAtOnce) {
+      const std::size_t count = std::min(kPointsAtOnce, points.size() - first);
+      for (std::size_t i = 0; i < count; ++i) distances[i] = out[first + i].signedDistance;
+      applyInsideTest(points.subspan(first, count), std::span(distances).first(count));
+      for (std::size_t i = 0; i < count; ++i) out[first + i].signedDistance = distances[i];
     }
   }
 
@@ -369,6 +434,8 @@ struct ExactDistance::Data {
   Hierarchy wholeMesh;                   ///< all triangles; only for an outer hull
   std::vector<std::uint32_t> hullSlots;  ///< slot in `wholeMesh` of each hull triangle's source; only for an outer hull
   ChosenInsideTest inside;
+  FarPoints far;
+  std::optional<bool> isInsideAround;  ///< the side of all points around the mesh; only for chosen pseudonormals
   std::optional<distance::ExactLeafSigns> signs;
   std::optional<distance::CandidateSearch> candidates;
   mutable std::atomic<const WindingSign*> winding = nullptr;  ///< is `preparedWinding_` once this is complete
@@ -397,15 +464,19 @@ ExactDistance::ExactDistance(ExactDistance&&) noexcept = default;
 ExactDistance& ExactDistance::operator=(ExactDistance&&) noexcept = default;
 
 double ExactDistance::operator()(const Vector3& x) const {
-  double distance = data_->resolve(data_->hierarchy, x, nearestTriangle(data_->hierarchy, x)).signedDistance;
+  double distance = 0;
+  if (data_->far.isFar(x)) {
+    data_->evaluate({&x, 1}, {&distance, 1});
+    return distance;
+  }
+  distance = data_->resolve(data_->hierarchy, x, nearestTriangle(data_->hierarchy, x)).signedDistance;
   data_->applyInsideTest({&x, 1}, {&distance, 1});
   return distance;
 }
 
 void ExactDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
-  data_->toTriangles(data_->hierarchy, points, out);
-  data_->applyInsideTest(points, out);
+  data_->evaluate(points, out);
 }
 
 bool ExactDistance::hasGradients() const {
@@ -423,43 +494,45 @@ bool ExactDistance::hasGradients() const {
 void ExactDistance::withGradients(std::span<const Vector3> points, std::span<double> out,
                                   std::span<Vector3> gradients) const {
   assert(points.size() == out.size() && points.size() == gradients.size() && hasGradients());
-  data_->toTriangles(data_->hierarchy, points, out, gradients);
-  data_->applyInsideTest(points, out);
+  data_->evaluate(points, out, gradients);
   if (data_->inside.choice.insideTest == InsideTest::shell) return;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (out[i] < 0) gradients[i] = -gradients[i];
 }
 
 ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
-  ClosestPoint closest = data_->closestOf(x, nearestTriangle(data_->hierarchy, x));
-  data_->applyInsideTest({&x, 1}, {&closest.signedDistance, 1});
+  const Vector3 nearer = data_->far.nearer(x);
+  ClosestPoint closest = data_->closestOf(nearer, nearestTriangle(data_->hierarchy, nearer));
+  data_->applyInsideTest({&nearer, 1}, {&closest.signedDistance, 1});
+  if (data_->far.isFar(x)) closest.signedDistance = data_->continued(closest.signedDistance, x, nearer);
   return closest;
 }
 
 void ExactDistance::closestPoints(std::span<const Vector3> points, std::span<ClosestPoint> out) const {
   assert(points.size() == out.size());
-  constexpr std::size_t kPointsAtOnce = 512;  // enough for the inside test to derive signs from each other
-  std::array<double, kPointsAtOnce> distances;
-  Data::forEachNearest(data_->hierarchy, points, [&](std::size_t i, const bvh::Nearest& nearest) {
-    out[i] = data_->closestOf(points[i], nearest);
-  });
-  if (data_->inside.choice.insideTest == InsideTest::pseudonormal) return;
-  for (std::size_t first = 0; first < points.size(); first += kPointsAtOnce) {
-    const std::size_t count = std::min(kPointsAtOnce, points.size() - first);
-    for (std::size_t i = 0; i < count; ++i) distances[i] = out[first + i].signedDistance;
-    data_->applyInsideTest(points.subspan(first, count), std::span(distances).first(count));
-    for (std::size_t i = 0; i < count; ++i) out[first + i].signedDistance = distances[i];
+  if (data_->far.areAnyFar(points)) {
+    const std::vector<Vector3> nearer = data_->far.nearer(points);
+    data_->closestPointsNear(nearer, out);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (data_->far.isFar(points[i]))
+        out[i].signedDistance = data_->continued(out[i].signedDistance, points[i], nearer[i]);
+  } else {
+    data_->closestPointsNear(points, out);
   }
 }
 
 double ExactDistance::windingNumber(const Vector3& x) const {
-  return data_->windingNumbers().numberAt(x, kWindingError);
+  double number = 0;
+  windingNumbers({&x, 1}, {&number, 1});
+  return number;
 }
 
 void ExactDistance::windingNumbers(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
   const WindingSign& winding = data_->windingNumbers();
-  for (std::size_t i = 0; i < points.size(); ++i) out[i] = winding.numberAt(points[i], kWindingError);
+  // The winding number of a far point is within kWindingError of 0.
+  for (std::size_t i = 0; i < points.size(); ++i)
+    out[i] = data_->far.isFar(points[i]) ? 0 : winding.numberAt(points[i], kWindingError);
 }
 
 const InsideTestChoice& ExactDistance::insideTestChoice() const { return data_->inside.choice; }
