@@ -117,6 +117,30 @@ TEST(Expression, operandsAreLoadedOnceAndNamedWithoutFolders) {
   }
 }
 
+TEST(Expression, anyNameIsReadAgain) {
+  for (const char* name : {"a", "5", "a b", "it's", "19\" rack", "5' 3\" tall.obj", "\"", "'", "''", "\"'\"", "a,b",
+                           "(", "-", "union", "inward", "builtin:torus,minor=0.2", "builtin:torus, x", "ä \" ' ö"}) {
+    const Expression leaf = Expression::named(name);
+    for (const Expression& expression : {leaf, combine::shell(combine::unite(leaf, leaf), 0.5, ShellSide::inward)}) {
+      const Expression again = parseExpression(textOf(expression));
+      EXPECT_EQ(textOf(again), textOf(expression));
+      const Expression* first = &again;
+      while (!first->node().operands.empty()) first = &first->node().operands[0];
+      EXPECT_EQ(first->node().name, name);
+    }
+  }
+  EXPECT_EQ(parseExpression("'it''s'").node().name, "it's");
+  EXPECT_THAT(refusalOf("'it''s"), HasSubstr("the quote is not closed"));
+  EXPECT_THROW(Expression::named(""), Error);
+}
+
+TEST(Expression, manyOperandsAreRefused) {
+  Expression twice = Expression::named("a");
+  for (int i = 0; i < 19; ++i) twice = combine::unite(twice, twice);
+  EXPECT_EQ(twice.node().leaves, 1u << 19);
+  EXPECT_THROW(combine::unite(twice, twice), Error);
+}
+
 TEST(Expression, randomOnesAreReadAgain) {
   const std::vector<Expression> leaves = {Expression::named("a.obj"), Expression::named("b c.hpsdf")};
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {

@@ -65,11 +65,13 @@ std::string numberText(double number) {
   return {text.data(), end};
 }
 
-/// Returns a leaf's name as an expression writes it.
+/// Returns a leaf's name as an expression writes it. Between quotes, a quote of the same kind is doubled.
 std::string nameText(const std::string& name) {
   if (readsAsName(name)) return name;
-  const char quote = name.find('"') == std::string::npos ? '"' : '\'';
-  return quote + name + quote;
+  const char quote = name.find('"') == std::string::npos || name.find('\'') != std::string::npos ? '"' : '\'';
+  std::string text(1, quote);
+  for (const char c : name) text.append(c == quote ? 2 : 1, c);
+  return text + quote;
 }
 
 std::string ownName(const TriangleMesh& mesh) { return mesh.name; }
@@ -104,6 +106,7 @@ Expression::Expression(Field field) : Expression(combine::leafOf(std::move(field
 Expression::Expression(DistanceFunction distance) : Expression(combine::leafOf(std::move(distance), "function")) {}
 
 Expression Expression::named(std::string name, std::size_t column) {
+  if (name.empty()) throw Error(ErrorKind::option, "", "the name of an operand is missing");
   Node node;
   node.operand = name;
   node.name = std::move(name);
@@ -117,7 +120,13 @@ Expression Expression::operation(Operation operation, std::vector<Expression> op
   Node node{.operation = operation, .operands = std::move(operands), .numbers = std::move(numbers), .side = side};
   combine::requireCounts(row, node);
   combine::requireNumbers(row, node);
-  for (const Expression& operand : node.operands) node.depth = std::max(node.depth, operand.node().depth + 1);
+  node.leaves = 0;
+  for (const Expression& operand : node.operands) {
+    node.depth = std::max(node.depth, operand.node().depth + 1);
+    node.leaves = std::min(node.leaves + operand.node().leaves, kMaxExpressionLeaves + 1);
+  }
+  if (node.leaves > kMaxExpressionLeaves)
+    throw Error(ErrorKind::limit, std::string(row.name), "the expression has more than a million operands");
   if (node.depth > kMaxExpressionDepth)
     throw Error(ErrorKind::limit, std::string(row.name),
                 "the expression is deeper than " + std::to_string(kMaxExpressionDepth) +
@@ -125,9 +134,10 @@ Expression Expression::operation(Operation operation, std::vector<Expression> op
   return Expression(std::move(node));
 }
 
-Expression Expression::renamed(std::string name) const {
+Expression Expression::renamed(std::string name, std::size_t column) const {
   Node node = *node_;
   node.name = std::move(name);
+  node.column = column;
   return Expression(std::move(node));
 }
 
@@ -165,11 +175,12 @@ class Resolver {
  private:
   Expression loaded(const Expression::Node& leaf) {
     const auto& name = std::get<std::string>(leaf.operand);
-    if (const auto known = known_.find(name); known != known_.end()) return known->second;
     try {
-      const Expression found = load_(name);
+      auto known = known_.find(name);
+      if (known == known_.end()) known = known_.emplace(name, load_(name)).first;
+      const Expression& found = known->second;
       const bool isLeaf = found.node().operation == Operation::operand;
-      return known_.emplace(name, isLeaf ? found.renamed(shortName(name)) : found).first->second;
+      return isLeaf ? found.renamed(shortName(name), leaf.column) : found;
     } catch (const Error& error) {
       if (leaf.column == 0) throw;
       throw expressionError(error.kind(), leaf.column, error.what());

@@ -63,12 +63,18 @@ class ExpressionParser {
   }
 
   Expression quoted(std::size_t start) {
-    const std::size_t end = text_.find(text_[at_], at_ + 1);
-    if (end == std::string_view::npos) refuse(start, "the quote is not closed");
-    const std::string_view name = text_.substr(at_ + 1, end - at_ - 1);
+    const char quote = text_[at_++];
+    std::string name;
+    while (true) {
+      const std::size_t end = text_.find(quote, at_);
+      if (end == std::string_view::npos) refuse(start, "the quote is not closed");
+      name += text_.substr(at_, end - at_);
+      at_ = end + 1;
+      if (!skip(quote)) break;
+      name += quote;
+    }
     if (name.empty()) refuse(start, "a name is missing between the quotes");
-    at_ = end + 1;
-    return Expression::named(std::string(name), start);
+    return Expression::named(std::move(name), start);
   }
 
   static double number(std::string_view word, std::size_t start) {

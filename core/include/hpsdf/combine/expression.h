@@ -24,6 +24,9 @@ namespace hpsdf {
 /// The greatest depth of an expression: the number of nodes from its root to a leaf.
 constexpr int kMaxExpressionDepth = 100;
 
+/// The greatest number of leaves of an expression. Expressions in C++ that share their operands may reach it soon.
+constexpr std::size_t kMaxExpressionLeaves = 1'000'000;
+
 /// An expression, such as the union of a mesh and a field. It is an immutable value; copies share the operands. Meshes,
 /// fields and distance functions convert to expressions, so that `combine::unite(mesh, field)` is one.
 class Expression {
@@ -43,25 +46,26 @@ class Expression {
     std::string name = {};                ///< of a leaf, for messages and metadata
     std::size_t column = 0;               ///< of a leaf in the text that it was read from, from 1; 0 if there is none
     int depth = 1;
+    std::size_t leaves = 1;  ///< number of leaves; one that is used several times counts each time
   };
 
   Expression(TriangleMesh mesh);          // NOLINT: implicit on purpose
   Expression(Field field);                // NOLINT: implicit on purpose
   Expression(DistanceFunction distance);  // NOLINT: implicit on purpose
 
-  /// Returns a leaf with a name that `withOperands` replaces by a solid.
+  /// Returns a leaf with a name that `withOperands` replaces by a solid. Throws `Error` for an empty name.
   static Expression named(std::string name, std::size_t column = 0);
 
   /// Returns an operation on other expressions. Throws `Error` (of the kind `option`, with the operation's name as its
   /// subject) for too few or too many operands or numbers, for a number that is not finite or out of range, and for an
-  /// expression deeper than `kMaxExpressionDepth`.
+  /// expression deeper than `kMaxExpressionDepth` or with more leaves than `kMaxExpressionLeaves`.
   static Expression operation(Operation operation, std::vector<Expression> operands, std::vector<double> numbers = {},
                               ShellSide side = ShellSide::centred);
 
   const Node& node() const { return *node_; }
 
-  /// Returns the same leaf with another name.
-  Expression renamed(std::string name) const;
+  /// Returns the same leaf with another name, which stands in this column of a text; 0 if there is none.
+  Expression renamed(std::string name, std::size_t column = 0) const;
 
  private:
   explicit Expression(Node node);
@@ -71,9 +75,9 @@ class Expression {
 
 /// Reads an expression from text, such as "difference(offset(a.hpsdf, 0.02), move(b.obj, 0, 0, 1))". A leaf is the name
 /// of a file or a shape. It is written between quotes (" or ') if it holds blanks, commas, parentheses or quotes, or
-/// looks like a number; commas before a shape's parameters, as in builtin:torus,minor=0.2, need none. Throws `Error`
-/// (of the kind `option`, with the subject "expression") that names the column, in characters from 1, and what is
-/// expected there. It opens no files.
+/// looks like a number; between quotes, a quote of the same kind is written twice. Commas before a shape's parameters,
+/// as in builtin:torus,minor=0.2, need no quotes. Throws `Error` (of the kind `option`, with the subject "expression")
+/// that names the column, in characters from 1, and what is expected there. It opens no files.
 Expression parseExpression(std::string_view text);
 
 /// Returns the text of an expression, which `parseExpression` reads again. Leaves are written by their names.
