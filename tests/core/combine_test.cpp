@@ -285,6 +285,43 @@ TEST(Combine, nothingLeftIsRefused) {
   EXPECT_THAT(refusal(subtract(box, box)), testing::HasSubstr("nothing is left"));
   EXPECT_THAT(refusal(intersect(box, moved(box, {5, 0, 0}))), testing::HasSubstr("nothing is left"));
   EXPECT_THAT(refusal(Expression::named("a.obj")), testing::HasSubstr("stands for nothing"));
+  const auto stretched = [](Expression solid, int times, double factor) {
+    for (int i = 0; i < times; ++i) solid = scaled(solid, factor);
+    return solid;
+  };
+  EXPECT_THAT(refusal(stretched(box, 20, 1e12)), testing::HasSubstr("beyond 1e100"));
+  EXPECT_THAT(refusal(stretched(box, 20, 1e-12)), testing::HasSubstr("below 1e-100"));
+  EXPECT_THAT(refusal(unite(box, stretched(box, 1, 1e-10))), testing::HasSubstr("which rounding spoils beside"));
+}
+
+TEST(CombinedDistance, aMeshThatIsNamedTwiceInOnePlaceCountsOnce) {
+  const Expression box = shapes::mesh("box"), other = moved(box, {0.3, 0.2, 0.1});
+  const CombinedDistance once(unite(box, other)), thrice(unite(box, other, box, intersect(other, other)));
+  EXPECT_EQ(once.bytes(), thrice.bytes());
+  EXPECT_EQ(once.boundary()->triangles, thrice.boundary()->triangles);
+  EXPECT_EQ(CombinedDistance(unite(box, box)).boundary()->triangles, shapes::mesh("box").triangles);
+}
+
+TEST(CombinedDistance, refusesSolidsThatAreMovedTooFarForTheirSize) {
+  const DistanceFunction ball = shapes::analytic("sphere");
+  const auto load = [&](const std::string& name) -> Expression {
+    if (name == "ball") return ball;
+    return shapes::mesh("box");
+  };
+  const auto refusal = [&](const std::string& text) -> std::string {
+    try {
+      const CombinedDistance distance(withOperands(parseExpression(text), load));
+      return "";
+    } catch (const Error& error) {
+      return error.what();
+    }
+  };
+  EXPECT_EQ(refusal("union(a, move(b, 1e6, 0, 0))"), "");
+  EXPECT_THAT(refusal("union(a, move(b, 1e17, 0, 0))"),
+              testing::StartsWith("expression: column 15: b: moves and scales put it at coordinates of 1e+17"));
+  EXPECT_THAT(refusal("union(a, offset(b, 0.1), move(a, 1e12, 0, 0))"),
+              testing::StartsWith("expression: column 31: a: "));
+  EXPECT_THAT(refusal("move(ball, 0, 1e17, 0)"), testing::StartsWith("expression: column 6: ball: moves and scales"));
 }
 
 TEST(Combine, meshThatIntersectsItselfCountsAsItsOuterSurface) {

@@ -10,11 +10,13 @@
 #include <utility>
 
 #include "bvh/hierarchy.h"
+#include "combine/similarity.h"
 #include "combine/triangle_cutter.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/random_points.h"
 #include "surface/crossings.h"
 #include "util/chunks.h"
+#include "util/refuse.h"
 
 namespace hpsdf::combine {
 namespace {
@@ -57,6 +59,19 @@ void join(Arrangement& all, const std::vector<MeshSolid>& solids) {
   }
   all.scale = surface::scaleToOne(all.mesh.vertices);
   for (Vector3& vertex : all.mesh.vertices) vertex *= all.scale;
+}
+
+/// Throws `Error` for a solid that is so small, beside the greatest coordinate, that cuts are not accurate to a
+/// thousandth of its size.
+void requireSimilarSizes(const std::vector<MeshSolid>& solids, double scale) {
+  for (const MeshSolid& solid : solids) {
+    const double size = boundingBox(*solid.mesh).sizes().norm();
+    if (size * scale >= kLeastShareOfCoordinates) continue;
+    throw Error(ErrorKind::mesh, "",
+                detail::messageOf("the mesh ", solid.mesh->name, " has the size ", size,
+                                  ", which rounding spoils beside coordinates of ", 1 / scale,
+                                  "; combine solids of more similar sizes, near the origin"));
+  }
 }
 
 /// Throws `Error` if the arrays for all solids would not fit into memory or their indices into 32 bits.
@@ -200,7 +215,12 @@ struct Sides {
 class SideFinder {
  public:
   SideFinder(const Arrangement& all, const MeshSolid& solid, std::uint32_t number)
-      : all_(all), solid_(solid), number_(number) {}
+      : all_(all), solid_(solid), number_(number) {
+    const Box& box = solid.distance->source().box;
+    const Vector3 margin = Vector3::Constant(0.01 * box.sizes().norm() + kSnapped / all.scale);
+    around_ = Box(box.min() - margin, box.max() + margin);
+    isInsideAround_ = (*solid.distance)(around_.max() + margin) < 0;
+  }
 
   Sides find(std::span<const Piece> pieces) const {
     return solid_.hasOrientedTriangles() ? ofMiddles(pieces) : ofProbes(pieces);
@@ -216,16 +236,25 @@ class SideFinder {
 
   /// Takes the side of each piece's middle. Pieces that lie in the solid's surface have its triangles' sides.
   Sides ofMiddles(std::span<const Piece> pieces) const {
+    Sides sides{std::vector<char>(pieces.size(), isInsideAround_), std::vector<char>(pieces.size(), isInsideAround_)};
+    std::vector<std::size_t> near;
     std::vector<Vector3> points;
-    for (const Piece& piece : pieces) points.push_back(piece.middle);
-    const std::vector<double> distances = distancesAt(std::move(points));
-    Sides sides{std::vector<char>(pieces.size()), std::vector<char>(pieces.size())};
     for (std::size_t i = 0; i < pieces.size(); ++i) {
       if (all_.solidOf[pieces[i].triangle] == number_) {
+        sides.front[i] = 0;
         sides.behind[i] = 1;
-      } else if (std::abs(distances[i]) * all_.scale > kCoincident) {
-        sides.front[i] = sides.behind[i] = distances[i] < 0;
+      } else if (around_.contains(pieces[i].middle / all_.scale)) {
+        near.push_back(i);
+        points.push_back(pieces[i].middle);
+      }
+    }
+    const std::vector<double> distances = distancesAt(std::move(points));
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      const std::size_t i = near[k];
+      if (std::abs(distances[k]) * all_.scale > kCoincident) {
+        sides.front[i] = sides.behind[i] = distances[k] < 0;
       } else {
+        sides.front[i] = sides.behind[i] = 0;
         const bool isAligned = normalNear(pieces[i].middle).dot(pieces[i].normal) > 0;
         (isAligned ? sides.behind : sides.front)[i] = 1;
       }
@@ -259,6 +288,8 @@ class SideFinder {
   const Arrangement& all_;
   const MeshSolid& solid_;
   std::uint32_t number_;
+  Box around_;  ///< holds the solid's surface; what lies beyond is on one side of it
+  bool isInsideAround_ = false;
 };
 
 /// The pieces of some triangles that bound the result, with the outside in front.
@@ -275,13 +306,12 @@ void addParts(const Piece& piece, bool isReversed, std::vector<Corners>& parts) 
   }
 }
 
-KeptPieces keptOf(const Arrangement& all, const std::vector<MeshSolid>& solids, const BooleanTree& tree,
+KeptPieces keptOf(const Arrangement& all, const std::vector<SideFinder>& solids, const BooleanTree& tree,
                   std::size_t first, std::size_t count) {
   std::vector<Piece> pieces;
   for (std::size_t t = first; t < first + count; ++t) addPieces(all, static_cast<std::uint32_t>(t), pieces);
   std::vector<Sides> sides;
-  for (std::uint32_t solid = 0; solid < solids.size(); ++solid)
-    sides.push_back(SideFinder(all, solids[solid], solid).find(pieces));
+  for (const SideFinder& solid : solids) sides.push_back(solid.find(pieces));
   KeptPieces kept;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     const bool front = tree.contains([&](std::uint32_t solid) { return sides[solid].front[i] != 0; });
@@ -343,12 +373,15 @@ TriangleMesh boundaryOf(const std::vector<MeshSolid>& solids, const BooleanTree&
   requireSize(solids);
   Arrangement all;
   join(all, solids);
+  requireSimilarSizes(solids, all.scale);
   findPartners(all, solids, progress);
   const std::size_t triangles = all.mesh.triangles.size();
+  std::vector<SideFinder> finders;
+  for (std::uint32_t solid = 0; solid < solids.size(); ++solid) finders.emplace_back(all, solids[solid], solid);
   std::vector<KeptPieces> chunks(detail::chunksOf(triangles, kTrianglesPerChunk));
   detail::forEachChunk(triangles, kTrianglesPerChunk, progress, "cutting the surfaces",
                        [&](std::size_t chunk, std::size_t first, std::size_t count) {
-                         chunks[chunk] = keptOf(all, solids, tree, first, count);
+                         chunks[chunk] = keptOf(all, finders, tree, first, count);
                        });
   requirePieces(chunks);
   return meshOf(all, chunks);

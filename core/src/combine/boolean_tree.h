@@ -31,10 +31,11 @@ struct BooleanTree {
     }
   }
 
-  /// Adds a number to the numbers of all solids.
-  void renumber(std::uint32_t by) {
-    solid += by;
-    for (BooleanTree& child : children) child.renumber(by);
+  /// Gives each solid the number numberOf(its number).
+  template <typename NumberOf>
+  void renumber(const NumberOf& numberOf) {
+    if (kind == Kind::solid) solid = numberOf(solid);
+    for (BooleanTree& child : children) child.renumber(numberOf);
   }
 };
 

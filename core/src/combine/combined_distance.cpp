@@ -1,13 +1,18 @@
 #include "hpsdf/combine/combined_distance.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <cstdint>
 #include <iterator>
+#include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "combine/boolean_surface.h"
 #include "combine/distance_node.h"
+#include "combine/expression_words.h"
 #include "combine/similarity.h"
 #include "hpsdf/detail/threads.h"
 
@@ -31,11 +36,39 @@ struct CompiledPart {
 BooleanSolid joined(BooleanTree::Kind kind, std::vector<BooleanSolid> parts) {
   BooleanSolid all{.solids = {}, .tree = {.kind = kind}};
   for (BooleanSolid& part : parts) {
-    part.tree.renumber(static_cast<std::uint32_t>(all.solids.size()));
+    const auto first = static_cast<std::uint32_t>(all.solids.size());
+    part.tree.renumber([first](std::uint32_t solid) { return first + solid; });
     std::ranges::move(part.solids, std::back_inserter(all.solids));
     all.tree.children.push_back(std::move(part.tree));
   }
   return all;
+}
+
+/// Keeps each solid once, also where the expression names it several times in one place.
+void unify(BooleanSolid& all) {
+  std::map<const ExactDistance*, std::uint32_t> numberOf;
+  std::vector<MeshSolid> once;
+  std::vector<std::uint32_t> numbers;
+  for (MeshSolid& solid : all.solids) {
+    const auto [known, isNew] = numberOf.emplace(solid.distance.get(), static_cast<std::uint32_t>(once.size()));
+    numbers.push_back(known->second);
+    if (isNew) once.push_back(std::move(solid));
+  }
+  all.solids = std::move(once);
+  all.tree.renumber([&](std::uint32_t solid) { return numbers[solid]; });
+}
+
+/// Returns true if an expression is that of its one solid, which its triangles bound.
+bool isOneMesh(const BooleanSolid& all) {
+  return all.solids.size() == 1 && all.solids[0].hasOrientedTriangles() &&
+         all.tree.contains([](std::uint32_t) { return true; });
+}
+
+/// Returns the box of a leaf's solid, or an empty one if it is unknown.
+Box boxOf(const Expression::Node& leaf) {
+  if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&leaf.operand)) return boundingBox(**mesh);
+  if (const auto* field = std::get_if<std::shared_ptr<const Field>>(&leaf.operand)) return (*field)->domain();
+  return std::get<std::shared_ptr<const DistanceFunction>>(leaf.operand)->source().box;
 }
 
 /// Returns true if the mesh is known to be closed. Pseudonormals that a caller forces upon it prove nothing.
@@ -86,7 +119,8 @@ class Compiler {
   NodePtr nodeOf(CompiledPart part) {
     if (!part.solid) return std::move(part.node);
     BooleanSolid& solid = *part.solid;
-    if (solid.solids.size() == 1 && solid.solids[0].hasOrientedTriangles()) {
+    unify(solid);
+    if (isOneMesh(solid)) {
       boundary_ = solid.solids[0].mesh;
       return meshNode(std::move(solid.solids[0].distance));
     }
@@ -149,31 +183,48 @@ class Compiler {
   CompiledPart leaf(const Expression::Node& node, const Similarity& placement) {
     if (const auto* name = std::get_if<std::string>(&node.operand))
       throw Error(ErrorKind::option, *name, "the name of an operand stands for nothing; replace it by a solid first");
+    try {
+      requireUsable(placement, boxOf(node));
+      return solidOf(node, placement);
+    } catch (const Error& error) {
+      const Error named = error.subject() == node.name ? error : Error(error.kind(), node.name, error.what());
+      throw node.column == 0 ? named : expressionError(error.kind(), node.column, named.what());
+    }
+  }
+
+  CompiledPart solidOf(const Expression::Node& node, const Similarity& placement) {
     if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&node.operand))
-      return meshLeaf(node.name, **mesh, placement);
+      return meshLeaf(*mesh, placement);
     if (const auto* field = std::get_if<std::shared_ptr<const Field>>(&node.operand))
       return {.node = fieldNode(*field, placement)};
     return {.node = functionNode(std::get<std::shared_ptr<const DistanceFunction>>(node.operand), placement)};
   }
 
-  CompiledPart meshLeaf(const std::string& name, const TriangleMesh& mesh, const Similarity& placement) {
-    try {
-      auto placed = std::make_shared<const TriangleMesh>(transformed(mesh, placement));
-      DistanceOptions options = options_;
-      options.thickness *= placement.scale;
-      auto distance = std::make_shared<const ExactDistance>(*placed, options, progress_);
-      if (!boundsSolid(*distance)) return {.node = meshNode(std::move(distance))};
-      BooleanSolid solid;
-      solid.solids.push_back({std::move(placed), std::move(distance)});
-      return {.solid = std::move(solid)};
-    } catch (const Error& error) {
-      if (error.subject() == name) throw;
-      throw Error(error.kind(), name, error.what());
-    }
+  CompiledPart meshLeaf(const std::shared_ptr<const TriangleMesh>& mesh, const Similarity& placement) {
+    MeshSolid solid = placed(mesh, placement);
+    if (!boundsSolid(*solid.distance)) return {.node = meshNode(std::move(solid.distance))};
+    return {.solid = BooleanSolid{.solids = {std::move(solid)}, .tree = {}}};
   }
+
+  /// Returns a mesh in its place with the distance to it, which are made once for each place.
+  MeshSolid placed(const std::shared_ptr<const TriangleMesh>& mesh, const Similarity& placement) {
+    PlacementKey key = {mesh.get(), {placement.scale}};
+    std::copy_n(placement.rotation.data(), 9, key.second.begin() + 1);
+    std::copy_n(placement.translation.data(), 3, key.second.begin() + 10);
+    if (const auto known = placed_.find(key); known != placed_.end()) return known->second;
+    MeshSolid solid{.mesh = std::make_shared<const TriangleMesh>(transformed(*mesh, placement)), .distance = {}};
+    DistanceOptions options = options_;
+    options.thickness *= placement.scale;
+    solid.distance = std::make_shared<const ExactDistance>(*solid.mesh, options, progress_);
+    return placed_.emplace(key, std::move(solid)).first->second;
+  }
+
+  /// A mesh with the numbers of its placement: scale, rotation and translation.
+  using PlacementKey = std::pair<const TriangleMesh*, std::array<double, 13>>;
 
   const DistanceOptions& options_;
   const Progress& progress_;
+  std::map<PlacementKey, MeshSolid> placed_;
   std::shared_ptr<const TriangleMesh> boundary_;
 };
 

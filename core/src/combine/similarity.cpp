@@ -1,9 +1,13 @@
 #include "combine/similarity.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+
+#include "hpsdf/error.h"
+#include "util/refuse.h"
 
 namespace hpsdf::combine {
 namespace {
@@ -17,6 +21,8 @@ std::array<double, 2> cosineAndSine(double degrees) {
   const double angle = turned * (std::numbers::pi / 180);
   return {std::cos(angle), std::sin(angle)};
 }
+
+double greatestCoordinate(const Box& box) { return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff(); }
 
 }  // namespace
 
@@ -49,6 +55,22 @@ Box transformed(const Box& box, const Similarity& by) {
   if (box.isEmpty()) return result;
   for (int corner = 0; corner < 8; ++corner) result.extend(by(box.corner(static_cast<Box::CornerType>(corner))));
   return result;
+}
+
+void requireUsable(const Similarity& placement, const Box& box) {
+  const double reach = std::max(placement.scale, placement.translation.cwiseAbs().maxCoeff());
+  if (!(placement.scale * kLargestCoordinate >= 1) || !(reach <= kLargestCoordinate))
+    detail::refuse("moves and scales have a total beyond 1e100 or below 1e-100");
+  if (box.isEmpty() || !box.sizes().allFinite()) return;
+  const double size = placement.scale * box.sizes().norm();
+  const Box placed = transformed(box, placement);
+  const double greatest = greatestCoordinate(placed);
+  if (!(size > 0) || !(greatest <= kLargestCoordinate) || !placed.sizes().allFinite())
+    detail::refuse("moves and scales give it coordinates beyond 1e100, or shrink it to a point");
+  const double shareBefore = box.sizes().norm() / greatestCoordinate(box);
+  if (size < std::min(kLeastShareOfCoordinates, 0.5 * shareBefore) * greatest)
+    detail::refuse("moves and scales put it at coordinates of ", greatest,
+                   ", where rounding spoils a solid of the size ", size, "; keep the solids nearer to the origin");
 }
 
 }  // namespace hpsdf::combine

@@ -32,4 +32,12 @@ TriangleMesh transformed(const TriangleMesh& mesh, const Similarity& by);
 /// Returns the smallest box around the transformed box; an empty one for an empty box.
 Box transformed(const Box& box, const Similarity& by);
 
+/// A solid whose size is less than this share of its greatest coordinate counts as spoiled by rounding: coordinates are
+/// spaced by more than 2e-7 of its size.
+constexpr double kLeastShareOfCoordinates = 0x1p-30;
+
+/// Throws `Error` if a solid with this box would be spoiled by rounding, or beyond `kLargestCoordinate`, where the
+/// similarity places it. A solid that is spoiled without it is not refused.
+void requireUsable(const Similarity& placement, const Box& box);
+
 }  // namespace hpsdf::combine
