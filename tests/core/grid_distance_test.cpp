@@ -120,6 +120,27 @@ TEST(GridDistance, refusesGridsWithoutSurfaceOrWithBadNumbers) {
   EXPECT_THROW(GridDistance(gridOf(kLayout, [](const Vector3&) { return 1.0; })), Error);
   EXPECT_THROW(GridDistance(gridOf(kLayout, [](const Vector3& x) { return x.x() > 0 ? std::nan("") : -1.0; })), Error);
   EXPECT_THROW(GridDistance(gridOf({.points = {3, 9, 9}}, quadratic)), Error);
+  const auto refusal = [](const RegularGrid& grid) -> std::string {
+    try {
+      const GridDistance distance(grid);
+      return "";
+    } catch (const Error& error) {
+      return error.what();
+    }
+  };
+  RegularGrid grid = gridOf(kLayout, quadratic);
+  grid.values.pop_back();
+  EXPECT_THAT(refusal(grid), testing::HasSubstr("with 2573 values"));
+  EXPECT_THAT(refusal({.layout = {.points = {4, 4, 8'388'609}}, .values = {}, .gradients = {}}),
+              testing::HasSubstr("from 1 to 8388608"));
+  EXPECT_THAT(refusal({.layout = {.points = {8'000'000, 8'000'000, 4}}, .values = {}, .gradients = {}}),
+              testing::HasSubstr("take a grid with larger voxels"));
+  GridLayout far = kLayout;
+  far.origin.x() = 1e13;
+  EXPECT_THAT(refusal(gridOf(far, [](const Vector3& x) { return x.y(); })),
+              testing::HasSubstr("that rounding spoils its spacing"));
+  SampledBlocks samples{.blocks = {{.index = {1 << 20, 0, 0}, .values = {}}}};
+  EXPECT_THROW(GridDistance(samples, DistanceFunction([](const Vector3&) { return 1.0; })), Error);
 }
 
 TEST(GridDistance, becomesAField) {
@@ -198,9 +219,11 @@ std::string imageOf(const std::string& attributes, const std::string& array, con
 TEST_F(GridFiles, ofVtkAreReadInItsOtherEncodings) {
   const std::string name = "<DataArray type=\"Float32\" Name=\"d\" ";
   // The sixteen bytes of the floats 0, 1, 2, 3, behind their size in 32 bits.
+  const std::string before = "<!-- <DataArray type='Int8'> > --><![CDATA[<DataArray type='Int8'>]]>";
   const std::string base64 = "EAAAAAAAAAAAAIA/AAAAQAAAQEA=", separate = "EAAAAA==AAAAAAAAgD8AAABAAABAQA==";
   const std::vector<std::string> files = {
       imageOf("", name + "format=\"ascii\">\n 0 1\n2 3 </DataArray>"),
+      imageOf("", before + name + "format=\"ascii\">0 1 2 3</DataArray><!-- a > b -->"),
       imageOf("byte_order='LittleEndian'", name + "format=\"binary\">\n  " + base64 + "\n</DataArray>"),
       imageOf("", name + "format=\"binary\">" + separate + "</DataArray>"),
       imageOf("", name + "format=\"appended\" offset=\"4\"/>",
@@ -226,13 +249,31 @@ TEST_F(GridFiles, ofVtkAreRefusedIfTheyAreForeign) {
   expectRefused("a.vti", imageOf("", array + array), "several arrays");
   expectRefused("a.vti", imageOf("", "<DataArray type=\"Int8\" Name=\"d\" format=\"ascii\">0</DataArray>"), "Int8");
   expectRefused("a.vti", imageOf("", "<DataArray type=\"Float32\" Name=\"d\" format=\"ascii\">0 1 2</DataArray>"),
-                "4 numbers");
+                "4 finite numbers");
   expectRefused("a.vti", imageOf("", "<DataArray type=\"Float32\" format=\"appended\" offset=\"0\"/>"),
                 "behind the end");
   expectRefused("a.vti", imageOf("", "<DataArray type=\"Float32\" format=\"binary\">EAAA</DataArray>"), "ends within");
+  const auto withExtent = [&](const std::string& extent) {
+    std::string image = imageOf("", array);
+    return image.replace(image.find("1 2 0 1 0 0"), 11, extent);
+  };
+  expectRefused("a.vti", withExtent("0.5 1.5 0 1 0 0"), "expected whole numbers of 32 bits as WholeExtent of the grid");
+  expectRefused("a.vti", withExtent("4294967296 4294967297 0 1 0 0"), "expected whole numbers of 32 bits");
+  expectRefused("a.vti", withExtent("1e300 1e300 0 1 0 0"), "expected whole numbers of 32 bits");
+  expectRefused("a.vti", withExtent("0 9000000 0 1 0 0"), "expected from 1 to 8388608 points along each axis");
+  expectRefused("a.vti", withExtent("2 1 0 1 0 0"), "a grid of 0 x 2 x 1 points");
+  expectRefused("a.vti", withExtent("0 1 0 1"), "expected 6 numbers as WholeExtent of the grid, found '0 1 0 1'");
+  expectRefused("a.vti", imageOf("compressor=\"" + std::string(1'000'000, 'x') + "\n\"", array),
+                "compressed by '" + std::string(40, 'x') + "…'; expected");
+  expectRefused("a.vti", imageOf("a", array), "=\"…\" in <VTKFile>");
+  expectRefused("a.vti", "<VTKFile type=\"ImageData\"><!-- the rest of the file", "the file ends before '-->'");
+  expectRefused("a.vti", "<VTKFile type=\"ImageData", "in <VTKFile>");
+  std::string many = "<VTKFile ";
+  for (int n = 0; n < 200; ++n) many += "a" + std::to_string(n) + "='' ";
+  expectRefused("a.vti", many + ">", "more than 100 attributes");
   std::string vast = imageOf("", array);
-  vast.replace(vast.find("1 2 0 1 0 0"), 11, "0 9999999 0 9999999 0 9999999");
-  expectRefused("a.vti", vast, "of memory");
+  vast.replace(vast.find("1 2 0 1 0 0"), 11, "0 7999999 0 7999999 0 7999999");
+  expectRefused("a.vti", vast, "a grid of 8000000 x 8000000 x 8000000 points would take some");
 }
 
 TEST_F(GridFiles, ofNumPyAreRefusedIfTheyAreForeign) {
@@ -245,7 +286,13 @@ TEST_F(GridFiles, ofNumPyAreRefusedIfTheyAreForeign) {
   expectRefused("a.npy", npy("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 2, 3), }"), "(nz, ny, nx, 4)");
   expectRefused("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 3, 3), }"), "last number");
   expectRefused("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (x, 3, 3), }"), "damaged");
-  expectRefused("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999, 3, 3), }"), "of memory");
+  expectRefused("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (999999999999, 3, 3), }"),
+                "from 1 to 8388608");
+  expectRefused("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (9999999, 0, 3), }"),
+                "from 1 to 8388608");
+  expectRefused("a.npy", npy("{'descr': '<f8', 'fortran_order': False, 'shape': (999999, 999999, 3), }"),
+                "take a grid with larger voxels");
+  expectRefused("a.npy", "", "the file is empty; export it again");
   expectRefused("a.npy", npy("{'descr': '<f8', 'fortran_order': False}"), "no 'shape'");
   const std::string fortran = npy("{'descr': '<f4', 'fortran_order': True, 'shape': (2, 2, 2), }");
   EXPECT_EQ(loadGrid(write("b.npy", fortran)).values.size(), 8u);

@@ -343,7 +343,7 @@ TEST_F(MeshImport, refusesPathsThatAreNoRegularFiles) {
   ASSERT_EQ(::mkfifo((directory_ / "pipe.obj").c_str(), 0600), 0);
   EXPECT_THAT(errorOf(directory_ / "pipe.obj"), HasSubstr("pipe.obj: not a regular file"));
   EXPECT_THAT(errorOf("empty.obj", ""), HasSubstr("empty.obj: the file is empty"));
-  EXPECT_THAT(errorOf(fs::path()), HasSubstr("the mesh file's name is empty"));
+  EXPECT_THAT(errorOf(fs::path()), HasSubstr("the name of the file is empty"));
 }
 
 TEST_F(MeshImport, refusesUnreadableFiles) {

@@ -1,29 +1,18 @@
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <optional>
 #include <system_error>
 
 #include "combine/expression_words.h"
 #include "hpsdf/combine/expression.h"
 #include "hpsdf/detail/nearest_name.h"
+#include "hpsdf/detail/text.h"
 
 namespace hpsdf {
 namespace combine {
 namespace {
 
 constexpr std::size_t kLongestExpression = 1'000'000;  ///< bytes
-
-/// Returns a piece of the text for a message, without control characters.
-std::string shown(std::string_view text) {
-  constexpr std::size_t kLongest = 40;
-  std::size_t end = std::min(text.size(), kLongest);
-  while (end > 0 && end < text.size() && (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80U) --end;
-  std::string shown(text.substr(0, end));
-  std::ranges::replace_if(
-      shown, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '?');
-  return end < text.size() ? shown + "…" : shown;
-}
 
 /// An argument of an operation: a number, a bare word that may name a side or a solid, or another expression.
 struct ParsedArgument {
@@ -81,9 +70,9 @@ class ExpressionParser {
     double value = 0;
     const std::string_view digits = word.substr(word[0] == '+' ? 1 : 0);
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error == std::errc::result_out_of_range) refuse(start, shown(word) + " is out of the range of numbers");
+    if (error == std::errc::result_out_of_range) refuse(start, shownText(word) + " is out of the range of numbers");
     if (error != std::errc() || end != digits.data() + digits.size())
-      refuse(start, "'" + shown(word) + "' is not a number; write a name that looks like one between quotes");
+      refuse(start, "'" + shownText(word) + "' is not a number; write a name that looks like one between quotes");
     return value;
   }
 
@@ -109,7 +98,7 @@ class ExpressionParser {
       names.emplace_back(row.name);
       all += (all.empty() ? "" : ", ") + names.back();
     }
-    return "there is no operation '" + shown(name) + "'; " + didYouMean(name, names, "there are " + all);
+    return "there is no operation '" + shownText(name) + "'; " + didYouMean(name, names, "there are " + all);
   }
 
   /// Makes an operation of its arguments: operands, then numbers, then the side of a shell.
@@ -144,7 +133,7 @@ class ExpressionParser {
   static ShellSide sideOf(const ParsedArgument& argument) {
     const auto name = std::ranges::find(kSideNames, argument.word);
     if (name == kSideNames.end())
-      refuse(argument.column, "expected inward, outward or centred, found '" + shown(argument.word) + "'");
+      refuse(argument.column, "expected inward, outward or centred, found '" + shownText(argument.word) + "'");
     return static_cast<ShellSide>(name - kSideNames.begin());
   }
 
@@ -169,7 +158,7 @@ class ExpressionParser {
   std::string found() const {
     if (at_ >= text_.size()) return "the end";
     const std::size_t length = std::max<std::size_t>(1, wordLength(text_.substr(at_)));
-    return "'" + shown(text_.substr(at_, length)) + "'";
+    return "'" + shownText(text_.substr(at_, length)) + "'";
   }
 
   [[noreturn]] static void refuse(std::size_t column, const std::string& problem) {

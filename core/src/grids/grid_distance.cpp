@@ -8,6 +8,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "grids/grid_memory.h"
+#include "hpsdf/triangle_mesh.h"
 #include "util/chunks.h"
 #include "util/refuse.h"
 
@@ -54,7 +56,14 @@ struct GridDistance::Samples {
   std::vector<SampledBlocks::Block> blocks;
   std::optional<SampleIndex> points;  ///< numbers of points of a grid that fills a box
 
+  /// Takes the blocks. Throws `Error` for an index that `keyOf` cannot hold.
   void fill(std::vector<SampledBlocks::Block> some) {
+    constexpr std::int32_t kMostBlocks = grids::kMostPointsOfAxis / kBlock;
+    const auto isBeyond = [](std::int32_t index) { return index < -kMostBlocks || index >= kMostBlocks; };
+    for (const SampledBlocks::Block& block : some)
+      if (std::ranges::any_of(block.index, isBeyond))
+        detail::refuse("the grid has samples with indices beyond ", grids::kMostPointsOfAxis,
+                       "; move it nearer to the origin, or take one with larger voxels");
     blocks = std::move(some);
     for (std::size_t n = 0; n < blocks.size(); ++n) places_.emplace(keyOf(blocks[n].index), n);
   }
@@ -135,9 +144,8 @@ struct GridDistance::Samples {
   /// Evaluates the distance and, if it is asked for, its gradient at a point in world units, or returns false.
   template <bool WithGradient>
   bool evaluate(const Vector3& point, double& value, Vector3& gradient) const {
-    constexpr double kMostIndex = 1 << 23;  // `keyOf` holds the indices of blocks below it
     const Vector3 wanted = (point - origin).cwiseQuotient(spacing), x = clamped(wanted);
-    if (!x.allFinite() || !(x.cwiseAbs().maxCoeff() < kMostIndex)) return false;
+    if (!x.allFinite() || !(x.cwiseAbs().maxCoeff() < double(grids::kMostPointsOfAxis))) return false;
     if (!interpolate<WithGradient>(x, value, gradient)) return false;
     gradient = gradient.cwiseQuotient(spacing);
     continueBeyond((wanted - x).cwiseProduct(spacing), value, gradient);
@@ -196,6 +204,8 @@ std::vector<SampledBlocks::Block> blocksOf(const RegularGrid& grid) {
 
 void requireUsableGrid(const RegularGrid& grid) {
   const auto& points = grid.layout.points;
+  const double x = points[0], y = points[1], z = points[2];
+  grids::requireReadableGrid(x, y, z, sizeof(double));
   if (*std::ranges::min_element(points) < 4)
     detail::refuse("a grid of ", points[0], " x ", points[1], " x ", points[2],
                    " points; the interpolation needs four points or more along each axis");
@@ -204,6 +214,17 @@ void requireUsableGrid(const RegularGrid& grid) {
     detail::refuse("the value number ", bad - grid.values.begin() + 1, " of the grid is not finite");
   if (!(grid.layout.spacing.minCoeff() > 0) || !grid.layout.spacing.allFinite() || !grid.layout.origin.allFinite())
     detail::refuse("the spacing of the grid is not a positive length, or its origin is not finite");
+  constexpr double kLeastShare = 0x1p-40;  // of the coordinates; less is a few thousand times their rounding
+  const Vector3 farthest = grid.layout.box().min().cwiseAbs().cwiseMax(grid.layout.box().max().cwiseAbs());
+  if (!(farthest.maxCoeff() <= kLargestCoordinate) || (grid.layout.spacing - kLeastShare * farthest).minCoeff() < 0)
+    detail::refuse("the grid is so far from the origin, at ", farthest.maxCoeff(),
+                   ", that rounding spoils its spacing of ", grid.layout.spacing.minCoeff());
+  // The last blocks along each axis are filled up with points that do not exist.
+  const auto blocks = [](double count) { return std::ceil(count / kBlock); };
+  grids::requireGridMemory(x, y, z, sizeof(SampledBlocks::Block) * blocks(x) * blocks(y) * blocks(z) / (x * y * z),
+                           grids::kCoarserGrid);
+  if (grid.values.size() != grid.layout.count())
+    detail::refuse("a grid of ", grid.layout.count(), " points with ", grid.values.size(), " values");
 }
 
 /// Calls visit(index, value) for all samples.

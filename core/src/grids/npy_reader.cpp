@@ -55,7 +55,8 @@ NpyHeader headerOf(std::string_view bytes) {
   const std::string_view text = bytes.substr(begin, length);
   const std::string_view type = valueOfKey(text, "'descr'").substr(0, 5);
   if (type != "'<f4'" && type != "'<f8'")
-    detail::refuse("the array has the type ", type, "; expected little-endian floats or doubles ('<f4' or '<f8')");
+    detail::refuse("the array has the type ", shownText(type),
+                   "; expected little-endian floats or doubles ('<f4' or '<f8')");
   return {.isDouble = type == "'<f8'",
           .isFortranOrder = valueOfKey(text, "'fortran_order'").starts_with("True"),
           .shape = shapeOf(valueOfKey(text, "'shape'")),
@@ -71,7 +72,7 @@ RegularGrid readNpy(std::string_view bytes) {
   if (shape.size() < 3 || shape.size() > 4 || (shape.size() == 4 && shape[3] != 4))
     detail::refuse("the array has ", shape.size(),
                    " axes; expected the shape (nz, ny, nx), or (nz, ny, nx, 4) with values and gradients");
-  requireGridMemory(double(shape[2]), double(shape[1]), double(shape[0]), 2 * sizeof(double));
+  requireReadableGrid(double(shape[2]), double(shape[1]), double(shape[0]), 2 * sizeof(double));
   const std::size_t count = std::size_t(shape[0]) * shape[1] * shape[2];
   const std::size_t size = header.isDouble ? sizeof(double) : sizeof(float);
   const std::string_view numbers = bytes.substr(header.firstNumber);

@@ -1,5 +1,6 @@
 #include "grids/read_grid.h"
 
+#include "grids/grid_memory.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/text.h"
 #include "hpsdf/input/grid_distance.h"
@@ -12,7 +13,7 @@ namespace {
 std::string wholeFile(const std::filesystem::path& file) {
   const Progress progress;
   mesh::Input input(file, progress);
-  requireMemory("the file " + file.string(), double(input.mostLeft()), "make the grid smaller");
+  requireMemory("the file " + file.string(), double(input.mostLeft()), grids::kCoarserGrid);
   std::string bytes;
   bytes.reserve(input.mostLeft());
   while (input.ensure(1)) {

@@ -6,75 +6,49 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "grids/grid_memory.h"
 #include "grids/read_grid.h"
+#include "grids/xml_tags.h"
 #include "hpsdf/detail/text.h"
 #include "util/refuse.h"
 
 namespace hpsdf::grids {
 namespace {
 
-/// An XML element's begin: its name, its attributes, and the text that follows it.
-struct Tag {
-  std::string name;
-  std::map<std::string, std::string> attributes;
-  std::string_view rest;
-
-  std::string attribute(const std::string& key) const {
-    const auto found = attributes.find(key);
-    return found == attributes.end() ? "" : found->second;
-  }
-};
-
-std::string_view takeUntil(std::string_view& text, std::string_view ends) {
-  const std::string_view taken = text.substr(0, text.find_first_of(ends));
-  text.remove_prefix(taken.size());
-  return taken;
-}
-
-/// Returns the next element's begin, or one without a name at the end. Comments, declarations and ends are passed over.
-Tag nextTag(std::string_view text) {
-  while (true) {
-    takeUntil(text, "<");
-    if (text.empty()) return {};
-    text.remove_prefix(1);
-    if (text.starts_with('/') || text.starts_with('?') || text.starts_with('!')) continue;
-    Tag tag{std::string(takeUntil(text, " \t\r\n/>")), {}, {}};
-    while (!(text = trimmed(text.substr(0))).empty() && !text.starts_with('>')) {
-      if (text.starts_with('/')) {
-        text.remove_prefix(1);
-        continue;
-      }
-      const std::string key(trimmed(takeUntil(text, "=>")));
-      takeUntil(text, "\"'>");
-      if (text.empty() || text.starts_with('>')) detail::refuse("the attribute ", key, " of ", tag.name, " is damaged");
-      const std::string_view quote = text.substr(0, 1);
-      text.remove_prefix(1);
-      tag.attributes[key] = takeUntil(text, quote);
-      if (!text.empty()) text.remove_prefix(1);
-    }
-    if (!text.empty()) text.remove_prefix(1);
-    tag.rest = text;
-    return tag;
-  }
-}
-
-/// Returns the numbers of an attribute, which must be `count`.
-std::vector<double> numbersOf(std::string_view text, std::size_t count, const std::string& what) {
+/// Returns the numbers of a text, or fewer than `count` or none if it holds anything else.
+std::vector<double> numbersIn(std::string_view text, std::size_t count) {
   std::vector<double> numbers;
   while (!(text = trimmed(text)).empty()) {
     double number = 0;
     const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error != std::errc() || !std::isfinite(number)) break;
+    if (error != std::errc() || !std::isfinite(number) || numbers.size() == count) return {};
     numbers.push_back(number);
     text.remove_prefix(std::size_t(rest - text.data()));
   }
-  if (numbers.size() != count || !text.empty())
-    detail::refuse("the attribute ", what, " does not hold ", count, " numbers");
+  return numbers;
+}
+
+/// Returns the numbers that the file gives under a name such as "Spacing", which must be `count`.
+std::vector<double> numbersOf(const Tag& tag, std::string_view name, std::size_t count) {
+  const std::string_view text = tag.attribute(name);
+  std::vector<double> numbers = numbersIn(text, count);
+  if (numbers.size() != count)
+    detail::refuse("expected ", count, count == 1 ? " number" : " numbers", " as ", name, " of the grid, found '",
+                   shownText(text), "'");
+  return numbers;
+}
+
+/// Returns numbers that must be whole and from `least` to `most`.
+std::vector<double> wholeNumbersOf(const Tag& tag, std::string_view name, std::size_t count, double least,
+                                   double most) {
+  std::vector<double> numbers = numbersOf(tag, name, count);
+  for (const double number : numbers)
+    if (number != std::floor(number) || number < least || number > most)
+      detail::refuse("expected whole numbers of 32 bits as ", name, " of the grid, found '",
+                     shownText(tag.attribute(name)), "'");
   return numbers;
 }
 
@@ -110,6 +84,8 @@ std::string decodeBase64(std::string_view text, std::size_t count) {
   return bytes;
 }
 
+constexpr std::size_t kMostArrays = 10'000;
+
 /// How the arrays of a file are stored.
 struct Encoding {
   bool hasLongHeaders = false;  ///< sizes have 64 bits instead of 32
@@ -135,9 +111,9 @@ class StoredArray {
     }
     const std::string start = first(3 * width);
     const std::uint64_t blocks = sizeAt(start, 0), bytesOfBlock = sizeAt(start, 1), bytesOfLast = sizeAt(start, 2);
-    const bool isPartial = bytesOfLast > 0;
-    if (blocks == 0 || bytesOfBlock == 0 || blocks > size || bytesOfBlock > size + 1 + (std::uint64_t{1} << 30) ||
-        (blocks - (isPartial ? 1 : 0)) * bytesOfBlock + bytesOfLast != size)
+    const std::uint64_t wholeBlocks = blocks - (bytesOfLast > 0 ? 1 : 0);
+    if (blocks == 0 || bytesOfBlock == 0 || blocks > size || (wholeBlocks > 0 && bytesOfBlock > size / wholeBlocks) ||
+        wholeBlocks * bytesOfBlock + bytesOfLast != size)
       refuseSize();
     return decompressed(size, blocks, bytesOfBlock);
   }
@@ -165,10 +141,13 @@ class StoredArray {
     std::uint64_t compressedSize = 0;
     for (std::uint64_t n = 0; n < blocks; ++n) {
       const std::uint64_t some = sizeAt(header, 3 + n);
-      if (some > stored_.size()) detail::refuse("the file ends within the array of distances");
+      if (some > stored_.size() - compressedSize) detail::refuse("the file ends within the array of distances");
       compressedSize += some;
     }
     const std::string all = first(headerSize + compressedSize);
+    constexpr double kGreatestExpansion = 1032;  // of zlib
+    if (double(size) > kGreatestExpansion * double(compressedSize))
+      detail::refuse("the compressed array of distances is damaged");
     std::string bytes(size, '\0');
     std::size_t from = headerSize, to = 0;
     for (std::uint64_t n = 0; n < blocks; ++n) {
@@ -192,7 +171,9 @@ class StoredArray {
 
 /// Returns the numbers of an array of text.
 std::vector<double> textNumbers(std::string_view text, std::size_t count) {
-  return numbersOf(takeUntil(text, "<"), count, "of distances (an array of text)");
+  std::vector<double> numbers = numbersIn(takeUntil(text, "<"), count);
+  if (numbers.size() != count) detail::refuse("the array of distances does not hold ", count, " finite numbers");
+  return numbers;
 }
 
 std::vector<double> numbersFrom(const std::string& bytes, bool isDouble, std::size_t count) {
@@ -204,15 +185,15 @@ std::vector<double> numbersFrom(const std::string& bytes, bool isDouble, std::si
 
 /// Reads the numbers of a data array.
 std::vector<double> readArray(const Tag& array, const Encoding& encoding, std::size_t count) {
-  const std::string type = array.attribute("type"), format = array.attribute("format");
+  const std::string_view type = array.attribute("type"), format = array.attribute("format");
   if (type != "Float32" && type != "Float64")
-    detail::refuse("the array of distances has the type ", type, "; expected Float32 or Float64");
+    detail::refuse("the array of distances has the type '", shownText(type), "'; expected Float32 or Float64");
   if (format == "ascii") return textNumbers(array.rest, count);
   const bool isDouble = type == "Float64", isAppended = format == "appended";
   std::string_view stored = array.rest;
   if (isAppended) {
-    const double offset = numbersOf(array.attribute("offset"), 1, "offset")[0];
-    if (!(offset >= 0) || offset >= double(encoding.appended.size()))
+    const double offset = numbersOf(array, "offset", 1)[0];
+    if (!(offset >= 0) || offset != std::floor(offset) || offset >= double(encoding.appended.size()))
       detail::refuse("the array of distances begins behind the end of the file");
     stored = encoding.appended.substr(std::size_t(offset));
   }
@@ -224,30 +205,28 @@ std::vector<double> readArray(const Tag& array, const Encoding& encoding, std::s
 struct ImageDescription {
   Encoding encoding;
   RegularGrid grid;
-  std::string scalars;      ///< name of the array of distances, or ""
-  std::vector<Tag> arrays;  ///< of the points
+  std::string_view scalars;  ///< name of the array of distances, or ""
+  std::vector<Tag> arrays;   ///< of the points
 };
 
 void takeFile(const Tag& tag, ImageDescription& image) {
   if (tag.attribute("type") != "ImageData")
-    detail::refuse("this is a file of VTK with ", tag.attribute("type"), "; expected ImageData (.vti)");
+    detail::refuse("this is a file of VTK with '", shownText(tag.attribute("type")), "'; expected ImageData (.vti)");
   if (tag.attribute("byte_order") == "BigEndian") detail::refuse("the file is big-endian; expected little-endian");
-  const std::string compressor = tag.attribute("compressor");
+  const std::string_view compressor = tag.attribute("compressor");
   if (!compressor.empty() && compressor != "vtkZLibDataCompressor")
-    detail::refuse("the file is compressed by ", compressor, "; expected vtkZLibDataCompressor, or none");
+    detail::refuse("the file is compressed by '", shownText(compressor), "'; expected vtkZLibDataCompressor, or none");
   image.encoding.isCompressed = !compressor.empty();
   image.encoding.hasLongHeaders = tag.attribute("header_type") == "UInt64";
 }
 
 void takeImage(const Tag& tag, ImageDescription& image) {
-  const auto extent = numbersOf(tag.attribute("WholeExtent"), 6, "WholeExtent");
-  const auto origin = numbersOf(tag.attribute("Origin"), 3, "Origin");
-  const auto spacing = numbersOf(tag.attribute("Spacing"), 3, "Spacing");
-  if (const std::string direction = tag.attribute("Direction"); !direction.empty()) {
-    const auto axes = numbersOf(direction, 9, "Direction");
-    if (axes != std::vector<double>{1, 0, 0, 0, 1, 0, 0, 0, 1})
-      detail::refuse("the grid is rotated (Direction); expected one along the axes");
-  }
+  using Integers = std::numeric_limits<std::int32_t>;
+  const auto extent = wholeNumbersOf(tag, "WholeExtent", 6, Integers::min(), Integers::max());
+  const auto origin = numbersOf(tag, "Origin", 3), spacing = numbersOf(tag, "Spacing", 3);
+  const bool hasAxes = !tag.attribute("Direction").empty();
+  if (hasAxes && numbersOf(tag, "Direction", 9) != std::vector<double>{1, 0, 0, 0, 1, 0, 0, 0, 1})
+    detail::refuse("the grid is rotated (Direction); expected one along the axes");
   GridLayout& layout = image.grid.layout;
   Vector3 points;
   for (int axis = 0; axis < 3; ++axis) {
@@ -255,8 +234,7 @@ void takeImage(const Tag& tag, ImageDescription& image) {
     layout.spacing[axis] = spacing[axis];
     layout.origin[axis] = origin[axis] + extent[2 * axis] * spacing[axis];
   }
-  if (!(points.minCoeff() >= 1)) detail::refuse("the grid has no points (WholeExtent)");
-  requireGridMemory(points[0], points[1], points[2], 3 * sizeof(double));
+  requireReadableGrid(points[0], points[1], points[2], 3 * sizeof(double));
   for (int axis = 0; axis < 3; ++axis) layout.points[axis] = std::uint32_t(points[axis]);
 }
 
@@ -275,6 +253,7 @@ ImageDescription describe(std::string_view bytes) {
     if (tag.name == "PointData" || tag.name == "CellData" || tag.name == "FieldData")
       isInPoints = tag.name == "PointData";
     if (tag.name == "DataArray" && isInPoints) image.arrays.push_back(tag);
+    if (image.arrays.size() > kMostArrays) detail::refuse("the points have more than ", kMostArrays, " arrays");
     if (tag.name != "AppendedData") continue;
     image.encoding.isAppendedRaw = tag.attribute("encoding") == "raw";
     const std::size_t mark = tag.rest.find('_');
@@ -289,7 +268,7 @@ ImageDescription describe(std::string_view bytes) {
 const Tag& distancesOf(const ImageDescription& image) {
   const Tag* found = nullptr;
   for (const Tag& array : image.arrays) {
-    const std::string components = array.attribute("NumberOfComponents");
+    const std::string_view components = array.attribute("NumberOfComponents");
     if (!components.empty() && components != "1") continue;
     if (!image.scalars.empty() && array.attribute("Name") != image.scalars) continue;
     if (found != nullptr) detail::refuse("the points have several arrays, of which none is named as Scalars");

@@ -26,4 +26,16 @@ inline std::string lowerCase(std::string text) {
 /// no extension.
 inline std::string lowerExtension(const std::filesystem::path& file) { return lowerCase(file.extension().string()); }
 
+/// Returns a text as messages show it: at most 40 bytes, with … behind them if there are more, and ? in the place of
+/// control characters. Characters of UTF-8 are not cut.
+inline std::string shownText(std::string_view text) {
+  constexpr std::size_t kLongest = 40;
+  std::size_t end = std::min(text.size(), kLongest);
+  while (end > 0 && end < text.size() && (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80U) --end;
+  std::string shown(text.substr(0, end));
+  std::ranges::replace_if(
+      shown, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '?');
+  return end < text.size() ? shown + "…" : shown;
+}
+
 }  // namespace hpsdf

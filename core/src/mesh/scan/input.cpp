@@ -27,15 +27,15 @@ constexpr std::uint64_t kGreatestExpansion = 1032;
 void requireReadable(const fs::path& file) {
   const std::string name = file.string();
   const auto refuse = [&](const std::string& problem) { throw Error(ErrorKind::file, name, problem); };
-  if (name.empty()) refuse("the mesh file's name is empty; give a file name");
+  if (name.empty()) refuse("the name of the file is empty; give one");
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
   if (status.type() == fs::file_type::not_found) refuse("no such file; check the path");
   if (!fs::exists(status)) refuse("cannot be read (" + error.message() + "); check the path");
-  if (fs::is_directory(status)) refuse("a directory, not a file; name a mesh file in it");
-  if (!fs::is_regular_file(status)) refuse("not a regular file; name a mesh file");
+  if (fs::is_directory(status)) refuse("a directory, not a file; name a file in it");
+  if (!fs::is_regular_file(status)) refuse("not a regular file; name one");
   const std::uintmax_t size = fs::file_size(file, error);
-  if (!error && size == 0) refuse("the file is empty; export the mesh again");
+  if (!error && size == 0) refuse("the file is empty; export it again");
   std::ifstream stream(file, std::ios::binary);
   if (!stream || stream.peek() == std::ifstream::traits_type::eof()) refuse("cannot be read; check its permissions");
 }
