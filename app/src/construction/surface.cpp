@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <span>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "construction/mesh_process.h"
 #include "construction/mesh_summary.h"
 #include "hpsdf/detail/memory.h"
+#include "hpsdf/detail/text.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
 #include "text/text.h"
@@ -44,6 +46,16 @@ struct NormalizedDistance {
   }
   std::size_t bytes() const { return distance.bytes(); }
 };
+
+/// Throws `Error` for a file of a format that `hpsdf export` writes and no command reads.
+void refuseWrittenOnly(const std::string& file) {
+  constexpr std::array kWrittenOnly = {".vtu", ".nvdb", ".cdf"};
+  const std::string extension = lowerExtension(file);
+  if (std::ranges::find(kWrittenOnly, extension) != kWrittenOnly.end())
+    throw Error(
+        ErrorKind::file, file,
+        "hpsdf writes " + extension + " files, but reads none; the grids that it reads are .vdb, .vti and .npy");
+}
 
 ImportedMesh readFile(const Console& console, const std::string& file) {
   return withProgress(console, [&](const Progress& progress) {
@@ -112,6 +124,7 @@ void requireMesh(const std::string& surface) {
 
 ImportedMesh importSurface(const Console& console, const std::string& surface) {
   requireMesh(surface);
+  refuseWrittenOnly(surface);
   if (surface.starts_with(kBuiltin)) {
     TriangleMesh mesh = shapes::mesh(surface);
     const MeshReport report = inspect(mesh);
