@@ -114,6 +114,21 @@ TEST_F(Combine, takesTheOptionsOfBuild) {
   EXPECT_THAT(tolerance.out, HasSubstr("tolerance: "));
 }
 
+TEST_F(Combine, takesGridsAsOperands) {
+  ASSERT_EQ(run({{"export", field(), "-o", at("grid.vti"), "--resolution", "40"}}).status, 0);
+  const Outcome outcome = combine("move(" + at("grid.vti") + ", 5, 0, 0)");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("distances: "));
+  EXPECT_EQ(load(at("c.hpsdf")).metadata().source.exactness, Exactness::nowhere);
+  const Field torus = load(field());
+  const Vector3 inside(torus.metadata().source.box.max().x() - 0.1, 0, 0);
+  EXPECT_NEAR(load(at("c.hpsdf")).value(inside + Vector3(5, 0, 0)), torus.value(inside), 0.05);
+  expectRefused({{"combine", at("grid.vti"), "-o", at("x.hpsdf"), "--bounds"}}, "nothing is proven of a grid");
+  ASSERT_EQ(run({{"export", field(), "-o", at("grid.npy"), "--resolution", "20"}}).status, 0);
+  expectRefused({{"combine", "offset(" + at("grid.npy") + ", 1)", "-o", at("x.hpsdf")}},
+                "column 8: " + at("grid.npy") + ": an array of NumPy does not tell where its points lie");
+}
+
 TEST_F(Combine, mistakesAreOneLineWithTheColumn) {
   const auto expectColumn = [&](const std::string& expression, const std::string& message) {
     expectRefused({{"combine", expression, "-o", at("x.hpsdf")}}, "expression: column " + message, {});
@@ -124,6 +139,8 @@ TEST_F(Combine, mistakesAreOneLineWithTheColumn) {
   expectColumn(" ", "2: expected a file, a shape or an operation, found the end");
   expectColumn("scale(builtin:box, 1, 2, 1)", "1: scale: it is written scale(A, S): different factors");
   expectColumn("union(builtin:box, none.obj)", "20: none.obj: no such file");
+  expectColumn("union(builtin:box, none.vti)", "20: none.vti: no such file");
+  expectColumn("union(builtin:box, move(builtin:box, 1e17, 0, 0))", "25: builtin:box: moves and scales put it at");
   expectColumn("union(builtin:box, \"no\nne.obj\")", "20: no ne.obj: no such file");
   expectColumn("union(builtin:box, builtin:sphere,radius=0)", "20: ");
   writeFile(at("broken.ply"), "ply\nformat");

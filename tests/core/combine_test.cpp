@@ -294,6 +294,23 @@ TEST(Combine, nothingLeftIsRefused) {
   EXPECT_THAT(refusal(unite(box, stretched(box, 1, 1e-10))), testing::HasSubstr("which rounding spoils beside"));
 }
 
+TEST(CombinedDistance, functionsThatAreKnownInABoxEndAtItsWalls) {
+  const Box domain(Vector3(-1, -1, -1), Vector3(1, 1, 1));
+  // The ball around (1, 0, 0) is known up to x = 1. Beyond the domain, the function answers what must not be used.
+  const DistanceFunction ball(
+      [&](const Vector3& x) { return domain.contains(x) ? (x - Vector3(1, 0, 0)).norm() - 0.5 : -1e9; },
+      {.name = "ball.vti",
+       .box = Box(Vector3(0.5, -0.5, -0.5), Vector3(1.5, 0.5, 0.5)),
+       .exactness = Exactness::nowhere});
+  const CombinedDistance distance(moved(Expression::within(domain, ball), {5, 0, 0}));
+  EXPECT_EQ(distance.exactness(), Exactness::nowhere);
+  EXPECT_TRUE(distance.source().box.isApprox(Box(Vector3(5.5, -0.5, -0.5), Vector3(6, 0.5, 0.5))));
+  EXPECT_NEAR(distance({5.4, 0, 0}), 0.1, 1e-12);
+  EXPECT_NEAR(distance({5.9, 0, 0}), -0.1, 1e-12) << "the wall is the surface";
+  EXPECT_NEAR(distance({7, 0, 0}), 1, 1e-12);
+  EXPECT_NEAR(distance({5, 3, 0}), std::hypot(2, std::sqrt(2) - 0.5), 1e-12);
+}
+
 TEST(CombinedDistance, aMeshThatIsNamedTwiceInOnePlaceCountsOnce) {
   const Expression box = shapes::mesh("box"), other = moved(box, {0.3, 0.2, 0.1});
   const CombinedDistance once(unite(box, other)), thrice(unite(box, other, box, intersect(other, other)));

@@ -28,6 +28,8 @@ GridDistance readRegularGrid(const Console& console, const std::string& file, co
 
 bool isGridName(std::string_view surface) { return isLevelSetName(surface) || isRegularGridName(surface); }
 
+bool tellsWherePointsLie(std::string_view grid) { return !isNumPyName(grid); }
+
 GridDistance readGridSurface(const Console& console, const std::string& file, const GridPlacement& placement) {
   if (placement.isGiven() && !isNumPyName(file))
     throw Error("spacing and origin belong to an array of NumPy (.npy): leave them out");

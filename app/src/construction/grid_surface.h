@@ -13,6 +13,9 @@ namespace hpsdf::app {
 /// Returns true for a name that ends as those of grids do.
 bool isGridName(std::string_view surface);
 
+/// Returns true for a grid whose file tells where its points lie: for all but arrays of NumPy.
+bool tellsWherePointsLie(std::string_view grid);
+
 /// Where the points of an array of NumPy lie, whose file does not tell it. What is not given is 0 or 1.
 struct GridPlacement {
   std::optional<Vector3> origin;

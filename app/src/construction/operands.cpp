@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "construction/file_kind.h"
+#include "construction/grid_surface.h"
 #include "construction/surface.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
@@ -36,6 +37,20 @@ bool hasBoolean(const Expression& expression) {
   return isBoolean(node.operation) || std::ranges::any_of(node.operands, hasBoolean);
 }
 
+/// Returns a grid as an operand. What is interpolated between samples is no exact distance.
+Expression loadedGrid(const Console& console, const std::string& name) {
+  if (!tellsWherePointsLie(name))
+    throw Error(
+        ErrorKind::file, name,
+        "an array of NumPy does not tell where its points lie: make a field of it by 'hpsdf build --spacing', and "
+        "combine that");
+  GridDistance grid = readGridSurface(console, name, {});
+  const Box domain = grid.domain();
+  Source source = grid.source();
+  source.exactness = Exactness::nowhere;
+  return Expression::within(domain, DistanceFunction(std::move(grid), std::move(source)));
+}
+
 }  // namespace
 
 std::vector<Expression> booleanOperands(const Expression& expression) {
@@ -58,7 +73,12 @@ Expression withLoadedOperands(const Console& console, const Expression& expressi
                               const std::string& proof) {
   return withOperands(expression, [&](const std::string& name) -> Expression {
     if (name.starts_with(kAnalytic)) return shapes::analytic(name);
-    if (isShape(name) || kindOfFile(name) != FileKind::field) return loadedMesh(console, name, insideTest, proof);
+    const bool isField = !isShape(name) && kindOfFile(name) == FileKind::field;
+    if (!isField && isGridName(name)) {
+      refuseProof(proof, name, "nothing is proven of a grid, between whose samples distances are interpolated");
+      return loadedGrid(console, name);
+    }
+    if (!isField) return loadedMesh(console, name, insideTest, proof);
     refuseProof(proof, name, "nothing is proven of a field, which has errors of its own");
     return load(name);
   });

@@ -68,6 +68,7 @@ bool isOneMesh(const BooleanSolid& all) {
 Box boxOf(const Expression::Node& leaf) {
   if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&leaf.operand)) return boundingBox(**mesh);
   if (const auto* field = std::get_if<std::shared_ptr<const Field>>(&leaf.operand)) return (*field)->domain();
+  if (!leaf.domain.isEmpty()) return leaf.domain;
   return std::get<std::shared_ptr<const DistanceFunction>>(leaf.operand)->source().box;
 }
 
@@ -197,7 +198,8 @@ class Compiler {
       return meshLeaf(*mesh, placement);
     if (const auto* field = std::get_if<std::shared_ptr<const Field>>(&node.operand))
       return {.node = fieldNode(*field, placement)};
-    return {.node = functionNode(std::get<std::shared_ptr<const DistanceFunction>>(node.operand), placement)};
+    return {.node =
+                functionNode(std::get<std::shared_ptr<const DistanceFunction>>(node.operand), placement, node.domain)};
   }
 
   CompiledPart meshLeaf(const std::shared_ptr<const TriangleMesh>& mesh, const Similarity& placement) {

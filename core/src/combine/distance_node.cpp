@@ -170,33 +170,24 @@ class PlacedNode : public DistanceNode {
   Similarity placement_;
 };
 
-class FieldNode final : public PlacedNode {
+/// A solid of which distances are known in a box only, its domain. It ends at the domain's walls.
+class WalledNode : public PlacedNode {
  public:
-  FieldNode(std::shared_ptr<const Field> field, const Similarity& placement)
-      : PlacedNode(placement), field_(std::move(field)) {
-    const Box& surface = field_->metadata().source.box;
+  WalledNode(const Similarity& placement, const Box& domain) : PlacedNode(placement), domain_(domain) {}
+
+ protected:
+  /// Returns the box of the surface, placed. Where `surface` is not known, it is the domain.
+  Box placedBox(const Box& surface, const Similarity& placement) const {
     const bool isKnown = !surface.isEmpty() && surface.sizes().allFinite();
-    box = transformed(isKnown ? Box(surface.intersection(field_->domain())) : field_->domain(), placement);
-    hasGradients = true;
-    bytes = field_->bytes();
+    return transformed(isKnown ? Box(surface.intersection(domain_)) : domain_, placement);
   }
 
  private:
-  void evaluateLocally(std::span<const Vector3> points, const Samples& out) const override {
-    const Box& domain = field_->domain();
+  void evaluateLocally(std::span<const Vector3> points, const Samples& out) const final {
     std::vector<Vector3> nearest(points.size());
     for (std::size_t i = 0; i < points.size(); ++i)
-      nearest[i] = points[i].cwiseMax(domain.min()).cwiseMin(domain.max());
-    if (out.hasGradients()) {
-      std::vector<ValueAndGradient> found(points.size());
-      field_->valuesAndGradients(nearest, found);
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        out.values[i] = found[i].value;
-        out.gradients[i] = found[i].gradient;
-      }
-    } else {
-      field_->values(nearest, out.values);
-    }
+      nearest[i] = points[i].cwiseMax(domain_.min()).cwiseMin(domain_.max());
+    evaluateInDomain(nearest, out);
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (points[i] == nearest[i])
         endAtWall(points[i], out, i);
@@ -205,15 +196,16 @@ class FieldNode final : public PlacedNode {
     }
   }
 
+  virtual void evaluateInDomain(std::span<const Vector3> points, const Samples& out) const = 0;
+
   /// Where the solid reaches a wall of the domain, the wall is its surface: the value is at least the negative distance
   /// to the nearest wall.
   void endAtWall(const Vector3& x, const Samples& out, std::size_t i) const {
-    const Box& domain = field_->domain();
     int axis = 0;
-    const double wall = ((x - domain.center()).cwiseAbs() - domain.sizes() / 2).maxCoeff(&axis);
+    const double wall = ((x - domain_.center()).cwiseAbs() - domain_.sizes() / 2).maxCoeff(&axis);
     if (out.values[i] >= wall) return;
     out.values[i] = wall;
-    if (out.hasGradients()) out.gradients[i] = Vector3::Unit(axis) * (x[axis] < domain.center()[axis] ? -1 : 1);
+    if (out.hasGradients()) out.gradients[i] = Vector3::Unit(axis) * (x[axis] < domain_.center()[axis] ? -1 : 1);
   }
 
   /// Turns a sample at the domain's nearest point into one at a point farther outside: a bound of the distance to a
@@ -229,28 +221,76 @@ class FieldNode final : public PlacedNode {
     gradient = (away + value * gradient) / continued;
   }
 
+  Box domain_;
+};
+
+class FieldNode final : public WalledNode {
+ public:
+  FieldNode(std::shared_ptr<const Field> field, const Similarity& placement)
+      : WalledNode(placement, field->domain()), field_(std::move(field)) {
+    box = placedBox(field_->metadata().source.box, placement);
+    hasGradients = true;
+    bytes = field_->bytes();
+  }
+
+ private:
+  void evaluateInDomain(std::span<const Vector3> points, const Samples& out) const override {
+    if (!out.hasGradients()) return field_->values(points, out.values);
+    std::vector<ValueAndGradient> found(points.size());
+    field_->valuesAndGradients(points, found);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      out.values[i] = found[i].value;
+      out.gradients[i] = found[i].gradient;
+    }
+  }
+
   std::shared_ptr<const Field> field_;
 };
+
+void evaluateFunction(const DistanceFunction& function, std::span<const Vector3> points, const Samples& out) {
+  if (out.hasGradients())
+    function.withGradients(points, out.values, out.gradients);
+  else
+    function(points, out.values);
+}
+
+/// Returns on which sides a function is exact: on both unless its source says otherwise.
+ExactSides sidesOf(const DistanceFunction& function) {
+  const Exactness exactness = function.source().exactness.value_or(Exactness::everywhere);
+  return {exactness == Exactness::everywhere || exactness == Exactness::outside,
+          exactness == Exactness::everywhere || exactness == Exactness::inside};
+}
 
 class FunctionNode final : public PlacedNode {
  public:
   FunctionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement)
       : PlacedNode(placement), function_(std::move(function)) {
-    const Source& source = function_->source();
-    const Exactness exactness = source.exactness.value_or(Exactness::everywhere);
-    exactSides.outside = exactness == Exactness::everywhere || exactness == Exactness::outside;
-    exactSides.inside = exactness == Exactness::everywhere || exactness == Exactness::inside;
-    box = transformed(source.box, placement);
+    exactSides = sidesOf(*function_);
+    box = transformed(function_->source().box, placement);
     hasGradients = function_->hasGradients();
     bytes = function_->bytes();
   }
 
  private:
   void evaluateLocally(std::span<const Vector3> points, const Samples& out) const override {
-    if (out.hasGradients())
-      function_->withGradients(points, out.values, out.gradients);
-    else
-      (*function_)(points, out.values);
+    evaluateFunction(*function_, points, out);
+  }
+
+  std::shared_ptr<const DistanceFunction> function_;
+};
+
+class WalledFunctionNode final : public WalledNode {
+ public:
+  WalledFunctionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement, const Box& domain)
+      : WalledNode(placement, domain), function_(std::move(function)) {
+    box = placedBox(function_->source().box, placement);
+    hasGradients = function_->hasGradients();
+    bytes = function_->bytes();
+  }
+
+ private:
+  void evaluateInDomain(std::span<const Vector3> points, const Samples& out) const override {
+    evaluateFunction(*function_, points, out);
   }
 
   std::shared_ptr<const DistanceFunction> function_;
@@ -344,7 +384,8 @@ NodePtr fieldNode(std::shared_ptr<const Field> field, const Similarity& placemen
   return std::make_unique<FieldNode>(std::move(field), placement);
 }
 
-NodePtr functionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement) {
+NodePtr functionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement, const Box& domain) {
+  if (!domain.isEmpty()) return std::make_unique<WalledFunctionNode>(std::move(function), placement, domain);
   return std::make_unique<FunctionNode>(std::move(function), placement);
 }
 

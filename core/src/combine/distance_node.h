@@ -53,7 +53,10 @@ NodePtr meshNode(std::shared_ptr<const ExactDistance> distance);
 NodePtr booleanNode(std::vector<MeshSolid> solids, BooleanTree tree, const TriangleMesh& boundary);
 
 NodePtr fieldNode(std::shared_ptr<const Field> field, const Similarity& placement);
-NodePtr functionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement);
+
+/// The distance of a function. Where a domain is given, the function is known in it only, and the solid ends at its
+/// walls.
+NodePtr functionNode(std::shared_ptr<const DistanceFunction> function, const Similarity& placement, const Box& domain);
 
 /// A union or an intersection by values, sharp where the radius is 0.
 NodePtr uniteNode(std::vector<NodePtr> operands, double radius);

@@ -105,6 +105,12 @@ Expression::Expression(Field field) : Expression(combine::leafOf(std::move(field
 
 Expression::Expression(DistanceFunction distance) : Expression(combine::leafOf(std::move(distance), "function")) {}
 
+Expression Expression::within(const Box& domain, DistanceFunction distance) {
+  Node node = combine::leafOf(std::move(distance), "function");
+  node.domain = domain;
+  return Expression(std::move(node));
+}
+
 Expression Expression::named(std::string name, std::size_t column) {
   if (name.empty()) throw Error(ErrorKind::option, "", "the name of an operand is missing");
   Node node;

@@ -339,6 +339,12 @@ std::size_t GridDistance::bytes() const {
   return samples_->blocks.size() * sizeof(SampledBlocks::Block) + (beyond_ ? beyond_->bytes() : 0);
 }
 
+Box GridDistance::domain() const {
+  if (!samples_->points) return {};
+  const auto& [x, y, z] = *samples_->points;
+  return Box(samples_->origin, samples_->origin + Vector3(x - 1, y - 1, z - 1).cwiseProduct(samples_->spacing));
+}
+
 InterpolationError GridDistance::interpolationError() const {
   const double near = kNearSpacings * samples_->spacing.maxCoeff();
   detail::Sums sums;

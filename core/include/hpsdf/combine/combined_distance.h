@@ -27,9 +27,9 @@ namespace hpsdf {
 /// * a closed mesh is exact everywhere; an open one, whose holes the winding number closes, is a bound, and so is one
 ///   upon which `InsideTest::pseudonormal` is forced;
 /// * a distance function is exact, unless its source says otherwise; a field is a bound, up to its own error, and ends
-/// at
-///   the walls of its domain. At distance d outside the domain, it has the value √(d² + f²), which no distance to a
-///   surface in the domain is below; f is its value at the domain's nearest point, or 0 if that is inside;
+///   at the walls of its domain, as a function does that `Expression::within` restricts to a box. At distance d outside
+///   the domain, it has the value √(d² + f²), which no distance to a surface in the domain is below; f is its value at
+///   the domain's nearest point, or 0 if that is inside;
 /// * a union is exact outside if its operands are, an intersection inside; a difference is an intersection;
 /// * an offset is exact outside if it is above 0, and inside if below 0, provided that its operand is exact there;
 /// * a shell is exact outside its wall if its operand is exact everywhere;

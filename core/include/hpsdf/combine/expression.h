@@ -43,6 +43,7 @@ class Expression {
     std::vector<double> numbers = {};
     ShellSide side = ShellSide::centred;  ///< of a shell
     Operand operand = {};                 ///< of a leaf
+    Box domain = {};                      ///< of a function that is known in a box only; otherwise empty
     std::string name = {};                ///< of a leaf, for messages and metadata
     std::size_t column = 0;               ///< of a leaf in the text that it was read from, from 1; 0 if there is none
     int depth = 1;
@@ -52,6 +53,11 @@ class Expression {
   Expression(TriangleMesh mesh);          // NOLINT: implicit on purpose
   Expression(Field field);                // NOLINT: implicit on purpose
   Expression(DistanceFunction distance);  // NOLINT: implicit on purpose
+
+  /// Returns a leaf with the distance of a solid that is known in a box only, such as one that a grid holds. As a field
+  /// does, the solid ends at the walls of this domain, and none of its values counts as exact. An empty box stands for
+  /// all of space.
+  static Expression within(const Box& domain, DistanceFunction distance);
 
   /// Returns a leaf with a name that `withOperands` replaces by a solid. Throws `Error` for an empty name.
   static Expression named(std::string name, std::size_t column = 0);

@@ -66,6 +66,9 @@ class GridDistance {
   const Source& source() const;
   std::size_t bytes() const;  ///< memory of the samples and of the other distance
 
+  /// Returns the box that a grid fills, or an empty one for `SampledBlocks`, whose distance is known everywhere.
+  Box domain() const;
+
   /// Estimates the error of the interpolation at the samples within three spacings of the surface: half of the
   /// difference between a sample and the interpolation of its neighbours at the distance of one and three spacings
   /// along an axis, the axis with the greatest difference. Leaving samples out doubles the spacing, which makes the
