@@ -114,6 +114,25 @@ TEST_F(Combine, takesTheOptionsOfBuild) {
   EXPECT_THAT(tolerance.out, HasSubstr("tolerance: "));
 }
 
+TEST_F(Combine, fieldsAreVerifiedByTheirExpression) {
+  const std::string expression = "union(builtin:box, move(builtin:torus, 0.3, 0, 0))";
+  for (const bool normalizes : {false, true}) {
+    ASSERT_EQ(
+        combine(expression, normalizes ? std::vector<std::string>{"--normalize"} : std::vector<std::string>{}).status,
+        0);
+    const Outcome outcome = run({{"verify", at("c.hpsdf"), "union( builtin:box,move(builtin:torus,0.3,0,0))",
+                                  "--max-error", "0.3", "--points", "2000", "--script", at("worst.hpsdfs")}});
+    EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("against union("));
+  }
+  fs::remove(at("worst.hpsdfs"));
+  expectRefused({{"verify", at("c.hpsdf")}}, "as an expression with the paths of its files: '" + expression + "'",
+                {"c.hpsdf"});
+  expectRefused({{"verify", at("c.hpsdf"), "union(builtin:box, builtin:torus)"}}, "not from union(", {"c.hpsdf"});
+  expectRefused({{"verify", at("c.hpsdf"), "offset(builtin:box, 1)"}}, "only Boolean expressions of closed meshes",
+                {"c.hpsdf"});
+}
+
 TEST_F(Combine, takesGridsAsOperands) {
   ASSERT_EQ(run({{"export", field(), "-o", at("grid.vti"), "--resolution", "40"}}).status, 0);
   const Outcome outcome = combine("move(" + at("grid.vti") + ", 5, 0, 0)");

@@ -348,7 +348,8 @@ many random points of faces; and the worst points, one of each cell. Lengths are
 gives the same figures for any number of threads.
 
 Use it to judge a field, or with limits (--max-…) in automated tests: where a limit is exceeded, all figures are
-written, the last line names the limit, and the exit status is 1. A mesh from which the field was not made is refused.
+written, the last line names the limit, and the exit status is 1. A mesh from which the field was not made is refused. For a field of 'hpsdf combine', MESH is its
+expression, if that is a Boolean one of closed meshes.
 
 Signs between the surface and the field's zero level are always wrong. Only wrong signs farther from the surface than
 the sign bound are defects; --max-mismatches counts these.)"),

@@ -4,11 +4,15 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
+#include "construction/operands.h"
 #include "construction/surface.h"
+#include "hpsdf/combine/combined_distance.h"
 #include "hpsdf/detail/crossings.h"
 #include "hpsdf/shapes.h"
 
@@ -77,6 +81,44 @@ ReferenceSurface meshReference(const Console& console, PreparedSurface&& prepare
   return reference;
 }
 
+/// Returns true for the text of an expression of solids, such as union(a.obj, b.obj).
+bool isExpression(const std::string& surface) {
+  std::error_code missing;
+  if (surface.find('(') == std::string::npos || std::filesystem::exists(surface, missing)) return false;
+  return parseExpression(surface).node().operation != Operation::operand;
+}
+
+CombinedDistance combinedDistance(const Console& console, const std::string& expression, const Source& source) {
+  const Expression loaded = withLoadedOperands(console, parseExpression(expression), source.insideTest);
+  return withProgress(
+      console, [&](const Progress& progress) { return CombinedDistance(loaded, distanceOptions(source), progress); });
+}
+
+/// Returns the distance in the units of a field that was made from `source`.
+DistanceFunction inUnitsOf(const Source& source, const DistanceFunction& distance) {
+  return source.normalization.isIdentity() ? distance : normalizedFunction(distance);
+}
+
+ReferenceSurface combinedReference(const Console& console, const std::string& expression, const Source& source) {
+  const CombinedDistance combined = combinedDistance(console, expression, source);
+  if (combined.boundary() == nullptr)
+    throw Error(
+        "a field is measured at triangles, which only Boolean expressions of closed meshes have; "
+        "'hpsdf combine' prints the errors of all fields that it builds");
+  ReferenceSurface reference;
+  reference.distance = std::make_shared<const DistanceFunction>(inUnitsOf(source, CombinedDistance(combined)));
+  const Normalization to = reference.distance->source().normalization;
+  reference.mesh = *combined.boundary();
+  for (Vector3& vertex : reference.mesh.vertices) vertex = to.scale * (vertex - to.center);
+  reference.normal = [distance = reference.distance](const Vector3& x, double) {
+    double value = 0;
+    Vector3 gradient;
+    distance->withGradients({&x, 1}, {&value, 1}, {&gradient, 1});
+    return gradient;
+  };
+  return reference;
+}
+
 }  // namespace
 
 bool isMadeFrom(const Source& candidate, const Source& source) {
@@ -85,6 +127,11 @@ bool isMadeFrom(const Source& candidate, const Source& source) {
 
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {
+    if (isExpression(surface)) {
+      ReferenceSurface reference = combinedReference(console, surface, source);
+      reference.fieldIsMadeFromIt = isMadeFrom(reference.distance->source(), source);
+      return reference;
+    }
     if (isGridName(surface))
       throw Error("a grid has no mesh, at which fields are measured; give the mesh from which the grid was made");
     PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
@@ -98,6 +145,11 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source) {
   return namingSurface(surface, [&] {
+    if (isExpression(surface)) {
+      const DistanceFunction combined = inUnitsOf(source, combinedDistance(console, surface, source));
+      warnIfForeign(console, surface, combined.source(), source);
+      return std::make_shared<const DistanceFunction>(combined);
+    }
     const PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
     auto exact = distanceTo(console, surface, prepared, distanceOptions(source));
     warnIfForeign(console, surface, exact->source(), source);

@@ -13,13 +13,14 @@
 namespace hpsdf::app {
 
 /// A surface against which a field is measured, in the units of the field. For an analytic shape, `mesh` is
-/// the mesh of the built-in shape of the same name, which differs only slightly from the analytic shape.
+/// the mesh of the built-in shape of the same name, which differs only slightly from the analytic shape. For an
+/// expression it is the boundary.
 struct ReferenceSurface {
   std::shared_ptr<const DistanceFunction> distance;
   std::function<Vector3(const Vector3& x, double signedDistance)> normal;  ///< returns ∇Φ at x, or zero if unknown
-  std::function<ClosestPoint(const Vector3& x)> closest;                   ///< empty for an analytic shape
+  std::function<ClosestPoint(const Vector3& x)> closest;                   ///< set for a mesh only
   TriangleMesh mesh;
-  std::optional<MeshReport> report;  ///< empty for an analytic shape
+  std::optional<MeshReport> report;  ///< set for a mesh only
   bool fieldIsMadeFromIt = false;
 };
 
@@ -27,11 +28,11 @@ struct ReferenceSurface {
 /// fingerprints, analytic shapes by their names.
 bool isMadeFrom(const Source& candidate, const Source& source);
 
-/// Loads a mesh file or a shape and converts it to the units of a field that was made from `source`. Throws `Error`
-/// naming `surface`.
+/// Loads a mesh file, a shape or a Boolean expression of closed meshes and converts it to the units of a field that was
+/// made from `source`. Throws `Error` naming `surface`.
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source);
 
-/// Returns the exact distance of a mesh file or a shape, in the units of a field that was made from `source`.
+/// Returns the distance of a mesh file, a shape or an expression, in the units of a field that was made from `source`.
 /// Warns if the field was made from another surface. Throws `Error` naming `surface`.
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source);

@@ -12,7 +12,8 @@ namespace hpsdf::app {
 Parameter surfaceParameter() {
   return {
       "mesh", text("MESH").positional(),
-      "The surface from which the field was made: a mesh file, builtin:SHAPE or analytic:SHAPE. It may be left out "
+      "The surface from which the field was made: a mesh file, builtin:SHAPE or analytic:SHAPE, or the expression of "
+      "'hpsdf combine' in quotes. It may be left out "
       "where the field was made from a built-in or analytic shape, or where the mesh lies beside the field or in the "
       "current folder under its name."};
 }
@@ -39,6 +40,11 @@ static std::string knownSurface(const CurrentField& current) {
 std::string surfaceOf(const CurrentField& current, const char* asked) {
   if (std::string known = knownSurface(current); !known.empty()) return known;
   const std::string& source = current.field.metadata().source.name;
+  if (current.field.metadata().source.exactness)
+    throw Error(
+        fmt::format("{}: this needs the solids that it was made from; give {} as an expression with the paths of "
+                    "its files: '{}'",
+                    current.name, asked, source));
   throw Error(fmt::format("{}: this needs the mesh that it was made from; give {}{}", current.name, asked,
                           source.empty() ? "" : ", " + source));
 }
@@ -48,9 +54,10 @@ bool findsSurface(const CurrentField& current) { return !knownSurface(current).e
 void refuseForeign(const CurrentField& current, const ReferenceSurface& reference, const std::string& surface,
                    std::string_view otherwise) {
   if (reference.fieldIsMadeFromIt) return;
-  const std::string& source = current.field.metadata().source.name;
-  throw Error(fmt::format("{} was made from {}, not from {}; give that mesh{}", current.name,
-                          source.empty() ? "something unknown" : source, surface, otherwise));
+  const Source& source = current.field.metadata().source;
+  throw Error(fmt::format("{} was made from {}, not from {}; give that{}{}", current.name,
+                          source.name.empty() ? "something unknown" : source.name, surface,
+                          source.exactness ? "" : " mesh", otherwise));
 }
 
 }  // namespace hpsdf::app
