@@ -116,6 +116,55 @@ TEST(GridDistance, takesAnotherDistanceWhereSamplesAreMissing) {
   EXPECT_EQ(valuesOf(distance, {Vector3(1e300, 0, 0)})[0], 42);
 }
 
+TEST(GridDistance, passesContinuouslyIntoTheOtherDistance) {
+  const auto sphere = [](const Vector3& x) { return x.norm() - 0.3; };
+  SampledBlocks samples{.origin = Vector3::Zero(), .spacing = Vector3(0.05, 0.06, 0.055), .blocks = {}};
+  for (std::int32_t b = 0; b < 64; ++b) {
+    SampledBlocks::Block block{.index = {b % 4 - 2, b / 4 % 4 - 2, b / 16 - 2}, .values = {}};
+    for (int n = 0; n < 512; ++n) {
+      const Vector3 index(8 * block.index[0] + n % 8, 8 * block.index[1] + n / 8 % 8, 8 * block.index[2] + n / 64);
+      const double value = sphere(index.cwiseProduct(samples.spacing));
+      block.values[n] = std::abs(value) < 0.25 ? value : std::nan("");
+    }
+    samples.blocks.push_back(block);
+  }
+  struct Other {
+    void operator()(std::span<const Vector3> points, std::span<double> out) const {
+      for (std::size_t i = 0; i < points.size(); ++i) out[i] = points[i].norm() - 0.2;
+    }
+    bool hasGradients() const { return true; }
+    void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const {
+      (*this)(points, out);
+      for (std::size_t i = 0; i < points.size(); ++i) gradients[i] = points[i].normalized();
+    }
+  };
+  const GridDistance distance(samples, DistanceFunction(Other()));
+  // From the sphere outward, the distance passes from that of the samples to the other one, which is greater by 0.1.
+  constexpr double kStep = 1e-4;
+  int mixed = 0;
+  for (const Vector3& to : randomPoints(Box(Vector3::Constant(-1), Vector3::Constant(1)), 50)) {
+    std::vector<Vector3> points;
+    for (double r = 0.29; r < 0.8; r += kStep) points.push_back(r * to.normalized());
+    std::vector<double> values(points.size());
+    std::vector<Vector3> gradients(points.size());
+    distance.withGradients(points, values, gradients);
+    EXPECT_EQ(values, valuesOf(distance, points));
+    EXPECT_NEAR(values.front(), -0.01, 0.01);
+    EXPECT_NEAR(values.back(), 0.6, 0.01);
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      ASSERT_NEAR(values[i] - values[i - 1], kStep, 5 * kStep);
+      const double share = (points[i].norm() - 0.2) - values[i];
+      if (share < 0.01 || share > 0.09) continue;
+      ++mixed;
+      constexpr double kLittle = 1e-7;
+      const Vector3 step = kLittle * to.normalized();
+      const std::vector<double> beside = valuesOf(distance, {points[i] - step, points[i] + step});
+      EXPECT_NEAR(gradients[i].dot(to.normalized()), (beside[1] - beside[0]) / (2 * kLittle), 1e-3) << i;
+    }
+  }
+  EXPECT_GT(mixed, 1000);
+}
+
 TEST(GridDistance, refusesGridsWithoutSurfaceOrWithBadNumbers) {
   EXPECT_THROW(GridDistance(gridOf(kLayout, [](const Vector3&) { return 1.0; })), Error);
   EXPECT_THROW(GridDistance(gridOf(kLayout, [](const Vector3& x) { return x.x() > 0 ? std::nan("") : -1.0; })), Error);

@@ -1,6 +1,7 @@
 #include "hpsdf/input/grid_distance.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -84,6 +85,40 @@ struct GridDistance::Samples {
     return block == nullptr ? kNoSample : block->values[numberInBlock(index)];
   }
 
+  /// Finds the samples that have all samples within two steps around them, so that each cell beside them has all
+  /// samples of its interpolation.
+  void findSurrounded() {
+    surrounded_.resize(blocks.size());
+    detail::forEachChunk(blocks.size(), 1, [&](std::size_t n, std::size_t, std::size_t) {
+      surrounded_[n] = surroundedIn(blocks[n].index);
+    });
+  }
+
+  /// Returns how much the interpolation counts at x, in units of samples, against the other distance: 1 in cells whose
+  /// corners are surrounded by samples, 0 where a sample of the interpolation is missing, and trilinear in between, so
+  /// that the distance does not jump. `gradient` is with respect to the index.
+  double shareAt(const Vector3& x, Vector3& gradient) const {
+    gradient.setZero();
+    if (points) return 1;
+    const Vector3 low = x.array().floor(), t = x - low;
+    const SampleIndex first = {std::int32_t(low[0]), std::int32_t(low[1]), std::int32_t(low[2])};
+    double share = 0;
+    int corners = 0;
+    for (int n = 0; n < 8; ++n) {
+      const std::array<int, 3> upper = {n & 1, n >> 1 & 1, n >> 2};
+      if (!isSurrounded({first[0] + upper[0], first[1] + upper[1], first[2] + upper[2]})) continue;
+      ++corners;
+      std::array<double, 3> weight;
+      for (int axis = 0; axis < 3; ++axis) weight[axis] = upper[axis] == 1 ? t[axis] : 1 - t[axis];
+      share += weight[0] * weight[1] * weight[2];
+      for (int axis = 0; axis < 3; ++axis)
+        gradient[axis] += (upper[axis] == 1 ? 1 : -1) * weight[(axis + 1) % 3] * weight[(axis + 2) % 3];
+    }
+    if (corners < 8) return share;
+    gradient.setZero();
+    return 1;
+  }
+
   /// Copies the 4³ samples from `first` on. Returns false if one of them is missing.
   bool copyStencil(const SampleIndex& first, std::array<double, 64>& out) const {
     // The stencil meets up to two blocks along each axis.
@@ -141,15 +176,18 @@ struct GridDistance::Samples {
     return true;
   }
 
-  /// Evaluates the distance and, if it is asked for, its gradient at a point in world units, or returns false.
+  /// Evaluates the distance and, if it is asked for, its gradient at a point in world units. Returns how much it counts
+  /// against the other distance, with the gradient of this share.
   template <bool WithGradient>
-  bool evaluate(const Vector3& point, double& value, Vector3& gradient) const {
+  double evaluate(const Vector3& point, double& value, Vector3& gradient, Vector3& shareGradient) const {
     const Vector3 wanted = (point - origin).cwiseQuotient(spacing), x = clamped(wanted);
-    if (!x.allFinite() || !(x.cwiseAbs().maxCoeff() < double(grids::kMostPointsOfAxis))) return false;
-    if (!interpolate<WithGradient>(x, value, gradient)) return false;
+    if (!x.allFinite() || !(x.cwiseAbs().maxCoeff() < double(grids::kMostPointsOfAxis))) return 0;
+    const double share = shareAt(x, shareGradient);
+    if (share == 0 || !interpolate<WithGradient>(x, value, gradient)) return 0;
+    shareGradient = shareGradient.cwiseQuotient(spacing);
     gradient = gradient.cwiseQuotient(spacing);
     continueBeyond((wanted - x).cwiseProduct(spacing), value, gradient);
-    return true;
+    return share;
   }
 
  private:
@@ -176,7 +214,39 @@ struct GridDistance::Samples {
     return key;
   }
 
+  using Flags = std::bitset<std::size_t{kBlock} * kBlock * kBlock>;
+
+  bool isSurrounded(const SampleIndex& index) const {
+    const auto found = places_.find(keyOf(blockOf(index)));
+    return found != places_.end() && surrounded_[found->second][numberInBlock(index)];
+  }
+
+  /// Returns which samples of a block have all samples within two steps around them. Erodes the samples that exist
+  /// along one axis after the other.
+  Flags surroundedIn(const SampleIndex& block) const {
+    constexpr int kReach = 2, kEdge = kBlock + 2 * kReach;
+    const auto number = [](int x, int y, int z) { return std::size_t((z * kEdge + y) * kEdge + x); };
+    std::array<char, std::size_t{kEdge} * kEdge * kEdge> exists;
+    for (int z = 0; z < kEdge; ++z)
+      for (int y = 0; y < kEdge; ++y)
+        for (int x = 0; x < kEdge; ++x)
+          exists[number(x, y, z)] = !std::isnan(
+              at({kBlock * block[0] + x - kReach, kBlock * block[1] + y - kReach, kBlock * block[2] + z - kReach}));
+    for (const std::size_t step : {number(1, 0, 0), number(0, 1, 0), number(0, 0, 1)}) {
+      const auto before = exists;
+      for (std::size_t n = kReach * step; n + kReach * step < exists.size(); ++n)
+        exists[n] = before[n - 2 * step] && before[n - step] && before[n] && before[n + step] && before[n + 2 * step];
+    }
+    Flags surrounded;
+    for (int z = 0; z < kBlock; ++z)
+      for (int y = 0; y < kBlock; ++y)
+        for (int x = 0; x < kBlock; ++x)
+          surrounded[numberInBlock({x, y, z})] = exists[number(x + kReach, y + kReach, z + kReach)] != 0;
+    return surrounded;
+  }
+
   std::unordered_map<std::uint64_t, std::size_t> places_;
+  std::vector<Flags> surrounded_;  ///< for each block; empty for a grid that fills a box
 };
 
 namespace {
@@ -276,18 +346,30 @@ Source sourceOf(const GridDistance::Samples& samples, Source source) {
   return source;
 }
 
-/// Asks the other distance for all points without samples at once. Without another distance, they get NaN.
+/// A point at which the interpolation counts by a share below 1.
+struct SharedPoint {
+  std::size_t number;
+  double share;
+  Vector3 shareGradient;
+};
+
+/// Asks the other distance for all points at which the interpolation does not count alone, and adds its share. Without
+/// another distance, they get NaN.
 template <bool WithGradients>
-void evaluateBeyond(const std::optional<DistanceFunction>& beyond, std::span<const Vector3> points,
-                    std::span<const std::size_t> missing, std::span<double> out, std::span<Vector3> gradients) {
+void addBeyond(const std::optional<DistanceFunction>& beyond, std::span<const Vector3> points,
+               std::span<const SharedPoint> missing, std::span<double> out, std::span<Vector3> gradients) {
   std::vector<Vector3> others(missing.size()), otherGradients(missing.size(), Vector3::Constant(kNoSample));
   std::vector<double> values(missing.size(), kNoSample);
-  for (std::size_t n = 0; n < missing.size(); ++n) others[n] = points[missing[n]];
+  for (std::size_t n = 0; n < missing.size(); ++n) others[n] = points[missing[n].number];
   if (beyond && WithGradients) beyond->withGradients(others, values, otherGradients);
   if (beyond && !WithGradients) (*beyond)(others, values);
   for (std::size_t n = 0; n < missing.size(); ++n) {
-    out[missing[n]] = values[n];
-    if constexpr (WithGradients) gradients[missing[n]] = otherGradients[n];
+    const auto& [number, share, shareGradient] = missing[n];
+    if constexpr (WithGradients)
+      gradients[number] = share == 0 ? otherGradients[n]
+                                     : Vector3(share * gradients[number] + (1 - share) * otherGradients[n] +
+                                               (out[number] - values[n]) * shareGradient);
+    out[number] = share == 0 ? values[n] : share * out[number] + (1 - share) * values[n];
   }
 }
 
@@ -306,6 +388,7 @@ GridDistance::GridDistance(const RegularGrid& grid, Source source) {
 GridDistance::GridDistance(SampledBlocks samples, DistanceFunction beyond, Source source) : beyond_(std::move(beyond)) {
   auto own = std::make_shared<Samples>(samples.origin, samples.spacing);
   own->fill(std::move(samples.blocks));
+  own->findSurrounded();
   source_ = sourceOf(*own, std::move(source));
   samples_ = std::move(own);
 }
@@ -313,13 +396,14 @@ GridDistance::GridDistance(SampledBlocks samples, DistanceFunction beyond, Sourc
 template <bool WithGradients>
 void GridDistance::evaluate(std::span<const Vector3> points, std::span<double> out,
                             std::span<Vector3> gradients) const {
-  std::vector<std::size_t> missing;
-  Vector3 gradient = Vector3::Zero();
+  std::vector<SharedPoint> missing;
+  Vector3 gradient = Vector3::Zero(), shareGradient = Vector3::Zero();
   for (std::size_t n = 0; n < points.size(); ++n) {
-    if (!samples_->evaluate<WithGradients>(points[n], out[n], gradient)) missing.push_back(n);
+    const double share = samples_->evaluate<WithGradients>(points[n], out[n], gradient, shareGradient);
+    if (share < 1) missing.push_back({n, share, shareGradient});
     if constexpr (WithGradients) gradients[n] = gradient;
   }
-  if (!missing.empty()) evaluateBeyond<WithGradients>(beyond_, points, missing, out, gradients);
+  if (!missing.empty()) addBeyond<WithGradients>(beyond_, points, missing, out, gradients);
 }
 
 void GridDistance::operator()(std::span<const Vector3> points, std::span<double> out) const {

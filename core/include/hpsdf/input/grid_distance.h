@@ -45,7 +45,8 @@ struct InterpolationError {
 /// a = −1/2). It has the value of each sample, its gradient is continuous, and it reproduces quadratic polynomials.
 ///
 /// Beyond a grid that fills a box, the distance is continued as fields are: f(q) + |x − q| with the closest point q of
-/// the box. Where samples of `SampledBlocks` are missing, another distance takes their place.
+/// the box. Where samples of `SampledBlocks` are missing, another distance takes their place; over the last cell before
+/// them, the interpolation passes into it continuously.
 ///
 /// Copies share the samples. All queries are const and thread-safe.
 class GridDistance {
@@ -54,8 +55,8 @@ class GridDistance {
   /// axis, or if no two neighbouring values have different signs, so that there is no surface.
   explicit GridDistance(const RegularGrid& grid, Source source = {});
 
-  /// Takes samples near a surface, and the distance `beyond` for points with fewer than 4 × 4 × 4 samples around them.
-  /// Throws `Error` if there is no surface.
+  /// Takes samples near a surface, and the distance `beyond` for points beside which a sample has fewer than 5 × 5 × 5
+  /// samples around it. Throws `Error` if there is no surface.
   GridDistance(SampledBlocks samples, DistanceFunction beyond, Source source = {});
 
   void operator()(std::span<const Vector3> points, std::span<double> out) const;
