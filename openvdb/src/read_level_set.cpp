@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <limits>
@@ -80,11 +81,20 @@ void requireVoxelMemory(const Grid& grid) {
   requireSampleMemory(voxels / Leaf::NUM_VALUES + double(grid.tree().leafCount()));
 }
 
+/// Throws `Error` for a grid with a value that is not finite.
+void requireFiniteValues(const Grid& grid, const fs::path& file) {
+  if (!std::isfinite(grid.background())) refuseFile(file, "the background of the level set is not a finite number");
+  for (auto value = grid.cbeginValueAll(); value; ++value)
+    if (!std::isfinite(*value))
+      refuseFile(file, "the level set has a value that is not a finite number; repair it or write it again");
+}
+
 Grid::Ptr levelSetOf(const fs::path& file) {
   const openvdb::GridPtrVecPtr grids = readGrids(file);
   for (const openvdb::GridBase::Ptr& grid : *grids)
     if (Grid::Ptr found = asLevelSet(grid)) {
       requireVoxelMemory(*found);
+      requireFiniteValues(*found, file);
       return found;
     }
   refuseFile(file, "the file holds no level set of floats or doubles");
@@ -111,14 +121,34 @@ std::pair<Vector3, Vector3> originAndSpacing(const Grid& grid, const fs::path& f
   return {origin, spacing};
 }
 
-/// Returns a mesh of the level set's surface, with triangles that face outward.
-TriangleMesh surfaceMesh(const Grid& grid, const std::string& name) {
+/// Throws `Error` for a grid so far from the origin, or with so great coordinates, that rounding spoils its voxels.
+void requireUsablePlacement(const Grid& grid, const Vector3& origin, const Vector3& spacing, const fs::path& file) {
+  constexpr double kLeastShare = 0x1p-40;  // of the coordinates; less is a few thousand times their rounding
+  const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  if (box.empty()) refuseFile(file, "the level set has no surface");
+  for (const openvdb::Coord& corner : {box.min(), box.max()}) {
+    const Vector3 at = origin + Vector3(corner.x(), corner.y(), corner.z()).cwiseProduct(spacing);
+    const double farthest = at.cwiseAbs().maxCoeff();
+    if (!(farthest <= kLargestCoordinate) || spacing.minCoeff() < kLeastShare * farthest)
+      refuseFile(file, "the grid is so far from the origin, compared with its voxels, that rounding spoils them");
+  }
+}
+
+/// Returns a mesh of the level set's surface, with triangles that face outward. OpenVDB makes it in single precision;
+/// therefore it is made in units of voxels, from a corner of the level set.
+TriangleMesh surfaceMesh(Grid& grid, const Vector3& origin, const Vector3& spacing, const std::string& name) {
+  const openvdb::Coord first = grid.evalActiveVoxelBoundingBox().min();
+  const Grid::Ptr inVoxels = grid.copy();  // shares the voxels
+  inVoxels->setTransform(openvdb::math::Transform::createLinearTransform());
+  inVoxels->transform().postTranslate(-first.asVec3d());
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec4I> quads;
-  openvdb::tools::volumeToMesh(grid, points, quads);
+  openvdb::tools::volumeToMesh(*inVoxels, points, quads);
   TriangleMesh mesh;
   mesh.name = name;
-  for (const openvdb::Vec3s& p : points) mesh.vertices.emplace_back(p.x(), p.y(), p.z());
+  const Vector3 corner = origin + Vector3(first.x(), first.y(), first.z()).cwiseProduct(spacing);
+  for (const openvdb::Vec3s& p : points)
+    mesh.vertices.push_back(corner + Vector3(p.x(), p.y(), p.z()).cwiseProduct(spacing));
   for (const openvdb::Vec4I& q : quads) {
     mesh.triangles.push_back({q[0], q[2], q[1]});
     mesh.triangles.push_back({q[0], q[3], q[2]});
@@ -181,7 +211,8 @@ GridDistance loadVdb(const fs::path& file, int threads, const Progress& progress
     progress.update("reading", 0);
     const Grid::Ptr levelSet = levelSetOf(file);
     const auto [origin, spacing] = originAndSpacing(*levelSet, file);
-    const TriangleMesh mesh = surfaceMesh(*levelSet, file.filename().string());
+    requireUsablePlacement(*levelSet, origin, spacing, file);
+    const TriangleMesh mesh = surfaceMesh(*levelSet, origin, spacing, file.filename().string());
     if (mesh.triangles.empty()) refuseFile(file, "the level set has no surface");
     const DistanceFunction beyond(ExactDistance(mesh, {.threads = threads}, progress));
     return GridDistance(samplesOf(*levelSet, origin, spacing, beyond), beyond, {.name = file.filename().string()});

@@ -8,6 +8,7 @@
 #include <openvdb/tools/LevelSetSphere.h>
 #include <openvdb/tools/MeshToVolume.h>
 
+#include <cmath>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -109,6 +110,36 @@ TEST_F(ReadLevelSet, refusesGridsThatItCannotUse) {
 }
 
 /// An active tile takes a few bytes of the file, and 4096³ voxels where it is divided.
+TEST_F(ReadLevelSet, refusesValuesThatAreNotFinite) {
+  for (const float bad : {std::nanf(""), HUGE_VALF}) {
+    const openvdb::FloatGrid::Ptr grid = sphere();
+    grid->tree().beginValueOn().setValue(bad);
+    expectRefused(write(grid), "a value that is not a finite number");
+    const openvdb::FloatGrid::Ptr background = openvdb::FloatGrid::create(bad);
+    background->setGridClass(openvdb::GRID_LEVEL_SET);
+    expectRefused(write(background), "the background of the level set is not a finite number");
+  }
+}
+
+TEST_F(ReadLevelSet, isAccurateFarFromTheOrigin) {
+  const Vector3 shift(1e6, -2e6, 3e5);
+  const openvdb::FloatGrid::Ptr grid = sphere();
+  grid->transform().postTranslate(openvdb::Vec3d(shift.x(), shift.y(), shift.z()));
+  const DistanceFunction distance = vdb::loadVdb(write(grid));
+  for (const Vector3& direction : {Vector3(1, 0, 0), Vector3(0, 0.6, 0.8), Vector3(-0.6, 0, 0.8)})
+    for (const double radius : {0.1, kRadius, 1.5}) {
+      const Vector3 x = kCenter + shift + radius * direction;
+      double value = 0;
+      distance({&x, 1}, {&value, 1});
+      EXPECT_NEAR(value, radius - kRadius, 2e-3) << radius;
+    }
+  grid->transform().postTranslate(openvdb::Vec3d(1e12, 0, 0));
+  expectRefused(write(grid), "that rounding spoils them");
+  const openvdb::FloatGrid::Ptr vast = sphere();
+  vast->setTransform(openvdb::math::Transform::createLinearTransform(1e100));
+  expectRefused(write(vast), "that rounding spoils them");
+}
+
 TEST_F(ReadLevelSet, refusesTilesThatMemoryCannotHold) {
   const auto grid = sphere();
   grid->tree().addTile(3, openvdb::Coord(1 << 14, 0, 0), 0.1f, true);
