@@ -36,11 +36,18 @@ static_assert(Leaf::DIM == kLeafEdge);
   throw Error(ErrorKind::file, file.string(), problem);
 }
 
-/// Throws `Error` if the file is missing or does not begin as OpenVDB files do.
-void requireVdbFile(const fs::path& file, std::ifstream& stream) {
+/// Throws `Error` unless the file can be opened: reading a pipe, for instance, would wait without end.
+void requireRegularFile(const fs::path& file) {
   std::error_code error;
-  if (!fs::exists(file, error)) refuseFile(file, "no such file");
-  if (!fs::is_regular_file(file, error) || !stream) refuseFile(file, "the file cannot be read");
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) refuseFile(file, "no such file; check the path");
+  if (fs::is_directory(status)) refuseFile(file, "a directory, not a file; name a file in it");
+  if (!fs::is_regular_file(status)) refuseFile(file, "not a regular file; name one");
+}
+
+/// Throws `Error` if the file cannot be read or does not begin as OpenVDB files do.
+void requireVdbFile(const fs::path& file, std::ifstream& stream) {
+  if (!stream) refuseFile(file, "cannot be read; check its permissions");
   constexpr char kMagic[8] = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
   char begin[8] = {};
   stream.read(begin, sizeof(begin));
@@ -51,6 +58,7 @@ void requireVdbFile(const fs::path& file, std::ifstream& stream) {
 
 /// Reads all grids of a file. A file that ends too early makes the stream throw.
 openvdb::GridPtrVecPtr readGrids(const fs::path& file) {
+  requireRegularFile(file);
   std::ifstream stream(file, std::ios::binary);
   requireVdbFile(file, stream);
   stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);

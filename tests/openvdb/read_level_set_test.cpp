@@ -7,6 +7,7 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <openvdb/tools/MeshToVolume.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <fstream>
@@ -154,7 +155,9 @@ TEST_F(ReadLevelSet, refusesTilesThatMemoryCannotHold) {
 
 TEST_F(ReadLevelSet, refusesForeignAndTruncatedFiles) {
   expectRefused(folder_ / "none.vdb", "no such file");
-  expectRefused(folder_.path(), "cannot be read");
+  expectRefused(folder_.path(), "a directory, not a file");
+  ASSERT_EQ(mkfifo((folder_ / "pipe.vdb").c_str(), 0600), 0);
+  expectRefused(folder_ / "pipe.vdb", "not a regular file");
   expectRefused(writeBytes(""), "no OpenVDB file");
   expectRefused(writeBytes("solid foreign\nendsolid\n"), "no OpenVDB file");
   const std::string whole = bytesOf(write(sphere()));
