@@ -178,6 +178,9 @@ TEST(GridDistance, refusesGridsWithoutSurfaceOrWithBadNumbers) {
     }
   };
   RegularGrid grid = gridOf(kLayout, quadratic);
+  grid.values[7] = 1e160;
+  EXPECT_THAT(refusal(grid), testing::HasSubstr("the value number 8 of the grid is not a finite number up to 1e100"));
+  grid.values[7] = 1;
   grid.values.pop_back();
   EXPECT_THAT(refusal(grid), testing::HasSubstr("with 2573 values"));
   EXPECT_THAT(refusal({.layout = {.points = {4, 4, 8'388'609}}, .values = {}, .gradients = {}}),

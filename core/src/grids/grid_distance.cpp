@@ -279,9 +279,10 @@ void requireUsableGrid(const RegularGrid& grid) {
   if (*std::ranges::min_element(points) < 4)
     detail::refuse("a grid of ", points[0], " x ", points[1], " x ", points[2],
                    " points; the interpolation needs four points or more along each axis");
-  const auto isBad = [](double value) { return !std::isfinite(value); };
+  const auto isBad = [](double value) { return !(std::abs(value) <= kLargestCoordinate); };
   if (const auto bad = std::ranges::find_if(grid.values, isBad); bad != grid.values.end())
-    detail::refuse("the value number ", bad - grid.values.begin() + 1, " of the grid is not finite");
+    detail::refuse("the value number ", bad - grid.values.begin() + 1,
+                   " of the grid is not a finite number up to 1e100");
   if (!(grid.layout.spacing.minCoeff() > 0) || !grid.layout.spacing.allFinite() || !grid.layout.origin.allFinite())
     detail::refuse("the spacing of the grid is not a positive length, or its origin is not finite");
   constexpr double kLeastShare = 0x1p-40;  // of the coordinates; less is a few thousand times their rounding
