@@ -1,4 +1,4 @@
-// Writes the binary files of the fuzzing corpus: fields of every kind, states of constructions, and raw
+// Writes the binary files of the fuzzing corpus: fields of every kind, states of constructions, grids, and raw
 // values. Usage: fuzz_seeds tests/fuzz/corpus
 #include <array>
 #include <cmath>
@@ -12,6 +12,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/output/grids.h"
 #include "hpsdf/verify.h"
 #include "target.h"
 
@@ -123,6 +124,42 @@ void writeTables(const fs::path& folder) {
   write(folder / "slice.pfm", "Pf\n3 2\n-1.0\n" + bytes);
 }
 
+void writeGrids(const fs::path& corpus) {
+  RegularGrid grid{.layout = {.points = {5, 4, 6}, .origin = Vector3(-1, 0, 2), .spacing = Vector3(0.5, 0.6, 0.4)},
+                   .values = {},
+                   .gradients = {}};
+  for (std::size_t n = 0; n < grid.layout.count(); ++n)
+    grid.values.push_back((grid.layout.position(n % 5, n / 5 % 4, n / 20) - grid.layout.box().center()).norm() - 0.7);
+  fs::create_directories(corpus / "grid_vti");
+  fs::create_directories(corpus / "grid_npy");
+  for (const NumberType type : {NumberType::float32, NumberType::float64}) {
+    const std::string name = type == NumberType::float32 ? "floats" : "doubles";
+    OutputFile vti(corpus / "grid_vti" / (name + ".vti")), npy(corpus / "grid_npy" / (name + ".npy"));
+    writeVti(grid, type, vti);
+    writeNpy(grid, type, npy);
+    vti.commit();
+    npy.commit();
+  }
+  std::string ascii, raw;
+  for (const double value : grid.values) {
+    const auto number = static_cast<float>(value);
+    ascii += std::to_string(number) + " ";
+    raw.append(reinterpret_cast<const char*>(&number), sizeof(number));
+  }
+  const auto image = [](const std::string& array, const std::string& appended) {
+    return "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\">\n<!-- a grid -->\n"
+           "<ImageData WholeExtent=\"0 4 0 3 0 5\" Origin=\"-1 0 2\" Spacing=\"0.5 0.6 0.4\">\n"
+           "<Piece Extent=\"0 4 0 3 0 5\">\n<PointData Scalars=\"d\">\n<DataArray type=\"Float32\" Name=\"d\" " +
+           array + "</PointData>\n</Piece>\n</ImageData>\n" + appended + "</VTKFile>\n";
+  };
+  write(corpus / "grid_vti" / "text.vti", image("format=\"ascii\">\n" + ascii + "\n</DataArray>\n", ""));
+  const auto bytes = static_cast<std::uint32_t>(raw.size());
+  const std::string size(reinterpret_cast<const char*>(&bytes), sizeof(bytes));
+  write(corpus / "grid_vti" / "appended.vti",
+        image("format=\"appended\" offset=\"0\"/>\n",
+              "<AppendedData encoding=\"raw\">_" + size + raw + "</AppendedData>\n"));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -134,4 +171,5 @@ int main(int argc, char** argv) {
   writeFields(corpus / "field_file");
   writeStates(corpus / "checkpoint");
   writeTables(corpus / "data_table");
+  writeGrids(corpus);
 }
