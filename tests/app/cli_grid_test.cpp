@@ -56,9 +56,9 @@ TEST_F(Grids, refuseWhatHasNoEffectOrDoesNotFit) {
 TEST_F(Grids, ofFormatsThatAreOnlyWrittenAreRefused) {
   for (const std::string name : {"x.vtu", "x.nvdb", "x.CDF"}) {
     writeFile(at(name), "grid");
-    for (const std::vector<std::string> words : {std::vector<std::string>{"build", at(name), "-o", at("x.hpsdf")},
-                                                 {"combine", "offset(" + at(name) + ", 1)", "-o", at("x.hpsdf")},
-                                                 {"query", "--closest", at(name), "0,0,0"}})
+    for (const std::vector<std::string>& words : {std::vector<std::string>{"build", at(name), "-o", at("x.hpsdf")},
+                                                  {"combine", "offset(" + at(name) + ", 1)", "-o", at("x.hpsdf")},
+                                                  {"query", "--closest", at(name), "0,0,0"}})
       expectRefused({words}, "the grids that it reads are .vdb, .vti and .npy", {name});
     fs::remove(at(name));
   }

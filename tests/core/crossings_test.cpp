@@ -17,6 +17,7 @@
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
 #include "support/test_mesh.h"
+#include "surface/crossings.h"
 #include "surface/exact_orientation.h"
 
 namespace hpsdf {
@@ -204,6 +205,24 @@ TEST(Crossings, doNotDependOnThreadsAndObeyTheLimit) {
     EXPECT_EQ(some, trianglesOf(3, limit));
     EXPECT_EQ(some.size(), limit);
     EXPECT_TRUE(std::ranges::includes(all, some));
+  }
+}
+
+TEST(Crossings, ofChosenTrianglesAreThoseWithOneOfThem) {
+  const TriangleMesh mesh = lens();
+  const Crossings all = findCrossings(mesh);
+  std::mt19937 random(11);
+  for (const int share : {0, 3, 40, 100}) {  // percent
+    std::vector<bool> chosen(mesh.triangles.size());
+    for (std::size_t i = 0; i < chosen.size(); ++i) chosen[i] = static_cast<int>(random() % 100) < share;
+    std::vector<std::array<std::uint32_t, 2>> expected, found;
+    for (const auto& [triangles, point] : all.found)
+      if (chosen[triangles[0]] || chosen[triangles[1]]) expected.push_back(triangles);
+    const Crossings some = surface::findCrossingsOf(mesh, chosen, kMaxCrossings, {});
+    for (const Crossing& crossing : some.found) found.push_back(crossing.triangles);
+    EXPECT_EQ(found, expected) << share;
+    EXPECT_TRUE(some.complete);
+    EXPECT_EQ(surface::findCrossingsOf(mesh, chosen, 5, {}).complete, expected.size() <= 5);
   }
 }
 

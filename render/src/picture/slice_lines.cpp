@@ -15,17 +15,17 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr int kBlock = 8;  // pixels along each side of a block in which an outline is searched
-constexpr Color kCasing = {16, 14, 34};
-constexpr float kCasingStrength = 0.8F;
+constexpr int kOutlineBlock = 8;  // pixels along each side of a block in which an outline is searched
+constexpr Color kOutlineCasing = {16, 14, 34};
+constexpr float kOutlineCasingStrength = 0.8F;
 constexpr Color kMeshLine = {255, 0, 255};  // the colour of cracks, which no colour map contains
 // The following lengths are in multiples of the width of a thin line.
 constexpr double kOutlineWidth = 2.6;
-constexpr double kCasingBorder = 1.3;
+constexpr double kOutlineCasingBorder = 1.3;
 constexpr double kMeshLineWidth = 1.4;
 constexpr double kMeshDotRadius = 2.2;  // of the dots where the section of a mesh bends
 constexpr double kDottedLength = 14;    // lines of this length or more have dots at their ends
-constexpr double kDash = 8;             // length of a dash, and of the gap after it
+constexpr double kOutlineDash = 8;      // length of a dash, and of the gap after it
 constexpr double kLegendTitle = 2.7;    // height of the legend's title and of the gap below the rows, in ems
 constexpr double kOnSurface = 2;        // pixels between an outline and the field's surface up to which they agree
 
@@ -144,18 +144,21 @@ std::vector<FlatLine> outlineOf(const DistanceFunction& distance, const SliceVie
                                 int width, int height) {
   // The surface can meet only blocks whose middle is closer to it than their corners are to the middle.
   const double pixel = std::max(view.right.norm() / width, view.up.norm() / height);
-  const double reach = std::sqrt(2.0) * (kBlock / 2 + 1) * pixel;
-  const int columns = (part.width() + kBlock - 1) / kBlock, rows = (part.height() + kBlock - 1) / kBlock;
+  const double reach = std::sqrt(2.0) * (kOutlineBlock / 2 + 1) * pixel;
+  const int columns = (part.width() + kOutlineBlock - 1) / kOutlineBlock,
+            rows = (part.height() + kOutlineBlock - 1) / kOutlineBlock;
   std::vector<std::vector<FlatLine>> ofRows(std::size_t(std::max(rows, 0)));
   tbb::parallel_for(0, rows, [&](int row) {
-    const int top = part.y0 + row * kBlock;
+    const int top = part.y0 + row * kOutlineBlock;
     const DistanceGrid middles =
-        distancesOf(distance, view, {part.x0 + kBlock / 2, top + kBlock / 2, columns, 1}, kBlock, width, height);
+        distancesOf(distance, view, {part.x0 + kOutlineBlock / 2, top + kOutlineBlock / 2, columns, 1}, kOutlineBlock,
+                    width, height);
     for (int column = 0; column < columns; ++column) {
       if (!(std::abs(middles.at(column, 0)) <= reach)) continue;
-      const int left = part.x0 + column * kBlock;
+      const int left = part.x0 + column * kOutlineBlock;
       const DistanceGrid grid = distancesOf(
-          distance, view, {left, top, std::min(kBlock + 1, part.x1 - left), std::min(kBlock + 1, part.y1 - top)}, 1,
+          distance, view,
+          {left, top, std::min(kOutlineBlock + 1, part.x1 - left), std::min(kOutlineBlock + 1, part.y1 - top)}, 1,
           width, height);
       for (int y = 0; y + 1 < grid.rows; ++y)
         for (int x = 0; x + 1 < grid.columns; ++x) addCrossings(grid, x, y, ofRows[std::size_t(row)]);
@@ -222,14 +225,14 @@ void addLineLegend(Overlay& overlay, Frame& frame, const std::vector<Legend::Lin
 void paintSliceLines(Image& picture, const Field& field, const SliceView& view, const PixelRect& part, int width,
                      int height, const ReferenceData& reference, double lineWidth) {
   if (part.empty()) return;  // the view shows nothing of the domain
-  const double halfWidth = 0.5 * kOutlineWidth * lineWidth, border = kCasingBorder * lineWidth;
+  const double halfWidth = 0.5 * kOutlineWidth * lineWidth, border = kOutlineCasingBorder * lineWidth;
   for (std::size_t n = 0; n < reference.outlined.size(); ++n) {
     const std::vector<FlatLine> lines = outlineOf(*reference.outlined[n].distance, view, part, width, height);
     const std::vector<bool> onSurface = areOnSurface(lines, field, view, width, height);
     LineDistances distances(part, halfWidth + border + 0.5);
     for (std::size_t i = 0; i < lines.size(); ++i)
-      if (onSurface[i] || !isGap(lines[i], kDash * lineWidth)) distances.add(lines[i]);
-    distances.paint(picture, kCasing, halfWidth + border, kCasingStrength);
+      if (onSurface[i] || !isGap(lines[i], kOutlineDash * lineWidth)) distances.add(lines[i]);
+    distances.paint(picture, kOutlineCasing, halfWidth + border, kOutlineCasingStrength);
     distances.paint(picture, outlineColor(n), halfWidth, 1);
   }
   if (reference.mesh.mesh != nullptr)

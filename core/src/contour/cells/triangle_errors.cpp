@@ -25,7 +25,7 @@ std::vector<Vector3> latticeOfTriangle(int n) {
 
 const std::vector<ErrorStage>& errorStages() {
   static const std::vector<ErrorStage> stages = {
-      {0, latticeOfTriangle(2)}, {0.25, latticeOfTriangle(4)}, {0.6, latticeOfTriangle(10)}};
+      {0, latticeOfTriangle(2)}, {0.2, latticeOfTriangle(4)}, {0.5, latticeOfTriangle(10)}};
   return stages;
 }
 
