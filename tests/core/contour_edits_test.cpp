@@ -61,6 +61,19 @@ TEST(ContourEdits, aSimplifiedBoxHasTwelveTriangles) {
   EXPECT_NEAR(signedVolume(found.mesh), boundingBox(shapes::mesh("box")).volume(), 1e-9);
 }
 
+/// Blending rounds the field of a part inside of it, with kinks that are small beside the triangles of its flat sides.
+TEST(ContourEdits, simplifiedMeshesOfOffsetsFollowKinksWithinLargeTriangles) {
+  const Field gear = blended(build(ExactDistance(shapes::mesh("gear")), support::cubeOf(1.2), {.targetError = 1e-4}));
+  for (const double tolerance : {0.012, 0.024}) {
+    const Contour few = contour(gear, {.offset = -0.05, .tolerance = tolerance, .simplify = true});
+    double greatest = 0;
+    for (const Vector3& point : pointsOf(few.mesh, 14))
+      greatest = std::max(greatest, std::abs(gear.value(point) + 0.05));
+    EXPECT_LE(greatest, 1.05 * tolerance);
+    EXPECT_LE(greatest, 1.1 * few.greatestValue);
+  }
+}
+
 /// Random leaves disagree, so that the surface jumps from leaf to leaf, and has parts of all sizes.
 TEST(ContourEdits, simplifiedMeshesOfRandomFieldsAreClosedManifoldsOrOpenOnes) {
   for (unsigned seed = 0; seed < 3; ++seed) {

@@ -34,20 +34,20 @@ std::string operationsHelp() {
 std::string combineHelp() {
   return paragraphs(R"(
 Builds one field of an expression of solids, such as 'difference(offset(a.hpsdf, 0.02), move(b.obj, 0, 0, 1))'. A, B, … stand
-for solids: a field, a mesh file, a grid (.vdb, .vti), builtin:SHAPE, analytic:SHAPE or an expression. Quote the whole expression for the shell.
-A name that holds blanks, commas, parentheses or quotes, or looks like a number, is written between quotes of its own: " or ', which is doubled where the name itself holds it.
-Lengths are in the units of the solids; a field counts in its own. The operations are:)") +
+for solids: a field, a mesh file, a grid (.vdb, .vti), builtin:SHAPE, analytic:SHAPE or an expression. Quote the whole
+expression for the shell. A name that holds blanks, commas, parentheses or quotes, or looks like a number, is written between
+quotes of its own: " or '. If the name contains that quote, write it twice. Lengths are in the units of the solids; a field counts in its own. The operations are:)") +
          "\n\n" + operationsHelp() + paragraphs(R"(
 A Boolean expression of closed meshes is exact everywhere: the triangles are cut where others cross them, and distances are
 measured to the pieces that bound the result. Inside a union, the distance is therefore that to the outer surface. With a
-field, a grid, an open mesh, an offset, a shell or a smooth operation, some values are lower bounds instead: no value is farther from
-0 than the surface is. A line of the report says which of them are exact, and 'hpsdf info' shows it later.
+field, a grid, an open mesh, an offset, a shell or a smooth operation, some values are lower bounds instead: no value is
+farther from 0 than the surface is. A line of the report says which of them are exact, and 'hpsdf info' shows it later.
 
 All other options are those of 'hpsdf build', with their meaning: the field approximates the distance of the expression
 within the tolerance or target error that is given here. Cutting two meshes of 70,000 triangles takes about
 two seconds. Sharp creases of the result take more bytes than smooth surfaces, because no leaf of the field is exact.
 
-'hpsdf slice --operands own' shows where the operands of a field lie, and what of their surfaces the result has.)");
+'hpsdf slice --operands own' shows where the operands of a field lie, and which parts of their surfaces bound the result.)");
 }
 
 const std::vector<Parameter> kCombineParameters = {

@@ -23,8 +23,8 @@ std::vector<Parameter> vertexColorParameters(const Registry& registry) {
   std::vector<Parameter> parameters = {
       {"color", choice(names),
        "Colours the vertices in the colours of pictures: by the degree or depth of the cells that hold them, or by a "
-       "quantity at the vertices, as 'render --color' does. For .ply, .glb and .obj. Give range to compare files. None "
-       "when left out."}};
+       "quantity at the vertices, as 'render --color' does. Files of .ply, .glb and .obj hold colours. Give range to "
+       "compare files. Without this option the file has no colours."}};
   for (const char* name : kShared) parameters.push_back(*findParameter(registry.command("render"), name));
   return under(kColours, std::move(parameters));
 }

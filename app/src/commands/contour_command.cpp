@@ -126,8 +126,7 @@ std::string missedBy(const Contour& made) {
   if (made.unresolved > 0)
     return fmt::format(
         "the mesh is farther from the surface than the tolerance in {} places, where it bends within the smallest "
-        "cells "
-        "or is torn: allow a greater tolerance, or build the field more accurately",
+        "cells or is torn: allow a greater tolerance, or build the field more accurately",
         grouped(made.unresolved));
   return "";
 }
@@ -191,19 +190,20 @@ const std::vector<Parameter> kContourParameters = {
      "File of the mesh: *.stl, *.ply, *.obj or *.glb. STL and GLB hold single-precision numbers."},
     {"offset", number().repeatable().byDefault("0").in("field units"),
      "Value of the field on the surface: above 0 for a surface around the solid, below 0 for one within. If it is "
-     "given "
-     "several times, each surface gets a file, and {offset} in the name of the file stands for the value."},
+     "given several times, each surface gets a file, and {offset} in the name of the file stands for the value."},
     {"tolerance", number().above(0).orShare().in("field units"),
      "Greatest distance between the mesh and the field's surface, e.g. 0.002 or 0.1%, a percentage of the longest side "
      "of the domain; 0.1% by default. Parts and gaps thinner than twice this may be lost."},
     {"resolution", wholeNumber("N").atLeast(8),
      "The tolerance as the N-th part of the longest side of the domain, e.g. 500 instead of 0.2%."},
     {"simplify", flag(),
-     "Merge vertices as far as the tolerance allows. The mesh has a fifth to a tenth of the triangles, of different "
-     "shapes, and takes about five times as long."},
+     "Merge vertices as far as the tolerance allows. The mesh usually has a half to a fifteenth of the triangles, "
+     "fewest "
+     "where the surface is flat, and takes three to five times as long."},
     {"no-normals", flag(), "Leave the normals of vertices out of the file. They are the field's gradients."},
     {"cut", choice({"wall", "open"}).byDefault("wall"),
-     "What happens where the domain cuts the solid: a wall closes the mesh, or the mesh stays open there."},
+     "Closes the mesh by a wall where the domain cuts the solid, or leaves it open there, half a tolerance within the "
+     "domain."},
     {"keep-jumps", flag(),
      "Follow the steps by which a field jumps between its cells. By default, a field that jumps is blended first, as "
      "'hpsdf blend' does it."}};
@@ -222,9 +222,10 @@ The mesh is a closed manifold without crossings, for any field: each edge belong
 form one fan, and triangles meet at common edges and vertices only. Where the domain cuts the solid, a wall closes the mesh
 half a tolerance within the domain.
 
-The mesh is measured at the corners, in the middle of each triangle and of its edges, and the other way round from points of the
-surface. The exit status is 1 where the tolerance is missed; the mesh is written all the same.)"),
-      .examples = {"hpsdf contour bunny.hpsdf -o bunny.ply", "hpsdf contour bunny.hpsdf -o coarse.obj --tolerance 1%",
+The mesh is measured at points of each triangle, and the other way round from points of the surface in each cell; more of them
+where the distance is not far below the tolerance. The exit status is 1 where the tolerance is missed; the mesh is written all the same.)"),
+      .examples = {"hpsdf contour bunny.hpsdf -o bunny.ply",
+                   "hpsdf contour bunny.hpsdf -o coarse.obj --tolerance 1% --simplify",
                    "hpsdf contour bunny.hpsdf -o degrees.glb --color degree",
                    "hpsdf contour bunny.hpsdf -o bunny{offset}.stl --offset 0 --offset 0.02"},
       .parameters = joined(

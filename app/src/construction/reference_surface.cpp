@@ -84,8 +84,9 @@ ReferenceSurface meshReference(const Console& console, PreparedSurface&& prepare
 /// Returns true for the text of an expression of solids, such as union(a.obj, b.obj).
 bool isExpression(const std::string& surface) {
   std::error_code missing;
-  if (surface.find('(') == std::string::npos || std::filesystem::exists(surface, missing)) return false;
-  return parseExpression(surface).node().operation != Operation::operand;
+  const std::string name = surface.substr(0, surface.find('('));
+  return name != surface && !std::filesystem::exists(surface, missing) &&
+         std::ranges::find(operations(), name, &OperationDescription::name) != operations().end();
 }
 
 CombinedDistance combinedDistance(const Console& console, const std::string& expression, const Source& source) {

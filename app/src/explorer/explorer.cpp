@@ -12,6 +12,7 @@
 #include "hpsdf/detail/build_settings.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
+#include "session/field_operands.h"
 #include "session/field_summary.h"
 
 namespace hpsdf::app {
@@ -210,6 +211,7 @@ void Explorer::fieldChanged() {
   const auto steps = session_.current().field.metadata().steps;
   if (rebuilding_ != Rebuilding::steps || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
   if (rebuilding_ == Rebuilding::no) settings_.clear();  // the settings belong to the previous field
+  if (view_.operands == kOwnOperands && !session_.current().field.metadata().source.exactness) view_.operands.clear();
   ++fields_;
 }
 
@@ -455,6 +457,7 @@ render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData ref
                                    const render::ScaleOptions& scale, int shrink) {
   if (reference.jumps != nullptr) reference.jumps = &session_.otherJumps(view_.beside);
   reference.mesh = {};  // it is the contour of the current field
+  if (view_.operands == kOwnOperands) reference.outlined = {};
   try {
     return drawn(session_.otherRenderer(view_.beside, view_.backend), other, reference, scale, shrink);
   } catch (const Error& error) {

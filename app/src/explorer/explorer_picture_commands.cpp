@@ -97,7 +97,8 @@ void changePlane(ViewState& view, const Arguments& arguments, Session& session) 
   if (arguments.given("target")) view.sliceTarget = targetOf(arguments);
   if (arguments.given("operands")) {
     view.operands = textOrNone(arguments, "operands");
-    if (!view.operands.empty()) session.operands(view.operands);  // reports an unreadable file now
+    if (!view.operands.empty() && session.hasField())
+      session.operands(view.operands);  // reports an unreadable file now
   }
 }
 
@@ -226,18 +227,19 @@ void addPlaneAndColorCommands(Registry& registry) {
       .help = "As 'slice' has it, of the picture that 'show slice' chooses. What is not given stays as it is. With the "
               "mouse: drag to move, wheel to zoom.",
       .examples = {"plane axis=x offset=0.2", "plane through=0,0,0,1,1,0", "plane zoom=8 target=0.2,0.6,0"},
-      .parameters = {{"axis", choice({"x", "y", "z"}), "The plane is perpendicular to this axis; z at first."},
-                     {"offset", numbers("NUMBER", {1}).orWords({"auto"}).in("world units"),
-                      "Where the plane crosses that axis; auto is the middle of the surface's box."},
-                     {"through", numbers("PX,PY,PZ,NX,NY,NZ", {6}).in("world units"),
-                      "A point of the plane and its normal instead."},
-                     {"in-space", flag(""), "Whether the plane stands in the surface's picture too."},
-                     {"zoom", number().above(0), "How many times larger than with the whole section in the picture."},
-                     targetParameter("The point in the picture's middle, moved into the plane; center is the "
-                                     "section's middle."),
-                     {"operands", text("EXPRESSION|own|none").under(kDrawn).advanced(),
-                      "Outline the operands of this expression, as 'slice' does; own for the one from which 'combine' "
-                      "built the field."}},
+      .parameters =
+          {{"axis", choice({"x", "y", "z"}), "The plane is perpendicular to this axis; z at first."},
+           {"offset", numbers("NUMBER", {1}).orWords({"auto"}).in("world units"),
+            "Where the plane crosses that axis; auto is the middle of the surface's box."},
+           {"through", numbers("PX,PY,PZ,NX,NY,NZ", {6}).in("world units"),
+            "A point of the plane and its normal instead."},
+           {"in-space", flag(""), "Whether the plane stands in the surface's picture too."},
+           {"zoom", number().above(0), "How many times larger than with the whole section in the picture."},
+           targetParameter("The point in the picture's middle, moved into the plane; center is the "
+                           "section's middle."),
+           {"operands", text("EXPRESSION|own|none").under(kDrawn).advanced(),
+            "Outline the operands of this expression, as 'slice' does. The word own stands for the expression "
+            "from which 'combine' built the field."}},
       .action = changing(changePlane),
       .check = checkPlane,
   });
@@ -272,10 +274,11 @@ void addTrianglesCommand(Registry& registry) {
           "kept until the field, the offset or the tolerance changes. The statistics say how many there are and how "
           "far they are from the surface.",
       .examples = {"triangles shown=true", "triangles tolerance=0.5%"},
-      .parameters = {{"shown", flag(""), "Whether they are drawn."},
-                     {"tolerance", number().above(0).orShare().in("field units"),
-                      "As 'contour' has it: a length, or a percentage of the longest side of the domain; 0.1% at "
-                      "first."}},
+      .parameters =
+          {{"shown", flag(""), "Draws the triangles."},
+           {"tolerance", number().above(0).orShare().in("field units"),
+            "The tolerance of the mesh, as for 'contour': a length, or a percentage of the longest side of the "
+            "domain. It is 0.1% unless you set it."}},
       .action = changing(changeTriangles),
   });
 }

@@ -207,9 +207,9 @@ const std::vector<Parameter> kSizeSamplesArrows = {
 const std::vector<Parameter> kSliceDrawn = {
     {"operands", text("EXPRESSION|own"),
      "Draws the outlines of the operands of an expression, each in a colour of its own: solid where the field's "
-     "surface "
-     "follows them, dashed elsewhere. own is the expression from which 'combine' built the field; its files are read "
-     "again, from the folder of the field or the current one."}};
+     "surface follows them, dashed elsewhere. The word own stands for the expression from which 'combine' built the "
+     "field. Its files are read again, by their names, from the folder of the field or the current one: if these have "
+     "changed, or lie in several folders, give the expression with their paths."}};
 
 void checkSlice(const Arguments& arguments) {
   if (arguments.given("operands")) checkOperands(arguments.text("operands"));

@@ -13,8 +13,6 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr const char* kOwn = "own";
-
 /// Returns the path of a file that a field names, in the folder of the field's file or else as it is.
 std::string fileBeside(const CurrentField& current, const std::string& name) {
   const std::filesystem::path beside = std::filesystem::path(current.name).parent_path() / name;
@@ -44,7 +42,7 @@ std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const 
   const Source& source = current.field.metadata().source;
   const DistanceOptions options{.insideTest = source.insideTest};
   const Expression loaded = withLoadedOperands(
-      console, expression == kOwn ? ownExpression(current) : parseExpression(expression), options.insideTest);
+      console, expression == kOwnOperands ? ownExpression(current) : parseExpression(expression), options.insideTest);
   std::vector<render::OutlinedSolid> solids;
   for (const Expression& operand : booleanOperands(loaded)) {
     DistanceFunction distance = withProgress(console, [&](const Progress& progress) -> DistanceFunction {
@@ -56,7 +54,7 @@ std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const 
 }
 
 void checkOperands(const std::string& expression) {
-  if (expression != kOwn) parseExpression(expression);
+  if (expression != kOwnOperands) parseExpression(expression);
 }
 
 }  // namespace hpsdf::app

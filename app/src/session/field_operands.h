@@ -2,6 +2,7 @@
 // The solids that were combined into a field, for slices that show their outlines.
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "console/console.h"
@@ -10,8 +11,11 @@
 
 namespace hpsdf::app {
 
-/// Loads the operands of an expression, in the units of the current field. The word "own" stands for the expression
-/// from which `combine` built the field; its files are looked for beside the field's file and in the current folder.
+/// The word for the expression from which `combine` built the field.
+constexpr std::string_view kOwnOperands = "own";
+
+/// Loads the operands of an expression, in the units of the current field. The files of `kOwnOperands` are looked
+/// for beside the field's file and in the current folder.
 /// Throws `Error` for a field that `combine` did not build, for mistakes in the expression and for files that cannot be
 /// read, and `Cancelled` after Ctrl-C.
 std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const CurrentField& current,

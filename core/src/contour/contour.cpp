@@ -17,6 +17,7 @@
 #include "contour/cells/contour_octree.h"
 #include "contour/cells/implicit_surface.h"
 #include "contour/edits/improvement.h"
+#include "contour/edits/surface_points.h"
 #include "contour/open_mesh.h"
 #include "contour/surface_mesh.h"
 #include "hpsdf/detail/memory.h"
@@ -32,8 +33,11 @@ constexpr double kRootsAlongLongest = 8;    ///< number of root cells along the 
 constexpr double kAccuracy = 1e-3;          ///< greatest |f| at vertices, in tolerances
 constexpr double kThin = 0.1;               ///< greatest |f| in parts and gaps that need not be found, in tolerances
 constexpr double kBulge = 0.5;              ///< greatest |f| where a surface may bulge across an edge, in tolerances
-/// The errors up to which triangles are merged, in tolerances. Errors at points that were not searched are greater.
-constexpr double kSimplified = 0.8;
+/// The errors up to which triangles are merged, in tolerances: the first with which the mesh is within the tolerance.
+constexpr std::array<double, 3> kSimplified = {0.8, 0.6, 0.4};
+/// The greatest distance between points at which triangles are measured when they are merged, and in the end, in
+/// tolerances.
+constexpr double kMergedPoints = 1.5, kDenserPoints = 0.5;
 /// The greatest |f| at vertices before these are rounded to single precision, and what the rounding may add, as
 /// parts of the accuracy. The position changes by √3/2 of the numbers' spacing.
 constexpr double kBeforeRounding = 0.25, kSpacing = 0.75;
@@ -319,21 +323,37 @@ class Contouring {
     return points[static_cast<std::size_t>(other - values.begin())];
   }
 
-  /// Turns over triangles of the finished mesh that are folded, merges others if that was asked for, and measures the
-  /// mesh again.
+  /// Flips edges of the finished mesh, turns over triangles that are folded, and merges others if that was asked for.
   void improve() {
     if (result_.mesh.triangles.empty()) return;
-    EditLimits limits{tolerance_, kAccuracy * tolerance_, isSinglePrecision_};
-    EditedMesh mesh = editedMesh(surface_, limits, std::move(result_.mesh));
-    unfold(surface_, limits, progress_, mesh);
-    if (simplifies_) {
-      limits.tolerance = kSimplified * tolerance_;
-      simplify(surface_, limits, progress_, mesh);
-    }
-    const MeshErrors errors = measure(surface_, tolerance_, progress_, mesh);
-    result_.greatestValue = simplifies_ ? errors.value : std::max(result_.greatestValue, errors.value);
-    result_.greatestGap = simplifies_ ? errors.gap : std::max(result_.greatestGap, errors.gap);
+    EditLimits limits{tolerance_, kAccuracy * tolerance_, isSinglePrecision_, kMergedPoints * tolerance_};
+    EditedMesh mesh(std::move(result_.mesh.vertices), std::move(result_.mesh.triangles));
+    MeshEditor editor(surface_, limits, progress_, mesh);
+    align(editor);
+    unfold(editor);
+    result_.greatestValue = std::max(result_.greatestValue, editor.errors().value);
+    result_.greatestGap = std::max(result_.greatestGap, editor.errors().gap);
+    if (simplifies_) simplifyWithin(limits, mesh);
     result_.mesh = std::move(mesh).finish();
+  }
+
+  /// Merges vertices up to a part of the tolerance that leaves the mesh within the tolerance at many more points.
+  void simplifyWithin(EditLimits limits, EditedMesh& mesh) {
+    mesh.setPoints(surfacePointsOf(surface_, limits, progress_, mesh));
+    const EditedMesh before = mesh;
+    EditLimits denser = limits;
+    denser.spacing = kDenserPoints * tolerance_;
+    for (const double share : kSimplified) {
+      mesh = before;
+      limits.tolerance = share * tolerance_;
+      MeshEditor editor(surface_, limits, progress_, mesh);
+      simplify(editor);
+      const MeshErrors errors = measure(surface_, denser, progress_, mesh);
+      result_.greatestValue = errors.value;
+      result_.greatestGap = missedCells_ > 0 ? std::max(result_.greatestGap, errors.gap) : errors.gap;
+      result_.unresolved = errors.missed + missedCells_;
+      if (errors.missed == 0 || missedPolygons_ > 0) return;
+    }
   }
 
   Contour finish() {
@@ -350,6 +370,7 @@ class Contouring {
       for (std::size_t i = 0; i < isKept.size(); ++i)
         isKept[i] = !surface_.isAtWall(mesh_.edges()[made.edgeOfTriangle[i]].point);
       removeTriangles(isKept, result_.mesh.vertices, result_.mesh.triangles);
+      surface_.removeWall();
     }
     improve();
     findNormals();

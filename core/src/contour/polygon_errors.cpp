@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "contour/cells/triangle_errors.h"
@@ -13,6 +14,9 @@ namespace hpsdf::contouring {
 namespace {
 
 constexpr std::size_t kTrianglesAtOnce = 64;
+
+/// Triangles are hardly larger than the cells around them, whose samples see what the points of a triangle do not.
+constexpr double kAnySpacing = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -31,11 +35,12 @@ void measurePolygons(const ImplicitSurface& surface, const DualMesh& mesh, bool 
       triangles.push_back({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]});
     }
     const std::span found = std::span(errors).subspan(first, count);
-    raiseErrors([&](auto points, auto values) { surface.values(points, values); }, triangles, tolerance, found);
+    raiseErrors([&](auto points, auto values) { surface.values(points, values); }, triangles, tolerance, kAnySpacing,
+                found);
     for (std::size_t i = 0; isOpen && i < count; ++i)
       if (!surface.isAtWall(edgeOf(changed[first + i]).point))
         raiseErrors([&](auto points, auto values) { surface.valuesWithoutWall(points, values); },
-                    std::span(triangles).subspan(i, 1), tolerance, found.subspan(i, 1));
+                    std::span(triangles).subspan(i, 1), tolerance, kAnySpacing, found.subspan(i, 1));
   });
   for (const std::uint32_t n : changed) edgeOf(n).polygon.error = 0;
   for (std::size_t i = 0; i < changed.size(); ++i) {

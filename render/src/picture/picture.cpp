@@ -281,7 +281,8 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   paintSliceLines(drawn.image, field, view, section, frame.view.width(), frame.view.height(), reference,
                   frame.lineWidth());
   drawn.legend.lines = lines;
-  if (!reference.outlined.empty()) drawn.details.insert(drawn.details.begin() + 2, "dashed off the surface");
+  if (!reference.outlined.empty())
+    drawn.details.insert(drawn.details.begin() + 2, "dashed where they do not bound the solid");
   addArrows(drawn.image, frame, field, view, buffers, samples, picture.arrows);
   addAxesOf(overlay, frame, view, section);
   addFieldDetails(field, figures, drawn.details);

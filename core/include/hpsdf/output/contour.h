@@ -32,7 +32,7 @@ struct ContourOptions {
   /// tolerance must then be at least `leastSinglePrecisionTolerance`.
   bool singlePrecision = false;
   /// Vertices are merged as far as the tolerance allows (Garland and Heckbert 1997): the mesh has fewer triangles, and
-  /// takes some times as long.
+  /// making it takes several times as long.
   bool simplify = false;
   int threads = 0;  ///< greatest number of threads, 0 for all; the mesh does not depend on it
 };

@@ -26,6 +26,9 @@ class ImplicitSurface {
   /// Returns the values that there are without the wall.
   void valuesWithoutWall(std::span<const Vector3> points, std::span<double> out) const;
 
+  /// Removes the wall.
+  void removeWall() { wall_.reset(); }
+
   /// Returns true if the value at x is that of the wall.
   bool isAtWall(const Vector3& x) const;
 

@@ -26,13 +26,14 @@ void groupItems(std::size_t groups, const ForEach& forEach, std::vector<std::uin
 
 }  // namespace
 
-EditedMesh::EditedMesh(std::vector<Vector3> vertices, std::vector<Triangle> triangles, std::vector<Vector3> points,
-                       std::vector<std::uint32_t> triangleOf)
-    : vertices_(std::move(vertices)),
-      triangles_(std::move(triangles)),
-      points_(std::move(points)),
-      triangleOf_(std::move(triangleOf)) {
+EditedMesh::EditedMesh(std::vector<Vector3> vertices, std::vector<Triangle> triangles)
+    : vertices_(std::move(vertices)), triangles_(std::move(triangles)) {
   listTriangles();
+  listPoints();
+}
+
+void EditedMesh::setPoints(std::vector<SurfacePoint> points) {
+  points_ = std::move(points);
   listPoints();
 }
 
@@ -56,7 +57,7 @@ void EditedMesh::listPoints() {
   groupItems(
       triangles_.size(),
       [&](const auto& visit) {
-        for (std::uint32_t n = 0; n < points_.size(); ++n) visit(triangleOf_[n], n);
+        for (std::uint32_t n = 0; n < points_.size(); ++n) visit(points_[n].triangle, n);
       },
       firstPoint_, pointsOf_);
 }
@@ -76,8 +77,10 @@ void EditedMesh::make(std::span<const Edit> edits) {
     for (const std::uint32_t n : edit.removed) {
       isRemoved[n] = true;
       // Triangles that are added take the places of those that are removed.
-      for (const std::uint32_t point : pointsOf(n))
-        triangleOf_[point] = edit.removed[near.nearestTo(points_[point]).first];
+      for (std::uint32_t i = firstPoint_[n]; i < firstPoint_[n + 1]; ++i) {
+        SurfacePoint& point = points_[pointsOf_[i]];
+        point.triangle = edit.removed[near.nearestTo(point.position).first];
+      }
     }
   }
   for (const Edit& edit : edits) {
@@ -94,7 +97,7 @@ void EditedMesh::make(std::span<const Edit> edits) {
     if (!isRemoved[n]) triangles_[kept++] = triangles_[n];
   }
   triangles_.resize(kept);
-  for (std::uint32_t& triangle : triangleOf_) triangle = number[triangle];
+  for (SurfacePoint& point : points_) point.triangle = number[point.triangle];
   listTriangles();
   listPoints();
 }

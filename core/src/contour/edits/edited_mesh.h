@@ -22,13 +22,20 @@ struct Edit {
   Vector3 position = Vector3::Zero();   ///< the vertex's new position
 };
 
-/// A mesh that is changed in many places at once, with the triangles at each vertex, and with points of the surface
-/// that the mesh approximates.
+/// A point of the surface that a mesh approximates.
+struct SurfacePoint {
+  Vector3 position;
+  std::uint32_t triangle;  ///< the triangle of the mesh to which it is nearest
+};
+
+/// A mesh that is changed in many places at once, with the triangles at each vertex.
 class EditedMesh {
  public:
-  /// `points` are points of the surface. `triangleOf` tells for each the triangle to which it is nearest.
-  EditedMesh(std::vector<Vector3> vertices, std::vector<Triangle> triangles, std::vector<Vector3> points,
-             std::vector<std::uint32_t> triangleOf);
+  EditedMesh(std::vector<Vector3> vertices, std::vector<Triangle> triangles);
+
+  /// Keeps points of the surface from now on.
+  void setPoints(std::vector<SurfacePoint> points);
+  bool hasPoints() const { return !points_.empty(); }
 
   std::span<const Vector3> vertices() const { return vertices_; }
   std::span<const Triangle> triangles() const { return triangles_; }
@@ -40,11 +47,12 @@ class EditedMesh {
   /// Returns true for a vertex on an edge of one triangle only, or on one of more than two.
   bool isAtBoundary(std::uint32_t vertex) const { return isAtBoundary_[vertex]; }
 
-  /// Returns the numbers of the points of the surface that are nearest to a triangle.
-  std::span<const std::uint32_t> pointsOf(std::uint32_t triangle) const {
-    return std::span(pointsOf_).subspan(firstPoint_[triangle], firstPoint_[triangle + 1] - firstPoint_[triangle]);
+  /// Calls visit(position) for each point of the surface that is nearest to a triangle.
+  template <typename Visit>
+  void forEachPointOf(std::uint32_t triangle, const Visit& visit) const {
+    for (std::uint32_t i = firstPoint_[triangle]; i < firstPoint_[triangle + 1]; ++i)
+      visit(points_[pointsOf_[i]].position);
   }
-  const Vector3& point(std::uint32_t number) const { return points_[number]; }
 
   std::array<Vector3, 3> corners(std::uint32_t triangle) const {
     const Triangle& t = triangles_[triangle];
@@ -67,8 +75,7 @@ class EditedMesh {
 
   std::vector<Vector3> vertices_;
   std::vector<Triangle> triangles_;
-  std::vector<Vector3> points_;
-  std::vector<std::uint32_t> triangleOf_;  ///< by point
+  std::vector<SurfacePoint> points_;
   std::vector<std::uint32_t> firstAt_, trianglesAt_;
   std::vector<std::uint32_t> firstPoint_, pointsOf_;
   std::vector<bool> isAtBoundary_;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "contour/cells/triangle_errors.h"
+#include "contour/edits/surface_points.h"
 #include "hpsdf/mesh_report.h"
 #include "surface/crossings.h"
 #include "util/chunks.h"
@@ -112,28 +113,43 @@ bool MeshEditor::isShapely(const Edit& edit) const {
   return left == 0 || left < folded(removed);
 }
 
-/// Returns true if the triangles that are added are within the tolerance of the surface, and the points of the surface
-/// at those that are removed within the tolerance of them.
-bool MeshEditor::isNear(const Edit& edit) const {
+/// Returns the greatest errors of the triangles that are added; the search ends where they exceed the tolerance.
+MeshErrors MeshEditor::distancesAfter(const Edit& edit) const {
   std::vector<Corners> added;
   for (const Triangle& triangle : edit.added) added.push_back(mesh_.cornersAfter(edit, triangle));
   const NearTriangles near(added);
-  const double squared = limits_.tolerance * limits_.tolerance;
-  for (const std::uint32_t n : edit.removed)
-    for (const std::uint32_t point : mesh_.pointsOf(n))
-      if (near.nearestTo(mesh_.point(point)).second > squared) return false;
-  std::vector<double> errors(added.size());
-  raiseErrors([&](auto points, auto values) { surface_.values(points, values); }, added, limits_.tolerance, errors);
-  return std::ranges::all_of(errors, [&](double error) { return error <= limits_.tolerance; });
+  double squaredGap = 0;
+  const auto measure = [&](const Vector3& point) {
+    if (squaredGap <= limits_.tolerance * limits_.tolerance)
+      squaredGap = std::max(squaredGap, near.nearestTo(point).second);
+  };
+  if (mesh_.hasPoints()) {
+    for (const std::uint32_t n : edit.removed) mesh_.forEachPointOf(n, measure);
+  } else {
+    std::vector<Corners> removed;
+    for (const std::uint32_t n : edit.removed) removed.push_back(mesh_.corners(n));
+    for (const SurfacePoint& point : surfacePointsNear(surface_, limits_, removed)) measure(point.position);
+  }
+  MeshErrors errors{.value = 0, .gap = std::sqrt(squaredGap)};
+  if (errors.gap > limits_.tolerance) return errors;
+  std::vector<double> values(added.size());
+  raiseErrors([&](auto points, auto found) { surface_.values(points, found); }, added, limits_.tolerance,
+              limits_.spacing, values);
+  errors.value = std::ranges::max(values);
+  return errors;
 }
 
-bool MeshEditor::isFit(const Edit& edit) const {
+/// Returns the errors of the triangles that are added, or std::nullopt if the edit must not be made.
+std::optional<MeshErrors> MeshEditor::errorsAfter(const Edit& edit) const {
   if (edit.vertex) {
     double value = 0;
     surface_.values({&edit.position, 1}, {&value, 1});
-    if (!(std::abs(value) <= limits_.accuracy)) return false;
+    if (!(std::abs(value) <= limits_.accuracy)) return std::nullopt;
   }
-  return isShapely(edit) && isNear(edit);
+  if (!isShapely(edit)) return std::nullopt;
+  const MeshErrors errors = distancesAfter(edit);
+  if (errors.gap > limits_.tolerance || errors.value > limits_.tolerance) return std::nullopt;
+  return errors;
 }
 
 /// Clears the marks of edits after which the mesh would cross itself.
@@ -163,16 +179,21 @@ void MeshEditor::leaveOutCrossing(std::span<const Edit> edits, std::vector<bool>
 
 std::vector<bool> MeshEditor::make(std::span<const Edit> edits) {
   constexpr std::size_t kAtOnce = 16;
-  std::vector<char> fits(edits.size());
+  std::vector<std::optional<MeshErrors>> errors(edits.size());
   detail::forEachChunk(edits.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
     progress_.throwIfCancelled();
-    for (std::size_t i = first; i < first + count; ++i) fits[i] = isFit(edits[i]) ? 1 : 0;
+    for (std::size_t i = first; i < first + count; ++i) errors[i] = errorsAfter(edits[i]);
   });
-  std::vector<bool> isMade(fits.begin(), fits.end());
+  std::vector<bool> isMade(edits.size());
+  for (std::size_t i = 0; i < edits.size(); ++i) isMade[i] = errors[i].has_value();
+  if (std::ranges::count(isMade, true) == 0) return isMade;
   leaveOutCrossing(edits, isMade);
   std::vector<Edit> made;
-  for (std::size_t i = 0; i < edits.size(); ++i)
-    if (isMade[i]) made.push_back(edits[i]);
+  for (std::size_t i = 0; i < edits.size(); ++i) {
+    if (!isMade[i]) continue;
+    made.push_back(edits[i]);
+    errors_ = {std::max(errors_.value, errors[i]->value), std::max(errors_.gap, errors[i]->gap), 0};
+  }
   mesh_.make(made);
   return isMade;
 }

@@ -1,27 +1,38 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "contour/cells/implicit_surface.h"
+#include "contour/edits/edit_limits.h"
 #include "contour/edits/edited_mesh.h"
 #include "hpsdf/error.h"
 
 namespace hpsdf::contouring {
 
-/// What a mesh must fulfil after edits.
-struct EditLimits {
-  double tolerance;        ///< greatest distance between the mesh and the surface, both ways
-  double accuracy;         ///< greatest magnitude of the function at vertices
-  bool isSinglePrecision;  ///< vertices are rounded to single precision
+/// The greatest errors that were found of a mesh, or of a part of it.
+struct MeshErrors {
+  double value = 0;        ///< magnitude of the function in a triangle
+  double gap = 0;          ///< distance of a point of the surface from the mesh
+  std::size_t missed = 0;  ///< triangles of which one of these is above the tolerance
 };
 
-/// Makes those of many proposed edits of a mesh that leave it a mesh of the surface.
+/// Makes those of many proposed edits of a mesh that leave it a mesh of the surface. They are judged by the points of
+/// the surface that the mesh keeps, or else by some near the triangles that are replaced.
 class MeshEditor {
  public:
   MeshEditor(const ImplicitSurface& surface, const EditLimits& limits, const Progress& progress, EditedMesh& mesh)
       : surface_(surface), limits_(limits), progress_(progress), mesh_(mesh) {}
+
+  const ImplicitSurface& surface() const { return surface_; }
+  const EditLimits& limits() const { return limits_; }
+  const Progress& progress() const { return progress_; }
+  const EditedMesh& mesh() const { return mesh_; }
+
+  /// Returns the greatest errors of the triangles that were added.
+  const MeshErrors& errors() const { return errors_; }
 
   /// Returns edits of which no two have a vertex in common: each one that has none in common with those before it.
   std::vector<std::size_t> independent(std::span<const Edit> edits) const;
@@ -34,15 +45,16 @@ class MeshEditor {
   std::vector<double> cosines() const;
 
  private:
-  bool isFit(const Edit& edit) const;
+  std::optional<MeshErrors> errorsAfter(const Edit& edit) const;
   bool isShapely(const Edit& edit) const;
-  bool isNear(const Edit& edit) const;
+  MeshErrors distancesAfter(const Edit& edit) const;
   void leaveOutCrossing(std::span<const Edit> edits, std::vector<bool>& isMade) const;
 
   const ImplicitSurface& surface_;
   EditLimits limits_;
   const Progress& progress_;
   EditedMesh& mesh_;
+  MeshErrors errors_;
 };
 
 }  // namespace hpsdf::contouring

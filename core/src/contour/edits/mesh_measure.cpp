@@ -8,7 +8,8 @@
 
 namespace hpsdf::contouring {
 
-MeshErrors measure(const ImplicitSurface& surface, double tolerance, const Progress& progress, const EditedMesh& mesh) {
+MeshErrors measure(const ImplicitSurface& surface, const EditLimits& limits, const Progress& progress,
+                   const EditedMesh& mesh) {
   constexpr std::size_t kAtOnce = 64;
   const std::size_t triangles = mesh.triangles().size();
   std::vector<double> values(triangles), squaredGaps(triangles);
@@ -18,14 +19,18 @@ MeshErrors measure(const ImplicitSurface& surface, double tolerance, const Progr
     for (std::size_t n = first; n < first + count; ++n) {
       corners.push_back(mesh.corners(static_cast<std::uint32_t>(n)));
       const NearTriangles triangle({&corners.back(), 1});
-      for (const std::uint32_t point : mesh.pointsOf(static_cast<std::uint32_t>(n)))
-        squaredGaps[n] = std::max(squaredGaps[n], triangle.nearestTo(mesh.point(point)).second);
+      mesh.forEachPointOf(static_cast<std::uint32_t>(n), [&](const Vector3& point) {
+        squaredGaps[n] = std::max(squaredGaps[n], triangle.nearestTo(point).second);
+      });
     }
-    raiseErrors([&](auto points, auto found) { surface.values(points, found); }, corners, tolerance,
-                std::span(values).subspan(first, count));
+    raiseErrors([&](auto points, auto found) { surface.values(points, found); }, corners, limits.tolerance,
+                limits.spacing, std::span(values).subspan(first, count));
   });
   if (triangles == 0) return {};
-  return {std::ranges::max(values), std::sqrt(std::ranges::max(squaredGaps))};
+  MeshErrors errors{std::ranges::max(values), std::sqrt(std::ranges::max(squaredGaps)), 0};
+  for (std::size_t n = 0; n < triangles; ++n)
+    if (values[n] > limits.tolerance || squaredGaps[n] > limits.tolerance * limits.tolerance) ++errors.missed;
+  return errors;
 }
 
 }  // namespace hpsdf::contouring

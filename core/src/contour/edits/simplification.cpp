@@ -22,22 +22,20 @@ struct Candidate {
 /// Merges vertices in rounds: in each, edges with low costs that have nothing to do with each other.
 class Simplification {
  public:
-  Simplification(const ImplicitSurface& surface, const EditLimits& limits, const Progress& progress, EditedMesh& mesh)
-      : surface_(surface),
-        limits_(limits),
-        progress_(progress),
-        mesh_(mesh),
-        editor_(surface, limits, progress, mesh) {}
+  explicit Simplification(MeshEditor& editor) : editor_(editor), mesh_(editor.mesh()) {}
 
   void run() {
+    constexpr int kMostPoorRounds = 5;
+    constexpr std::size_t kPoor = 2000;  // a round is poor that merges fewer than one vertex for so many triangles
     isChanged_.assign(mesh_.vertices().size(), true);
-    for (;;) {
+    for (int poor = 0; poor < kMostPoorRounds;) {
       updateCandidates();
       const std::vector<std::size_t> cheapest = cheapestCandidates();
       if (cheapest.empty()) return;
       const auto tried = std::ranges::count_if(candidates_, &Candidate::isTried);
-      progress_.update("merging vertices", double(tried) / double(candidates_.size()));
-      tryToMerge(cheapest);
+      editor_.progress().update("merging vertices", double(tried) / double(candidates_.size()));
+      const std::size_t merged = tryToMerge(cheapest);
+      poor = merged < mesh_.triangles().size() / kPoor ? poor + 1 : 0;
     }
   }
 
@@ -73,7 +71,7 @@ class Simplification {
   /// first.
   std::vector<std::size_t> cheapestCandidates() const {
     constexpr std::size_t kPart = 3, kLeast = 512;
-    const double dearest = 2 * limits_.tolerance;
+    const double dearest = 2 * editor_.limits().tolerance;
     std::vector<std::size_t> cheapest;
     for (std::size_t i = 0; i < candidates_.size(); ++i)
       if (!candidates_[i].isTried && candidates_[i].cost <= dearest) cheapest.push_back(i);
@@ -82,13 +80,14 @@ class Simplification {
     return cheapest;
   }
 
-  void tryToMerge(std::span<const std::size_t> cheapest) {
+  /// Returns how many were merged.
+  std::size_t tryToMerge(std::span<const std::size_t> cheapest) {
     constexpr std::size_t kAtOnce = 64;
     std::vector<std::optional<Edit>> found(cheapest.size());
     detail::forEachChunk(found.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
       for (std::size_t i = first; i < first + count; ++i)
-        found[i] =
-            collapseOf(surface_, limits_, mesh_, candidates_[cheapest[i]].low(), candidates_[cheapest[i]].high());
+        found[i] = collapseOf(editor_.surface(), editor_.limits(), mesh_, candidates_[cheapest[i]].low(),
+                              candidates_[cheapest[i]].high());
     });
     std::vector<Edit> edits;
     std::vector<std::size_t> candidateOf;
@@ -111,6 +110,7 @@ class Simplification {
     for (std::size_t i = 0; i < chosen.size(); ++i)
       for (const std::uint32_t vertex : around[i])
         if (isMade[i]) isChanged_[vertex] = true;
+    return static_cast<std::size_t>(std::ranges::count(isMade, true));
   }
 
   std::vector<std::uint32_t> verticesAround(const Edit& edit) const {
@@ -120,19 +120,14 @@ class Simplification {
     return vertices;
   }
 
-  const ImplicitSurface& surface_;
-  EditLimits limits_;
-  const Progress& progress_;
-  EditedMesh& mesh_;
-  MeshEditor editor_;
+  MeshEditor& editor_;
+  const EditedMesh& mesh_;
   std::vector<Candidate> candidates_;  ///< sorted by their edges
   std::vector<bool> isChanged_;        ///< by vertex: triangles at it have changed in the last round
 };
 
 }  // namespace
 
-void simplify(const ImplicitSurface& surface, const EditLimits& limits, const Progress& progress, EditedMesh& mesh) {
-  Simplification(surface, limits, progress, mesh).run();
-}
+void simplify(MeshEditor& editor) { Simplification(editor).run(); }
 
 }  // namespace hpsdf::contouring

@@ -1,71 +1,70 @@
-#include <array>
+#include "contour/edits/surface_points.h"
+
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
-#include "contour/edits/improvement.h"
+#include "contour/cells/triangle_errors.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
 namespace {
 
-/// Barycentric coordinates of the points of a triangle that are moved to the surface.
-const std::array<Vector3, 4> kPlacesInTriangle = {
-    Vector3(1.0 / 3, 1.0 / 3, 1.0 / 3), Vector3(2.0 / 3, 1.0 / 6, 1.0 / 6), Vector3(1.0 / 6, 2.0 / 3, 1.0 / 6),
-    Vector3(1.0 / 6, 1.0 / 6, 2.0 / 3)};
-
-/// Moves points along the gradient to the surface, and sets whether they reached it.
-void moveToSurface(const ImplicitSurface& surface, double accuracy, std::span<Vector3> points, std::span<bool> isOnIt) {
+/// Moves points along the gradient towards the surface, and returns the magnitudes of the function there.
+std::vector<double> moveToSurface(const ImplicitSurface& surface, double accuracy, std::span<Vector3> points) {
   constexpr int kSteps = 4;
   std::vector<ValueAndGradient> found(points.size());
+  std::vector<double> magnitudes(points.size());
   for (int step = 0; step <= kSteps; ++step) {
     surface.valuesAndGradients(points, found);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto& [value, gradient] = found[i];
-      isOnIt[i] = std::abs(value) <= accuracy;
+      magnitudes[i] = std::abs(value);
       const double squared = gradient.squaredNorm();
-      if (!isOnIt[i] && step < kSteps && squared > 0.01) points[i] -= gradient * (value / squared);
+      if (magnitudes[i] > accuracy && step < kSteps && squared > 0.01) points[i] -= gradient * (value / squared);
     }
   }
+  return magnitudes;
 }
 
 }  // namespace
 
-EditedMesh editedMesh(const ImplicitSurface& surface, const EditLimits& limits, TriangleMesh mesh) {
-  constexpr std::size_t kAtOnce = 64, kPlaces = kPlacesInTriangle.size();
-  std::vector<Vector3> moved(kPlaces * mesh.triangles.size());
-  std::vector<char> counts(moved.size());
-  detail::forEachChunk(mesh.triangles.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
-    const std::span points = std::span(moved).subspan(kPlaces * first, kPlaces * count);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto [a, b, c] = cornersOf(mesh, mesh.triangles[first + i / kPlaces]);
-      const Vector3& place = kPlacesInTriangle[i % kPlaces];
-      points[i] = place[0] * a + place[1] * b + place[2] * c;
-    }
-    std::array<bool, kPlaces * kAtOnce> isOnIt;
-    moveToSurface(surface, limits.accuracy, points, std::span(isOnIt).first(points.size()));
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto [a, b, c] = cornersOf(mesh, mesh.triangles[first + i / kPlaces]);
-      const std::array<Vector3, 3> corners = {a, b, c};
-      const double squared = NearTriangles({&corners, 1}).nearestTo(points[i]).second;
-      counts[kPlaces * first + i] = isOnIt[i] && squared <= limits.tolerance * limits.tolerance ? 1 : 0;
-    }
-  });
-  std::vector<Vector3> points;
+std::vector<SurfacePoint> surfacePointsNear(const ImplicitSurface& surface, const EditLimits& limits,
+                                            std::span<const std::array<Vector3, 3>> triangles) {
+  std::vector<Vector3> moved;
   std::vector<std::uint32_t> triangleOf;
-  std::vector<bool> isListed(mesh.vertices.size());
-  const auto add = [&](const Vector3& point, std::uint32_t triangle) {
-    points.push_back(point);
-    triangleOf.push_back(triangle);
-  };
-  for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) {
-    for (std::size_t k = 0; k < kPlaces; ++k)
-      if (counts[kPlaces * n + k] != 0) add(moved[kPlaces * n + k], n);
-    for (const std::uint32_t vertex : mesh.triangles[n]) {
-      if (!isListed[vertex]) add(mesh.vertices[vertex], n);
-      isListed[vertex] = true;
+  for (std::uint32_t n = 0; n < triangles.size(); ++n) {
+    const auto& [a, b, c] = triangles[n];
+    for (const Vector3& place : placesInTriangle(triangles[n], limits.spacing)) {
+      moved.emplace_back(place[0] * a + place[1] * b + place[2] * c);
+      triangleOf.push_back(n);
     }
   }
-  return {std::move(mesh.vertices), std::move(mesh.triangles), std::move(points), std::move(triangleOf)};
+  const std::vector<double> magnitudes = moveToSurface(surface, limits.accuracy, moved);
+  std::vector<SurfacePoint> points;
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    const double squared = NearTriangles(triangles.subspan(triangleOf[i], 1)).nearestTo(moved[i]).second;
+    if (magnitudes[i] <= limits.accuracy && squared <= limits.tolerance * limits.tolerance)
+      points.push_back({moved[i], triangleOf[i]});
+  }
+  return points;
+}
+
+std::vector<SurfacePoint> surfacePointsOf(const ImplicitSurface& surface, const EditLimits& limits,
+                                          const Progress& progress, const EditedMesh& mesh) {
+  constexpr std::size_t kAtOnce = 64;
+  std::vector<SurfacePoint> points = detail::listOfChunks<SurfacePoint>(
+      mesh.triangles().size(), kAtOnce, Progress{.report = {}, .cancelled = progress.cancelled}, "",
+      [&](std::vector<SurfacePoint>& found, std::size_t first, std::size_t count) {
+        std::vector<std::array<Vector3, 3>> corners;
+        for (std::size_t n = first; n < first + count; ++n)
+          corners.push_back(mesh.corners(static_cast<std::uint32_t>(n)));
+        found = surfacePointsNear(surface, limits, corners);
+        for (SurfacePoint& point : found) point.triangle += static_cast<std::uint32_t>(first);
+      });
+  for (std::uint32_t vertex = 0; vertex < mesh.vertices().size(); ++vertex)
+    if (!mesh.trianglesAt(vertex).empty()) points.push_back({mesh.vertices()[vertex], mesh.trianglesAt(vertex)[0]});
+  return points;
 }
 
 }  // namespace hpsdf::contouring
