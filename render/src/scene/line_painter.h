@@ -16,7 +16,7 @@ struct SpaceLine {
   double fadeLength;  ///< length, in world units, by which the line fades where it is short in the picture
 };
 
-/// How lines look in the picture. Lengths in the picture are in multiples of the line width.
+/// The appearance of lines in the picture. Lengths in the picture are in multiples of the line width.
 struct LineStyle {
   double fullLength = 24;         ///< lines whose `fadeLength` has this length in the picture have their full strength
   double goneLength = 6;          ///< lines of this length or less have the strength `leastStrength`

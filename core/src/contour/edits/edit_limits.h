@@ -2,7 +2,7 @@
 
 namespace hpsdf::contouring {
 
-/// What a mesh must fulfil after edits.
+/// The limits that a mesh must keep after edits.
 struct EditLimits {
   double tolerance;        ///< greatest distance between the mesh and the surface, both ways
   double accuracy;         ///< greatest magnitude of the function at vertices
