@@ -16,9 +16,9 @@ constexpr std::uint32_t kNoPoint = 0xffffffff;
 /// Makes the polygons of a dual mesh and divides them into triangles.
 class Polygons {
  public:
-  Polygons(const ImplicitSurface& surface, std::span<CrossedEdge> edges, const Sheets& sheets,
-           std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy)
-      : surface_(surface), edges_(edges), sheets_(sheets), fans_(fans), accuracy_(accuracy) {
+  Polygons(const ImplicitSurface& surface, const ContourOctree& octree, std::span<CrossedEdge> edges,
+           const Sheets& sheets, std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy)
+      : surface_(surface), octree_(octree), edges_(edges), sheets_(sheets), fans_(fans), accuracy_(accuracy) {
     mesh_.vertices = std::move(vertices);
     if (!fans_.empty()) addFacePoints();
   }
@@ -67,18 +67,19 @@ class Polygons {
   /// separate them.
   Vector3 pointOn(const Link& link) const {
     const CrossedEdge &one = edges_[link.edges[0]], &other = edges_[link.edges[1]];
-    const int axis = link.axis, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const int axis = link.face.axis, u = (axis + 1) % 3, v = (axis + 2) % 3;
     const double a = one.normal[u], b = one.normal[v], c = other.normal[u], d = other.normal[v];
     const double right = one.normal.dot(one.point) - one.normal[axis] * one.point[axis];
     const double otherRight = other.normal.dot(other.point) - other.normal[axis] * other.point[axis];
     const double determinant = a * d - b * c;
     Vector3 point = (one.point + other.point) / 2;
     if (!link.isOnly) return point;
+    const Box face = boxOf(octree_, link);
     if (std::abs(determinant) > 0.1) {
       Vector3 meeting = point;
       meeting[u] = (right * d - otherRight * b) / determinant;
       meeting[v] = (otherRight * a - right * c) / determinant;
-      if (link.face.contains(meeting)) return bisected(surface_, link.face, meeting, accuracy_);
+      if (face.contains(meeting)) return bisected(surface_, face, meeting, accuracy_);
     }
     for (int step = 0; step < 4; ++step) {
       ValueAndGradient at;
@@ -86,9 +87,9 @@ class Polygons {
       at.gradient[axis] = 0;
       const double squared = at.gradient.squaredNorm();
       if (!(squared > 0.01)) break;
-      point = (point - at.gradient * (at.value / squared)).cwiseMax(link.face.min()).cwiseMin(link.face.max());
+      point = (point - at.gradient * (at.value / squared)).cwiseMax(face.min()).cwiseMin(face.max());
     }
-    return bisected(surface_, link.face, point, accuracy_);
+    return bisected(surface_, face, point, accuracy_);
   }
 
   /// Returns the corners of an edge's polygon, counter-clockwise as seen from outside.
@@ -165,6 +166,7 @@ class Polygons {
   }
 
   const ImplicitSurface& surface_;
+  const ContourOctree& octree_;
   std::span<CrossedEdge> edges_;
   const Sheets& sheets_;
   const std::vector<bool>& fans_;
@@ -177,9 +179,10 @@ class Polygons {
 
 }  // namespace
 
-DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<CrossedEdge> edges, const Sheets& sheets,
-                      std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy) {
-  return Polygons(surface, edges, sheets, std::move(vertices), fans, accuracy).make();
+DualMesh makeDualMesh(const ImplicitSurface& surface, const ContourOctree& octree, std::span<CrossedEdge> edges,
+                      const Sheets& sheets, std::vector<Vector3> vertices, const std::vector<bool>& fans,
+                      double accuracy) {
+  return Polygons(surface, octree, edges, sheets, std::move(vertices), fans, accuracy).make();
 }
 
 }  // namespace hpsdf::contouring

@@ -25,7 +25,8 @@ struct DualMesh {
 /// Makes the mesh, and chooses the diagonals of the polygons that have changed. `fans` marks the edges whose polygons
 /// become fans; it is empty if there are none. The function is at most `accuracy` at further corners, unless several
 /// sheets run through their face.
-DualMesh makeDualMesh(const ImplicitSurface& surface, std::span<CrossedEdge> edges, const Sheets& sheets,
-                      std::vector<Vector3> vertices, const std::vector<bool>& fans, double accuracy);
+DualMesh makeDualMesh(const ImplicitSurface& surface, const ContourOctree& octree, std::span<CrossedEdge> edges,
+                      const Sheets& sheets, std::vector<Vector3> vertices, const std::vector<bool>& fans,
+                      double accuracy);
 
 }  // namespace hpsdf::contouring

@@ -8,18 +8,27 @@
 
 #include "contour/cells/contour_octree.h"
 #include "contour/cells/crossed_edges.h"
+#include "util/grouping.h"
 
 namespace hpsdf::contouring {
+
+/// A face of a leaf: the axis normal to it, and whether it is the upper one of the two.
+struct CellFace {
+  int axis;
+  bool upper;
+};
 
 /// Two crossed edges of a face between two leaves that a sheet of the surface connects across the face. The face is a
 /// whole face of the smaller leaf.
 struct Link {
   std::array<std::uint32_t, 2> edges;  ///< the lower one first
-  std::array<std::int32_t, 2> cells;
-  int axis;     ///< normal to the face
-  Box face;     ///< without a thousandth of its edge at the boundary
+  std::array<std::int32_t, 2> cells;   ///< the one whose face this is first
+  CellFace face;
   bool isOnly;  ///< no other link runs through the face
 };
+
+/// Returns the flat box of a link's face, without a thousandth of its edge at the boundary.
+Box boxOf(const ContourOctree& octree, const Link& link);
 
 /// The sheets of the surface in the leaves of an octree. A sheet passes through one leaf. It meets the boundary of the
 /// leaf in a closed loop, which crosses edges and runs through faces from edge to edge. Each sheet becomes one vertex
@@ -37,9 +46,7 @@ class Sheets {
   std::int32_t cellOf(std::uint32_t sheet) const { return cells_[sheet]; }
 
   /// Returns the edges that a sheet crosses, in ascending order.
-  std::span<const std::uint32_t> edgesOf(std::uint32_t sheet) const {
-    return std::span(edges_).subspan(first_[sheet], first_[sheet + 1] - first_[sheet]);
-  }
+  std::span<const std::uint32_t> edgesOf(std::uint32_t sheet) const { return edges_[sheet]; }
 
   /// Returns the sheet that crosses an edge in leaf number `place` of the leaves around it, which must be in the
   /// octree.
@@ -51,15 +58,11 @@ class Sheets {
   std::uint32_t linkOf(std::uint32_t edge, std::int32_t one, std::int32_t other) const;
 
  private:
-  void listLinks(std::size_t edges);
-
-  std::vector<std::int32_t> cells_;       ///< by sheet
-  std::vector<std::size_t> first_ = {0};  ///< by sheet: its first place in edges_
-  std::vector<std::uint32_t> edges_;
+  std::vector<std::int32_t> cells_;                   ///< by sheet
+  detail::Grouping edges_;                            ///< of sheets
   std::vector<std::array<std::uint32_t, 4>> around_;  ///< by edge: the sheets in the leaves around it
   std::vector<Link> links_;
-  std::vector<std::size_t> firstLink_;  ///< by edge: its first place in linksOfEdge_
-  std::vector<std::uint32_t> linksOfEdge_;
+  detail::Grouping linksOfEdge_;
 };
 
 }  // namespace hpsdf::contouring

@@ -6,7 +6,9 @@
 #include <limits>
 
 #include "bvh/triangle_frame.h"
+#include "contour/cells/projection.h"
 #include "util/chunks.h"
+#include "util/grouping.h"
 
 namespace hpsdf::contouring {
 namespace {
@@ -49,55 +51,15 @@ std::vector<LeafSheets> leavesOf(const Sheets& sheets, const std::vector<double>
   return leaves;
 }
 
-/// The triangles of each crossed edge's polygon.
-class TrianglesOfEdges {
- public:
-  TrianglesOfEdges(std::size_t edges, std::span<const std::uint32_t> edgeOfTriangle)
-      : first_(edges + 1), triangles_(edgeOfTriangle.size()) {
-    for (const std::uint32_t edge : edgeOfTriangle) ++first_[edge + 1];
-    for (std::size_t edge = 0; edge < edges; ++edge) first_[edge + 1] += first_[edge];
-    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-    for (std::uint32_t n = 0; n < edgeOfTriangle.size(); ++n) triangles_[next[edgeOfTriangle[n]]++] = n;
-  }
-
-  std::span<const std::uint32_t> of(std::uint32_t edge) const {
-    return std::span(triangles_).subspan(first_[edge], first_[edge + 1] - first_[edge]);
-  }
-
- private:
-  std::vector<std::uint32_t> first_, triangles_;
-};
-
-/// Moves points along the gradient to the zero set. Afterwards, a point counts if its value is at most `accuracy`.
-void moveToSurface(const ImplicitSurface& surface, std::span<Vector3> points, double accuracy, std::span<bool> counts) {
-  constexpr int kSteps = 4;
-  std::array<ValueAndGradient, kGapPointsAtOnce> found;
-  for (int step = 0; step <= kSteps; ++step) {
-    surface.valuesAndGradients(points, std::span(found).first(points.size()));
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto& [value, gradient] = found[i];
-      counts[i] = std::abs(value) <= accuracy;
-      const double squared = gradient.squaredNorm();
-      if (!counts[i] && step < kSteps && squared > 0.01) points[i] -= gradient * (value / squared);
-    }
-  }
-}
-
-/// Returns the greatest distance from those points that count to the triangles around the crossed edges of a leaf.
-double greatestGapOf(const LeafSheets& leaf, const Sheets& sheets, const TrianglesOfEdges& trianglesOfEdges,
-                     const DualMesh& mesh, std::span<const Vector3> points, std::span<const bool> counts) {
-  std::vector<bvh::TriangleFrame> frames;
-  for (std::uint32_t sheet = leaf.first; sheet < leaf.end; ++sheet)
-    for (const std::uint32_t edge : sheets.edgesOf(sheet))
-      for (const std::uint32_t n : trianglesOfEdges.of(edge)) {
-        const Triangle& t = mesh.triangles[n];
-        frames.push_back(bvh::makeFrame({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, n));
-      }
+/// Returns the greatest distance from points to the nearest of some triangles, which are given by their frames'
+/// numbers.
+double greatestDistanceOf(std::span<const Vector3> points, std::span<const std::uint32_t> triangles,
+                          std::span<const bvh::TriangleFrame> frames) {
   double greatest = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!counts[i]) continue;
+  for (const Vector3& point : points) {
     double least = std::numeric_limits<double>::infinity();
-    for (const bvh::TriangleFrame& frame : frames) least = std::min(least, bvh::squaredDistance(frame, points[i]));
+    for (std::size_t i = 0; i < triangles.size() && least > greatest; ++i)
+      least = std::min(least, bvh::squaredDistance(frames[triangles[i]], point));
     greatest = std::max(greatest, least);
   }
   return std::sqrt(greatest);
@@ -111,10 +73,22 @@ class GapSearch {
       : surface_(surface),
         octree_(octree),
         sheets_(sheets),
-        mesh_(mesh),
-        trianglesOfEdges_(edges, mesh.edgeOfTriangle),
+        trianglesOfEdges_(edges,
+                          [&](const auto& visit) {
+                            for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) visit(mesh.edgeOfTriangle[n], n);
+                          }),
+        frames_(mesh.triangles.size()),
         accuracy_(accuracy),
-        progress_(progress) {}
+        progress_(progress) {
+    constexpr std::size_t kAtOnce = 1024;
+    detail::forEachChunk(frames_.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      for (std::size_t n = first; n < first + count; ++n) {
+        const Triangle& t = mesh.triangles[n];
+        frames_[n] = bvh::makeFrame({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]},
+                                    static_cast<std::uint32_t>(n));
+      }
+    });
+  }
 
   /// Raises the gaps of leaves to the greatest distances of the points that are found from these starting points.
   void search(std::span<const LeafSheets> leaves, std::span<const Vector3> seeds, std::vector<double>& gaps) const {
@@ -128,28 +102,40 @@ class GapSearch {
  private:
   void searchSome(std::span<const LeafSheets> leaves, std::span<const Vector3> seeds, std::vector<double>& gaps) const {
     std::array<Vector3, kGapPointsAtOnce> memory;
-    std::array<bool, kGapPointsAtOnce> counts;
+    std::array<double, kGapPointsAtOnce> magnitudes;
     const std::span points = std::span(memory).first(seeds.size() * leaves.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Box box = octree_.box(octree_[leaves[i / seeds.size()].cell]);
       points[i] = box.min() + seeds[i % seeds.size()].cwiseProduct(box.sizes());
     }
-    moveToSurface(surface_, points, accuracy_, counts);
+    projectOntoSurface(surface_, accuracy_, points, std::span(magnitudes).first(points.size()));
+    std::vector<Vector3> found;
     for (std::size_t i = 0; i < leaves.size(); ++i) {
       const Box box = octree_.box(octree_[leaves[i].cell]);
-      const std::span ours = points.subspan(seeds.size() * i, seeds.size());
-      const std::span isOurs = std::span(counts).subspan(seeds.size() * i, seeds.size());
-      for (std::size_t k = 0; k < ours.size(); ++k) isOurs[k] = isOurs[k] && box.contains(ours[k]);
+      found.clear();
+      for (std::size_t k = seeds.size() * i; k < seeds.size() * (i + 1); ++k)
+        if (magnitudes[k] <= accuracy_ && box.contains(points[k])) found.push_back(points[k]);
       double& gap = gaps[static_cast<std::size_t>(leaves[i].cell)];
-      gap = std::max(gap, greatestGapOf(leaves[i], sheets_, trianglesOfEdges_, mesh_, ours, isOurs));
+      gap = std::max(gap, greatestDistanceOf(found, trianglesAround(leaves[i]), frames_));
     }
+  }
+
+  /// Returns the triangles around the crossed edges of a leaf.
+  std::vector<std::uint32_t> trianglesAround(const LeafSheets& leaf) const {
+    std::vector<std::uint32_t> triangles;
+    for (std::uint32_t sheet = leaf.first; sheet < leaf.end; ++sheet)
+      for (const std::uint32_t edge : sheets_.edgesOf(sheet)) {
+        const std::span more = trianglesOfEdges_[edge];
+        triangles.insert(triangles.end(), more.begin(), more.end());
+      }
+    return triangles;
   }
 
   const ImplicitSurface& surface_;
   const ContourOctree& octree_;
   const Sheets& sheets_;
-  const DualMesh& mesh_;
-  TrianglesOfEdges trianglesOfEdges_;
+  detail::Grouping trianglesOfEdges_;
+  std::vector<bvh::TriangleFrame> frames_;  ///< by triangle
   double accuracy_;
   const Progress& progress_;
 };

@@ -28,7 +28,7 @@ void SurfaceMesh::connect() {
   placeChangedVertices(before);
   forgetGapsAtChanges();
   for (CrossedEdge& edge : edges_) edge.polygon.isUntested |= edge.polygon.isChanged;
-  mesh_ = makeDualMesh(surface_, edges_, *sheets_, vertices_, {}, options_.accuracy);
+  mesh_ = makeDualMesh(surface_, octree_, edges_, *sheets_, vertices_, {}, options_.accuracy);
   measurePolygons(surface_, mesh_, options_.isOpen, options_.tolerance, progress_, edges_);
   for (CrossedEdge& edge : edges_) edge.polygon.isChanged = false;
 }
@@ -104,7 +104,7 @@ void SurfaceMesh::makeFans(const std::vector<bool>& fans) {
     vertices[sheet] = middleOf(*sheets_, sheet, edges_);
     for (const std::uint32_t edge : sheets_->edgesOf(sheet)) edges_[edge].polygon.isChanged = true;
   }
-  mesh_ = makeDualMesh(surface_, edges_, *sheets_, std::move(vertices), fans, options_.accuracy);
+  mesh_ = makeDualMesh(surface_, octree_, edges_, *sheets_, std::move(vertices), fans, options_.accuracy);
   round(mesh_.vertices);
   const std::vector<bool> ofFans = trianglesOfFans();
   for (std::size_t i = 0; i < ofFans.size(); ++i)

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 
 #include "contour/cells/bisection.h"
 #include "contour/cells/meeting_point.h"
+#include "contour/cells/projection.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
@@ -28,36 +27,6 @@ void listPlanes(const Sheets& sheets, std::uint32_t sheet, std::span<const Cross
                 std::vector<TangentPlane>& planes) {
   planes.clear();
   for (const std::uint32_t e : sheets.edgesOf(sheet)) planes.push_back({edges[e].point, edges[e].normal});
-}
-
-/// Moves points along the gradient towards the zero set, within their rooms, and returns the values there.
-std::array<double, kSheetsAtOnce> project(const ImplicitSurface& surface, std::span<Vector3> points,
-                                          std::span<const Box> rooms, double accuracy) {
-  constexpr int kMostSteps = 6;
-  std::array<Vector3, kSheetsAtOnce> tried, best;
-  std::array<double, kSheetsAtOnce> bestValue;
-  std::array<ValueAndGradient, kSheetsAtOnce> found;
-  const std::size_t count = points.size();
-  std::fill_n(bestValue.begin(), count, std::numeric_limits<double>::infinity());
-  std::ranges::copy(points, tried.begin());
-  for (int step = 0; step <= kMostSteps; ++step) {
-    surface.valuesAndGradients(std::span(tried).first(count), std::span(found).first(count));
-    bool moves = false;
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto& [value, gradient] = found[i];
-      if (std::abs(value) < std::abs(bestValue[i])) {
-        bestValue[i] = value;
-        best[i] = tried[i];
-      }
-      const double squared = gradient.squaredNorm();
-      if (std::abs(bestValue[i]) <= accuracy || !(squared > 0.01)) continue;
-      moves = true;
-      tried[i] = (tried[i] - gradient * (value / squared)).cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
-    }
-    if (!moves) break;
-  }
-  std::copy_n(best.begin(), count, points.begin());
-  return bestValue;
 }
 
 }  // namespace
@@ -85,10 +54,11 @@ void placeVertices(const ImplicitSurface& surface, const ContourOctree& octree, 
       const Vector3 start = rooms[i].contains(meeting) ? meeting : middle;
       placed[i] = start.cwiseMax(rooms[i].min()).cwiseMin(rooms[i].max());
     }
-    const std::array<double, kSheetsAtOnce> values = project(surface, placed, std::span(rooms).first(count), accuracy);
+    std::array<double, kSheetsAtOnce> magnitudes;
+    projectOntoSurface(surface, accuracy, placed, std::span(magnitudes).first(count), std::span(rooms).first(count));
     for (std::size_t i = 0; i < count; ++i)
       vertices[chosen[first + i]] =
-          std::abs(values[i]) > accuracy ? bisected(surface, rooms[i], placed[i], accuracy) : placed[i];
+          magnitudes[i] > accuracy ? bisected(surface, rooms[i], placed[i], accuracy) : placed[i];
   });
 }
 

@@ -32,31 +32,34 @@ std::vector<double> valuesInMiddles(const ImplicitSurface& surface, const Edited
   return values;
 }
 
-/// Returns flips of edges of some triangles, by which the middle comes much nearer to the surface.
-std::vector<ProposedFlip> flipsOf(const ImplicitSurface& surface, const EditLimits& limits, const EditedMesh& mesh,
-                                  std::size_t first, std::size_t count) {
+/// Returns flips of edges of those of some triangles that are open, by which the middle comes much nearer to the
+/// surface.
+std::vector<ProposedFlip> flipsOf(const MeshEditor& editor, const std::vector<bool>& isOpen, std::size_t first,
+                                  std::size_t count) {
   constexpr double kFar = 0.1;     // least value in the middle of an edge that may be flipped, in tolerances
   constexpr double kNearer = 0.3;  // greatest value in the middle of the other diagonal, as a part of that
+  const EditedMesh& mesh = editor.mesh();
   std::vector<std::pair<std::uint32_t, std::size_t>> sides;
   std::vector<std::array<std::uint32_t, 2>> edges;
-  for (std::size_t n = first; n < first + count; ++n)
-    for (std::size_t side = 0; side < 3; ++side) {
+  for (auto n = static_cast<std::uint32_t>(first); n < first + count; ++n)
+    for (std::size_t side = 0; side < 3 && isOpen[n]; ++side) {
       const std::uint32_t a = mesh.triangles()[n][side], b = mesh.triangles()[n][(side + 1) % 3];
-      if (a > b) continue;  // the other triangle at the edge has it
-      sides.emplace_back(static_cast<std::uint32_t>(n), side);
+      const std::optional<std::uint32_t> neighbor = neighborOf(mesh, n, side);
+      if (!neighbor || (a > b && isOpen[*neighbor])) continue;  // one triangle of two proposes to flip their edge
+      sides.emplace_back(n, side);
       edges.push_back({a, b});
     }
-  const std::vector<double> before = valuesInMiddles(surface, mesh, edges);
+  const std::vector<double> before = valuesInMiddles(editor.surface(), mesh, edges);
   std::vector<ProposedFlip> flips;
   edges.clear();
   for (std::size_t i = 0; i < sides.size(); ++i) {
-    if (before[i] < kFar * limits.tolerance) continue;
+    if (before[i] < kFar * editor.limits().tolerance) continue;
     std::optional<Edit> flip = flipOf(mesh, sides[i].first, sides[i].second);
     if (!flip) continue;
     edges.push_back({flip->added[0][1], flip->added[0][2]});
     flips.push_back({std::move(*flip), before[i]});
   }
-  const std::vector<double> after = valuesInMiddles(surface, mesh, edges);
+  const std::vector<double> after = valuesInMiddles(editor.surface(), mesh, edges);
   std::vector<ProposedFlip> nearer;
   for (std::size_t i = 0; i < flips.size(); ++i)
     if (after[i] < kNearer * flips[i].value) nearer.push_back(std::move(flips[i]));
@@ -68,17 +71,25 @@ std::vector<ProposedFlip> flipsOf(const ImplicitSurface& surface, const EditLimi
 void align(MeshEditor& editor) {
   constexpr int kMostRounds = 4;
   constexpr std::size_t kAtOnce = 256;
+  std::vector<bool> isOpen(editor.mesh().triangles().size(), true);  // it is not known that no edge is to be flipped
   for (int round = 0; round < kMostRounds; ++round) {
     std::vector<ProposedFlip> proposed = detail::listOfChunks<ProposedFlip>(
-        editor.mesh().triangles().size(), kAtOnce, {}, "",
+        isOpen.size(), kAtOnce, Progress{.cancelled = editor.progress().cancelled}, "",
         [&](std::vector<ProposedFlip>& found, std::size_t first, std::size_t count) {
-          found = flipsOf(editor.surface(), editor.limits(), editor.mesh(), first, count);
+          found = flipsOf(editor, isOpen, first, count);
         });
     std::ranges::stable_sort(proposed, std::greater{}, &ProposedFlip::value);
     std::vector<Edit> flips, chosen;
     for (ProposedFlip& one : proposed) flips.push_back(std::move(one.flip));
+    isOpen.assign(isOpen.size(), false);
+    for (const Edit& flip : flips)
+      for (const std::uint32_t n : flip.removed) isOpen[n] = true;
     for (const std::size_t i : editor.independent(flips)) chosen.push_back(std::move(flips[i]));
-    if (chosen.empty() || std::ranges::count(editor.make(chosen), true) == 0) return;
+    if (chosen.empty()) return;
+    const std::vector<bool> isMade = editor.make(chosen);
+    // The triangles of a flip that was refused stay as they are.
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+      for (const std::uint32_t n : chosen[i].removed) isOpen[n] = isMade[i];
   }
 }
 

@@ -1,10 +1,10 @@
 #include "contour/edits/edge_collapse.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <span>
 
+#include "contour/cells/projection.h"
 #include "util/single_precision.h"
 
 namespace hpsdf::contouring {
@@ -39,19 +39,6 @@ bool staysManifold(const EditedMesh& mesh, std::uint32_t a, std::uint32_t b) {
          });
 }
 
-/// Moves a point along the gradient to the surface, as far as that succeeds.
-Vector3 onSurface(const ImplicitSurface& surface, Vector3 point, double accuracy) {
-  constexpr int kMostSteps = 6;
-  for (int step = 0; step < kMostSteps; ++step) {
-    ValueAndGradient at;
-    surface.valuesAndGradients({&point, 1}, {&at, 1});
-    const double squared = at.gradient.squaredNorm();
-    if (std::abs(at.value) <= accuracy || !(squared > 0.01)) break;
-    point -= at.gradient * (at.value / squared);
-  }
-  return point;
-}
-
 }  // namespace
 
 MergedVertex mergedVertex(const EditedMesh& mesh, std::uint32_t a, std::uint32_t b) {
@@ -74,8 +61,10 @@ std::optional<Edit> collapseOf(const ImplicitSurface& surface, const EditLimits&
   constexpr double kBeforeRounding = 0.25;
   if (!staysManifold(mesh, a, b)) return std::nullopt;
   Edit edit{.removed = trianglesAtEither(mesh, a, b), .added = {}, .vertex = a};
-  edit.position = onSurface(surface, mergedVertex(mesh, a, b).position,
-                            limits.accuracy * (limits.isSinglePrecision ? kBeforeRounding : 1));
+  edit.position = mergedVertex(mesh, a, b).position;
+  double magnitude = 0;
+  projectOntoSurface(surface, limits.accuracy * (limits.isSinglePrecision ? kBeforeRounding : 1), {&edit.position, 1},
+                     {&magnitude, 1});
   if (limits.isSinglePrecision) edit.position = detail::inSinglePrecision(edit.position);
   for (const std::uint32_t n : edit.removed) {
     Triangle triangle = mesh.triangles()[n];

@@ -11,19 +11,6 @@ namespace {
 
 constexpr std::uint32_t kNoNumber = 0xffffffff;
 
-/// Sorts items by their groups: sets `first`, by group, to the place of its first item in `items`. `forEach` calls a
-/// function with the group and the number of each item.
-template <typename ForEach>
-void groupItems(std::size_t groups, const ForEach& forEach, std::vector<std::uint32_t>& first,
-                std::vector<std::uint32_t>& items) {
-  first.assign(groups + 1, 0);
-  forEach([&](std::uint32_t group, std::uint32_t) { ++first[group + 1]; });
-  for (std::size_t group = 0; group < groups; ++group) first[group + 1] += first[group];
-  items.resize(first.back());
-  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-  forEach([&](std::uint32_t group, std::uint32_t item) { items[next[group]++] = item; });
-}
-
 }  // namespace
 
 EditedMesh::EditedMesh(std::vector<Vector3> vertices, std::vector<Triangle> triangles)
@@ -38,13 +25,10 @@ void EditedMesh::setPoints(std::vector<SurfacePoint> points) {
 }
 
 void EditedMesh::listTriangles() {
-  groupItems(
-      vertices_.size(),
-      [&](const auto& visit) {
-        for (std::uint32_t n = 0; n < triangles_.size(); ++n)
-          for (const std::uint32_t vertex : triangles_[n]) visit(vertex, n);
-      },
-      firstAt_, trianglesAt_);
+  trianglesAt_ = detail::Grouping(vertices_.size(), [&](const auto& visit) {
+    for (std::uint32_t n = 0; n < triangles_.size(); ++n)
+      for (const std::uint32_t vertex : triangles_[n]) visit(vertex, n);
+  });
   isAtBoundary_.assign(vertices_.size(), false);
   const std::vector<mesh::DirectedEdge> sides = mesh::directedEdgesOf(triangles_);
   mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> side) {
@@ -54,12 +38,9 @@ void EditedMesh::listTriangles() {
 }
 
 void EditedMesh::listPoints() {
-  groupItems(
-      triangles_.size(),
-      [&](const auto& visit) {
-        for (std::uint32_t n = 0; n < points_.size(); ++n) visit(points_[n].triangle, n);
-      },
-      firstPoint_, pointsOf_);
+  pointsOf_ = detail::Grouping(triangles_.size(), [&](const auto& visit) {
+    for (std::uint32_t n = 0; n < points_.size(); ++n) visit(points_[n].triangle, n);
+  });
 }
 
 std::array<Vector3, 3> EditedMesh::cornersAfter(const Edit& edit, const Triangle& triangle) const {
@@ -77,8 +58,8 @@ void EditedMesh::make(std::span<const Edit> edits) {
     for (const std::uint32_t n : edit.removed) {
       isRemoved[n] = true;
       // Triangles that are added take the places of those that are removed.
-      for (std::uint32_t i = firstPoint_[n]; i < firstPoint_[n + 1]; ++i) {
-        SurfacePoint& point = points_[pointsOf_[i]];
+      for (const std::uint32_t i : pointsOf_[n]) {
+        SurfacePoint& point = points_[i];
         point.triangle = edit.removed[near.nearestTo(point.position).first];
       }
     }

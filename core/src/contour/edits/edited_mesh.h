@@ -11,6 +11,7 @@
 #include "bvh/triangle_frame.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
+#include "util/grouping.h"
 
 namespace hpsdf::contouring {
 
@@ -40,9 +41,7 @@ class EditedMesh {
   std::span<const Vector3> vertices() const { return vertices_; }
   std::span<const Triangle> triangles() const { return triangles_; }
 
-  std::span<const std::uint32_t> trianglesAt(std::uint32_t vertex) const {
-    return std::span(trianglesAt_).subspan(firstAt_[vertex], firstAt_[vertex + 1] - firstAt_[vertex]);
-  }
+  std::span<const std::uint32_t> trianglesAt(std::uint32_t vertex) const { return trianglesAt_[vertex]; }
 
   /// Returns true for a vertex on an edge of one triangle only, or on one of more than two.
   bool isAtBoundary(std::uint32_t vertex) const { return isAtBoundary_[vertex]; }
@@ -50,8 +49,7 @@ class EditedMesh {
   /// Calls visit(position) for each point of the surface that is nearest to a triangle.
   template <typename Visit>
   void forEachPointOf(std::uint32_t triangle, const Visit& visit) const {
-    for (std::uint32_t i = firstPoint_[triangle]; i < firstPoint_[triangle + 1]; ++i)
-      visit(points_[pointsOf_[i]].position);
+    for (const std::uint32_t i : pointsOf_[triangle]) visit(points_[i].position);
   }
 
   std::array<Vector3, 3> corners(std::uint32_t triangle) const {
@@ -76,8 +74,7 @@ class EditedMesh {
   std::vector<Vector3> vertices_;
   std::vector<Triangle> triangles_;
   std::vector<SurfacePoint> points_;
-  std::vector<std::uint32_t> firstAt_, trianglesAt_;
-  std::vector<std::uint32_t> firstPoint_, pointsOf_;
+  detail::Grouping trianglesAt_, pointsOf_;
   std::vector<bool> isAtBoundary_;
 };
 

@@ -42,17 +42,18 @@ std::vector<double> cosinesOf(const ImplicitSurface& surface, std::span<const Co
 struct Trial {
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> places;  ///< by triangle: the one before the edits in whose place it is
-  std::vector<bool> isChanged;        ///< by triangle: an edit changes it, whether that is made or not
+  std::vector<bool> isTested;         ///< by triangle: it is to be tested for crossings
 };
 
-/// Returns the triangles after those edits that are made. `editOf` tells which edit removes a triangle, or kNoEdit.
+/// Returns the triangles after those edits that are made. `editOf` tells which edit removes a triangle, or kNoEdit;
+/// `isTested`, by edit, whether the triangles in its place are to be tested.
 Trial trialOf(std::span<const Triangle> triangles, std::span<const Edit> edits, std::span<const std::size_t> editOf,
-              const std::vector<bool>& isMade) {
+              const std::vector<bool>& isMade, const std::vector<bool>& isTested) {
   Trial trial;
   const auto add = [&](const Triangle& triangle, std::uint32_t place) {
     trial.triangles.push_back(triangle);
     trial.places.push_back(place);
-    trial.isChanged.push_back(editOf[place] != kNoEdit);
+    trial.isTested.push_back(editOf[place] != kNoEdit && isTested[editOf[place]]);
   };
   for (std::uint32_t n = 0; n < triangles.size(); ++n) {
     if (editOf[n] == kNoEdit || !isMade[editOf[n]]) {
@@ -161,17 +162,21 @@ void MeshEditor::leaveOutCrossing(std::span<const Edit> edits, std::vector<bool>
     if (edits[i].vertex) vertices[*edits[i].vertex] = edits[i].position;
     for (const std::uint32_t n : edits[i].removed) editOf[n] = i;
   }
+  std::vector<bool> isTested(edits.size(), true);
   for (;;) {
-    const Trial trial = trialOf(mesh_.triangles(), edits, editOf, isMade);
-    const Crossings crossings = surface::findCrossingsOf({vertices, trial.triangles, "contour"}, trial.isChanged,
+    const Trial trial = trialOf(mesh_.triangles(), edits, editOf, isMade, isTested);
+    const Crossings crossings = surface::findCrossingsOf({vertices, trial.triangles, "contour"}, trial.isTested,
                                                          kMaxCrossings, Progress{.cancelled = progress_.cancelled});
     std::vector<std::size_t> wrong;
     for (const Crossing& crossing : crossings.found)
       for (const std::uint32_t triangle : crossing.triangles) wrong.push_back(editOf[trial.places[triangle]]);
     std::erase_if(wrong, [&](std::size_t edit) { return edit == kNoEdit || !isMade[edit]; });
     if (wrong.empty()) return;
+    // Where all crossings are known, new ones can only be those of triangles that are as before again.
+    isTested.assign(edits.size(), !crossings.complete);
     for (const std::size_t edit : wrong) {
       isMade[edit] = false;
+      isTested[edit] = true;
       if (const auto vertex = edits[edit].vertex) vertices[*vertex] = mesh_.vertices()[*vertex];
     }
   }

@@ -1,34 +1,13 @@
 #include "contour/edits/surface_points.h"
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
+#include "contour/cells/projection.h"
 #include "contour/cells/triangle_errors.h"
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
-namespace {
-
-/// Moves points along the gradient towards the surface, and returns the magnitudes of the function there.
-std::vector<double> moveToSurface(const ImplicitSurface& surface, double accuracy, std::span<Vector3> points) {
-  constexpr int kSteps = 4;
-  std::vector<ValueAndGradient> found(points.size());
-  std::vector<double> magnitudes(points.size());
-  for (int step = 0; step <= kSteps; ++step) {
-    surface.valuesAndGradients(points, found);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto& [value, gradient] = found[i];
-      magnitudes[i] = std::abs(value);
-      const double squared = gradient.squaredNorm();
-      if (magnitudes[i] > accuracy && step < kSteps && squared > 0.01) points[i] -= gradient * (value / squared);
-    }
-  }
-  return magnitudes;
-}
-
-}  // namespace
-
 std::vector<SurfacePoint> surfacePointsNear(const ImplicitSurface& surface, const EditLimits& limits,
                                             std::span<const std::array<Vector3, 3>> triangles) {
   std::vector<Vector3> moved;
@@ -40,7 +19,8 @@ std::vector<SurfacePoint> surfacePointsNear(const ImplicitSurface& surface, cons
       triangleOf.push_back(n);
     }
   }
-  const std::vector<double> magnitudes = moveToSurface(surface, limits.accuracy, moved);
+  std::vector<double> magnitudes(moved.size());
+  projectOntoSurface(surface, limits.accuracy, moved, magnitudes);
   std::vector<SurfacePoint> points;
   for (std::size_t i = 0; i < moved.size(); ++i) {
     const double squared = NearTriangles(triangles.subspan(triangleOf[i], 1)).nearestTo(moved[i]).second;
