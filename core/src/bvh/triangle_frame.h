@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -68,6 +69,15 @@ inline double squaredDistance(const TriangleFrame& f, const Vector3& x) {
   const FramePoint point = locate(f, x);
   const double nearestSide = std::min(std::min(point.side[0], point.side[1]), point.side[2]);
   return point.height * point.height + (point.inside ? 0.0 : nearestSide);
+}
+
+/// Returns the squared distance from x to the nearest of `count` triangles, or that to the first one at which it is at
+/// most `enough`. `frameOf(i)` returns the frame of triangle i.
+template <typename FrameOf>
+double leastSquaredDistance(std::size_t count, const FrameOf& frameOf, const Vector3& x, double enough) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count && least > enough; ++i) least = std::min(least, squaredDistance(frameOf(i), x));
+  return least;
 }
 
 /// Returns the parameter in [0, 1] of the point on segment ab closest to x: 0 at a, 1 at b. Returns 0 if a = b.

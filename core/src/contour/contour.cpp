@@ -343,6 +343,7 @@ class Contouring {
     const EditedMesh before = mesh;
     EditLimits denser = limits;
     denser.spacing = kDenserPoints * tolerance_;
+    const std::size_t missedBefore = measure(surface_, denser, progress_, before).missed;
     for (const double share : kSimplified) {
       mesh = before;
       limits.tolerance = share * tolerance_;
@@ -352,7 +353,7 @@ class Contouring {
       result_.greatestValue = errors.value;
       result_.greatestGap = missedCells_ > 0 ? std::max(result_.greatestGap, errors.gap) : errors.gap;
       result_.unresolved = errors.missed + missedCells_;
-      if (errors.missed == 0 || missedPolygons_ > 0) return;
+      if (errors.missed <= missedBefore) return;
     }
   }
 

@@ -55,13 +55,10 @@ std::vector<LeafSheets> leavesOf(const Sheets& sheets, const std::vector<double>
 /// numbers.
 double greatestDistanceOf(std::span<const Vector3> points, std::span<const std::uint32_t> triangles,
                           std::span<const bvh::TriangleFrame> frames) {
+  const auto frameOf = [&](std::size_t i) -> const bvh::TriangleFrame& { return frames[triangles[i]]; };
   double greatest = 0;
-  for (const Vector3& point : points) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < triangles.size() && least > greatest; ++i)
-      least = std::min(least, bvh::squaredDistance(frames[triangles[i]], point));
-    greatest = std::max(greatest, least);
-  }
+  for (const Vector3& point : points)
+    greatest = std::max(greatest, bvh::leastSquaredDistance(triangles.size(), frameOf, point, greatest));
   return std::sqrt(greatest);
 }
 

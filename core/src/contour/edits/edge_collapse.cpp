@@ -56,22 +56,26 @@ MergedVertex mergedVertex(const EditedMesh& mesh, std::uint32_t a, std::uint32_t
   return {position, greatestDistance(position, planes)};
 }
 
-std::optional<Edit> collapseOf(const ImplicitSurface& surface, const EditLimits& limits, const EditedMesh& mesh,
-                               std::uint32_t a, std::uint32_t b) {
-  constexpr double kBeforeRounding = 0.25;
+std::optional<Edit> collapseOf(const EditedMesh& mesh, std::uint32_t a, std::uint32_t b) {
   if (!staysManifold(mesh, a, b)) return std::nullopt;
-  Edit edit{.removed = trianglesAtEither(mesh, a, b), .added = {}, .vertex = a};
-  edit.position = mergedVertex(mesh, a, b).position;
-  double magnitude = 0;
-  projectOntoSurface(surface, limits.accuracy * (limits.isSinglePrecision ? kBeforeRounding : 1), {&edit.position, 1},
-                     {&magnitude, 1});
-  if (limits.isSinglePrecision) edit.position = detail::inSinglePrecision(edit.position);
+  Edit edit{.removed = trianglesAtEither(mesh, a, b),
+            .added = {},
+            .vertex = a,
+            .position = mergedVertex(mesh, a, b).position};
   for (const std::uint32_t n : edit.removed) {
     Triangle triangle = mesh.triangles()[n];
     std::ranges::replace(triangle, b, a);
     if (std::ranges::count(triangle, a) == 1) edit.added.push_back(triangle);
   }
   return edit;
+}
+
+void placeVertex(const ImplicitSurface& surface, const EditLimits& limits, Edit& edit) {
+  constexpr double kBeforeRounding = 0.25;
+  double magnitude = 0;
+  projectOntoSurface(surface, limits.accuracy * (limits.isSinglePrecision ? kBeforeRounding : 1), {&edit.position, 1},
+                     {&magnitude, 1});
+  if (limits.isSinglePrecision) edit.position = detail::inSinglePrecision(edit.position);
 }
 
 }  // namespace hpsdf::contouring

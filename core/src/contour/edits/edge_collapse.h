@@ -20,9 +20,11 @@ struct MergedVertex {
 /// Returns the point that fits the planes of the triangles at both ends of an edge best. It is near the surface.
 MergedVertex mergedVertex(const EditedMesh& mesh, std::uint32_t a, std::uint32_t b);
 
-/// Returns the edit that merges the ends of an edge into a vertex on the surface, or std::nullopt if the mesh would be
-/// no manifold afterwards, or if an end is at the mesh's boundary.
-std::optional<Edit> collapseOf(const ImplicitSurface& surface, const EditLimits& limits, const EditedMesh& mesh,
-                               std::uint32_t a, std::uint32_t b);
+/// Returns the edit that merges the ends of an edge into the point of `mergedVertex`, or std::nullopt if the mesh would
+/// be no manifold afterwards, or if an end is at the mesh's boundary.
+std::optional<Edit> collapseOf(const EditedMesh& mesh, std::uint32_t a, std::uint32_t b);
+
+/// Moves the position of an edit's vertex onto the surface.
+void placeVertex(const ImplicitSurface& surface, const EditLimits& limits, Edit& edit);
 
 }  // namespace hpsdf::contouring

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "mesh/connectivity.h"
+#include "util/chunks.h"
 
 namespace hpsdf::contouring {
 namespace {
@@ -43,27 +44,32 @@ void EditedMesh::listPoints() {
   });
 }
 
-std::array<Vector3, 3> EditedMesh::cornersAfter(const Edit& edit, const Triangle& triangle) const {
-  std::array<Vector3, 3> corners;
+Corners EditedMesh::cornersAfter(const Edit& edit, const Triangle& triangle) const {
+  Corners corners;
   for (std::size_t k = 0; k < 3; ++k) corners[k] = triangle[k] == edit.vertex ? edit.position : vertices_[triangle[k]];
   return corners;
 }
 
+/// Gives the points of triangles that an edit removes to the nearest triangle that it adds. Triangles that are added
+/// take the places of those that are removed.
+void EditedMesh::movePoints(const Edit& edit) {
+  std::vector<Corners> added;
+  for (const Triangle& triangle : edit.added) added.push_back(cornersAfter(edit, triangle));
+  const NearTriangles near(added);
+  for (const std::uint32_t n : edit.removed)
+    for (const std::uint32_t i : pointsOf_[n])
+      points_[i].triangle = edit.removed[near.nearestTo(points_[i].position).first];
+}
+
 void EditedMesh::make(std::span<const Edit> edits) {
+  constexpr std::size_t kAtOnce = 16;
+  if (hasPoints())
+    detail::forEachChunk(edits.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      for (const Edit& edit : edits.subspan(first, count)) movePoints(edit);
+    });
   std::vector<bool> isRemoved(triangles_.size());
-  for (const Edit& edit : edits) {
-    std::vector<std::array<Vector3, 3>> added;
-    for (const Triangle& triangle : edit.added) added.push_back(cornersAfter(edit, triangle));
-    const NearTriangles near(added);
-    for (const std::uint32_t n : edit.removed) {
-      isRemoved[n] = true;
-      // Triangles that are added take the places of those that are removed.
-      for (const std::uint32_t i : pointsOf_[n]) {
-        SurfacePoint& point = points_[i];
-        point.triangle = edit.removed[near.nearestTo(point.position).first];
-      }
-    }
-  }
+  for (const Edit& edit : edits)
+    for (const std::uint32_t n : edit.removed) isRemoved[n] = true;
   for (const Edit& edit : edits) {
     if (edit.vertex) vertices_[*edit.vertex] = edit.position;
     for (std::size_t i = 0; i < edit.added.size(); ++i) {
@@ -96,7 +102,7 @@ TriangleMesh EditedMesh::finish() && {
   return {std::move(used), std::move(triangles_), "contour"};
 }
 
-NearTriangles::NearTriangles(std::span<const std::array<Vector3, 3>> triangles) {
+NearTriangles::NearTriangles(std::span<const Corners> triangles) {
   for (const auto& corners : triangles) frames_.push_back(bvh::makeFrame(corners, 0));
 }
 
@@ -107,6 +113,11 @@ std::pair<std::size_t, double> NearTriangles::nearestTo(const Vector3& point) co
     if (squared < nearest.second) nearest = {i, squared};
   }
   return nearest;
+}
+
+void NearTriangles::raise(double& squared, const Vector3& point) const {
+  const auto frameOf = [&](std::size_t i) -> const bvh::TriangleFrame& { return frames_[i]; };
+  squared = std::max(squared, bvh::leastSquaredDistance(frames_.size(), frameOf, point, squared));
 }
 
 }  // namespace hpsdf::contouring

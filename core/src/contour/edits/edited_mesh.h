@@ -15,6 +15,9 @@
 
 namespace hpsdf::contouring {
 
+/// The positions of the corners of a triangle.
+using Corners = std::array<Vector3, 3>;
+
 /// A change of a mesh: some triangles are replaced by others, of which there are as many or fewer.
 struct Edit {
   std::vector<std::uint32_t> removed;  ///< indices of triangles
@@ -52,13 +55,13 @@ class EditedMesh {
     for (const std::uint32_t i : pointsOf_[triangle]) visit(points_[i].position);
   }
 
-  std::array<Vector3, 3> corners(std::uint32_t triangle) const {
+  Corners corners(std::uint32_t triangle) const {
     const Triangle& t = triangles_[triangle];
     return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]};
   }
 
   /// Returns the corners of a triangle after an edit.
-  std::array<Vector3, 3> cornersAfter(const Edit& edit, const Triangle& triangle) const;
+  Corners cornersAfter(const Edit& edit, const Triangle& triangle) const;
 
   /// Makes edits, which have no triangle in common. The points of triangles that an edit removes become those of the
   /// nearest triangle that it adds.
@@ -68,6 +71,7 @@ class EditedMesh {
   TriangleMesh finish() &&;
 
  private:
+  void movePoints(const Edit& edit);
   void listTriangles();
   void listPoints();
 
@@ -81,10 +85,13 @@ class EditedMesh {
 /// Triangles whose distances from many points are needed.
 class NearTriangles {
  public:
-  explicit NearTriangles(std::span<const std::array<Vector3, 3>> triangles);
+  explicit NearTriangles(std::span<const Corners> triangles);
 
   /// Returns the place of the triangle that is nearest to a point, and the squared distance.
   std::pair<std::size_t, double> nearestTo(const Vector3& point) const;
+
+  /// Raises a squared distance to that of a point from the nearest triangle.
+  void raise(double& squared, const Vector3& point) const;
 
  private:
   std::vector<bvh::TriangleFrame> frames_;

@@ -13,8 +13,6 @@
 namespace hpsdf::contouring {
 namespace {
 
-using Corners = std::array<Vector3, 3>;
-
 constexpr std::size_t kNoEdit = ~std::size_t{0};
 
 /// Triangles that are flatter than this, as the ratio of their height to their longest side, are made only where there
@@ -94,19 +92,11 @@ std::vector<std::size_t> MeshEditor::independent(std::span<const Edit> edits) co
 }
 
 /// Returns true if no triangle that is added is folded over, or fewer than before, and none is flatter than all that
-/// are removed.
-bool MeshEditor::isShapely(const Edit& edit) const {
+/// are removed. Triangles are given by their corners.
+bool MeshEditor::isShapely(std::span<const Corners> removed, std::span<const Corners> added) const {
   double allowed = kFlattest;
-  std::vector<Corners> removed;
-  for (const std::uint32_t n : edit.removed) {
-    removed.push_back(mesh_.corners(n));
-    allowed = std::min(allowed, flatness(removed.back()));
-  }
-  std::vector<Corners> added;
-  for (const Triangle& triangle : edit.added) {
-    added.push_back(mesh_.cornersAfter(edit, triangle));
-    if (!(flatness(added.back()) >= allowed)) return false;
-  }
+  for (const Corners& corners : removed) allowed = std::min(allowed, flatness(corners));
+  if (!std::ranges::all_of(added, [&](const Corners& corners) { return flatness(corners) >= allowed; })) return false;
   const auto folded = [&](std::span<const Corners> triangles) {
     return std::ranges::count_if(cosinesOf(surface_, triangles), [](double cosine) { return cosine < kFolded; });
   };
@@ -114,21 +104,18 @@ bool MeshEditor::isShapely(const Edit& edit) const {
   return left == 0 || left < folded(removed);
 }
 
-/// Returns the greatest errors of the triangles that are added; the search ends where they exceed the tolerance.
-MeshErrors MeshEditor::distancesAfter(const Edit& edit) const {
-  std::vector<Corners> added;
-  for (const Triangle& triangle : edit.added) added.push_back(mesh_.cornersAfter(edit, triangle));
+/// Returns the greatest errors of the triangles that are added, which are given by their corners; the search ends where
+/// they exceed the tolerance.
+MeshErrors MeshEditor::distancesAfter(const Edit& edit, std::span<const Corners> removed,
+                                      std::span<const Corners> added) const {
   const NearTriangles near(added);
   double squaredGap = 0;
   const auto measure = [&](const Vector3& point) {
-    if (squaredGap <= limits_.tolerance * limits_.tolerance)
-      squaredGap = std::max(squaredGap, near.nearestTo(point).second);
+    if (squaredGap <= limits_.tolerance * limits_.tolerance) near.raise(squaredGap, point);
   };
   if (mesh_.hasPoints()) {
     for (const std::uint32_t n : edit.removed) mesh_.forEachPointOf(n, measure);
   } else {
-    std::vector<Corners> removed;
-    for (const std::uint32_t n : edit.removed) removed.push_back(mesh_.corners(n));
     for (const SurfacePoint& point : surfacePointsNear(surface_, limits_, removed)) measure(point.position);
   }
   MeshErrors errors{.value = 0, .gap = std::sqrt(squaredGap)};
@@ -147,8 +134,11 @@ std::optional<MeshErrors> MeshEditor::errorsAfter(const Edit& edit) const {
     surface_.values({&edit.position, 1}, {&value, 1});
     if (!(std::abs(value) <= limits_.accuracy)) return std::nullopt;
   }
-  if (!isShapely(edit)) return std::nullopt;
-  const MeshErrors errors = distancesAfter(edit);
+  std::vector<Corners> removed, added;
+  for (const std::uint32_t n : edit.removed) removed.push_back(mesh_.corners(n));
+  for (const Triangle& triangle : edit.added) added.push_back(mesh_.cornersAfter(edit, triangle));
+  if (!isShapely(removed, added)) return std::nullopt;
+  const MeshErrors errors = distancesAfter(edit, removed, added);
   if (errors.gap > limits_.tolerance || errors.value > limits_.tolerance) return std::nullopt;
   return errors;
 }

@@ -46,8 +46,8 @@ class MeshEditor {
 
  private:
   std::optional<MeshErrors> errorsAfter(const Edit& edit) const;
-  bool isShapely(const Edit& edit) const;
-  MeshErrors distancesAfter(const Edit& edit) const;
+  bool isShapely(std::span<const Corners> removed, std::span<const Corners> added) const;
+  MeshErrors distancesAfter(const Edit& edit, std::span<const Corners> removed, std::span<const Corners> added) const;
   void leaveOutCrossing(std::span<const Edit> edits, std::vector<bool>& isMade) const;
 
   const ImplicitSurface& surface_;

@@ -15,13 +15,12 @@ MeshErrors measure(const ImplicitSurface& surface, const EditLimits& limits, con
   std::vector<double> values(triangles), squaredGaps(triangles);
   detail::forEachChunk(triangles, kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
     progress.throwIfCancelled();
-    std::vector<std::array<Vector3, 3>> corners;
+    std::vector<Corners> corners;
     for (std::size_t n = first; n < first + count; ++n) {
       corners.push_back(mesh.corners(static_cast<std::uint32_t>(n)));
       const NearTriangles triangle({&corners.back(), 1});
-      mesh.forEachPointOf(static_cast<std::uint32_t>(n), [&](const Vector3& point) {
-        squaredGaps[n] = std::max(squaredGaps[n], triangle.nearestTo(point).second);
-      });
+      mesh.forEachPointOf(static_cast<std::uint32_t>(n),
+                          [&](const Vector3& point) { triangle.raise(squaredGaps[n], point); });
     }
     raiseErrors([&](auto points, auto found) { surface.values(points, found); }, corners, limits.tolerance,
                 limits.spacing, std::span(values).subspan(first, count));

@@ -70,7 +70,7 @@ class Simplification {
   /// Returns candidates that have not been tried, by their costs: a part of all, so that the flattest places come
   /// first.
   std::vector<std::size_t> cheapestCandidates() const {
-    constexpr std::size_t kPart = 3, kLeast = 512;
+    constexpr std::size_t kPart = 3, kLeast = 4096;
     const double dearest = 2 * editor_.limits().tolerance;
     std::vector<std::size_t> cheapest;
     for (std::size_t i = 0; i < candidates_.size(); ++i)
@@ -85,9 +85,9 @@ class Simplification {
     constexpr std::size_t kAtOnce = 64;
     std::vector<std::optional<Edit>> found(cheapest.size());
     detail::forEachChunk(found.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      editor_.progress().throwIfCancelled();
       for (std::size_t i = first; i < first + count; ++i)
-        found[i] = collapseOf(editor_.surface(), editor_.limits(), mesh_, candidates_[cheapest[i]].low(),
-                              candidates_[cheapest[i]].high());
+        found[i] = collapseOf(mesh_, candidates_[cheapest[i]].low(), candidates_[cheapest[i]].high());
     });
     std::vector<Edit> edits;
     std::vector<std::size_t> candidateOf;
@@ -104,6 +104,9 @@ class Simplification {
       candidates_[candidateOf[i]].isTried = true;
       chosen.push_back(std::move(edits[i]));
     }
+    detail::forEachChunk(chosen.size(), kAtOnce, [&](std::size_t, std::size_t first, std::size_t count) {
+      for (Edit& edit : std::span(chosen).subspan(first, count)) placeVertex(editor_.surface(), editor_.limits(), edit);
+    });
     std::vector<std::vector<std::uint32_t>> around;
     for (const Edit& edit : chosen) around.push_back(verticesAround(edit));
     const std::vector<bool> isMade = editor_.make(chosen);

@@ -9,7 +9,7 @@
 
 namespace hpsdf::contouring {
 std::vector<SurfacePoint> surfacePointsNear(const ImplicitSurface& surface, const EditLimits& limits,
-                                            std::span<const std::array<Vector3, 3>> triangles) {
+                                            std::span<const Corners> triangles) {
   std::vector<Vector3> moved;
   std::vector<std::uint32_t> triangleOf;
   for (std::uint32_t n = 0; n < triangles.size(); ++n) {
@@ -36,7 +36,7 @@ std::vector<SurfacePoint> surfacePointsOf(const ImplicitSurface& surface, const 
   std::vector<SurfacePoint> points = detail::listOfChunks<SurfacePoint>(
       mesh.triangles().size(), kAtOnce, Progress{.report = {}, .cancelled = progress.cancelled}, "",
       [&](std::vector<SurfacePoint>& found, std::size_t first, std::size_t count) {
-        std::vector<std::array<Vector3, 3>> corners;
+        std::vector<Corners> corners;
         for (std::size_t n = first; n < first + count; ++n)
           corners.push_back(mesh.corners(static_cast<std::uint32_t>(n)));
         found = surfacePointsNear(surface, limits, corners);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <span>
 #include <vector>
 
@@ -14,7 +13,7 @@ namespace hpsdf::contouring {
 /// Returns points of the surface near triangles, which are given by their corners: some for each, within the tolerance
 /// of it. `triangle` of a point is the place of its triangle among these.
 std::vector<SurfacePoint> surfacePointsNear(const ImplicitSurface& surface, const EditLimits& limits,
-                                            std::span<const std::array<Vector3, 3>> triangles);
+                                            std::span<const Corners> triangles);
 
 /// Returns the vertices of a mesh, and points of the surface near its triangles.
 std::vector<SurfacePoint> surfacePointsOf(const ImplicitSurface& surface, const EditLimits& limits,

@@ -25,8 +25,10 @@ std::optional<Edit> unfoldingOf(const MeshEditor& editor, std::uint32_t triangle
   const Triangle& t = mesh.triangles()[triangle];
   const std::array<std::size_t, 3> sides = sidesByLength(mesh, t);
   if (attempt == 0) return flipOf(mesh, triangle, sides[2]);
-  if (attempt == 1) return collapseOf(editor.surface(), editor.limits(), mesh, t[sides[0]], t[(sides[0] + 1) % 3]);
-  return flipOf(mesh, triangle, sides[1]);
+  if (attempt == 2) return flipOf(mesh, triangle, sides[1]);
+  std::optional<Edit> collapse = collapseOf(mesh, t[sides[0]], t[(sides[0] + 1) % 3]);
+  if (collapse) placeVertex(editor.surface(), editor.limits(), *collapse);
+  return collapse;
 }
 
 }  // namespace
