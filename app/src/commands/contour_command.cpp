@@ -13,7 +13,6 @@
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
-#include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/mesh_file.h"
@@ -144,9 +143,8 @@ std::vector<WrittenContour> writeContours(Session& session, const Arguments& arg
   const int threads = arguments.whole("threads");
   const double tolerance = toleranceOf(arguments, current);
   const render::ReferenceData colorData = vertexColorData(session, arguments);
-  std::optional<Field> blendedField;
-  if (current.data().blend == 0 && !arguments.flag("keep-jumps"))
-    blendedField = withThreads(threads, [&] { return blended(current); });
+  const Field* followed = &current;
+  if (!arguments.flag("keep-jumps")) followed = withThreads(threads, [&] { return &session.continuousField(); });
   std::vector<WrittenContour> all;
   for (const double offset : arguments.numbers("offset")) {
     const std::string file = fileOf(arguments.text("output"), offset);
@@ -156,14 +154,13 @@ std::vector<WrittenContour> writeContours(Session& session, const Arguments& arg
                                  .singlePrecision = isSinglePrecisionMesh(file),
                                  .simplify = arguments.flag("simplify"),
                                  .threads = threads};
-    const Field& field = blendedField ? *blendedField : current;
-    Contour made =
-        withProgress(session.console(), [&](const Progress& progress) { return contour(field, options, progress); });
+    Contour made = withProgress(session.console(),
+                                [&](const Progress& progress) { return contour(*followed, options, progress); });
     if (made.mesh.triangles.empty())
       throw Error(
           fmt::format("offset: the field has no value of {} in its domain, so that there is no surface", offset));
-    auto colors = vertexColors(arguments, field, made.mesh, colorData);
-    all.push_back({file, offset, tolerance, blendedField.has_value(), std::move(made), std::move(colors)});
+    auto colors = vertexColors(arguments, *followed, made.mesh, colorData);
+    all.push_back({file, offset, tolerance, followed != &current, std::move(made), std::move(colors)});
   }
   for (const WrittenContour& made : all) saveMesh(made.contour.mesh, made.file, vertexDataOf(arguments, made));
   return all;

@@ -30,6 +30,7 @@ void Session::setField(CurrentField field) {
   renderer_.reset();
   defects_.reset();
   operands_.reset();
+  blended_.reset();
   contour_.reset();
   jumps_.reset();
   exact_.reset();
@@ -127,12 +128,19 @@ const std::vector<render::OutlinedSolid>& Session::operands(const std::string& e
   return *operands_;
 }
 
+const Field& Session::continuousField() {
+  const Field& field = current().field;
+  if (field.data().blend != 0) return field;
+  if (!blended_) blended_ = blended(field);
+  return *blended_;
+}
+
 const Contour& Session::contour(double offset, double tolerance) {
   if (!knowsContour(offset, tolerance)) {
-    const Field& field = current().field;
+    const Field& field = continuousField();
     contour_ = withProgress(console_, [&](const Progress& progress) {
       const ContourOptions options{.offset = offset, .tolerance = tolerance};
-      return hpsdf::contour(field.data().blend == 0 ? blended(field) : field, options, progress);
+      return hpsdf::contour(field, options, progress);
     });
     contourOf_ = {offset, tolerance};
   }

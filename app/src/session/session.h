@@ -135,7 +135,11 @@ class Session {
   /// expression for the word "own". They are kept for later calls. Throws as `loadedOperands` does.
   const std::vector<render::OutlinedSolid>& operands(const std::string& expression);
 
-  /// Returns the contour that the command `contour` would write: of the blended field if the field jumps between cells.
+  /// Returns the field whose contours the command `contour` writes unless it keeps jumps: the current field, or a
+  /// blended copy if the current field jumps between cells. The copy is kept until the field changes.
+  const Field& continuousField();
+
+  /// Returns the contour that the command `contour` would write: of `continuousField`.
   /// The last one is kept. `offset` and `tolerance` are in the field's units. Throws as `hpsdf::contour` does.
   const Contour& contour(double offset, double tolerance);
   /// True if `contour` would return the contour that is kept.
@@ -160,7 +164,8 @@ class Session {
   std::optional<MeshDefects> defects_;
   std::string defectsOf_;  // surface argument of the call that computed `defects_`
   std::optional<std::vector<render::OutlinedSolid>> operands_;
-  std::string operandsOf_;  // argument of the call that loaded `operands_`
+  std::string operandsOf_;        // argument of the call that loaded `operands_`
+  std::optional<Field> blended_;  // copy of the current field, for contours
   std::optional<Contour> contour_;
   std::pair<double, double> contourOf_;                      // offset and tolerance of `contour_`
   std::vector<std::unique_ptr<Other>> others_;               // most recently used first; renderers keep references
