@@ -378,19 +378,36 @@ TEST(Explorer, theTrianglesOfTheContourAreShownAndCounted) {
   bench.run("contour output=" + (folder / "t.ply").string() + " tolerance=1%");
   EXPECT_EQ(readMesh(folder / "t.ply").triangles.size(), triangles);
 
-  // It follows the tolerance, the offset and the field; rough frames of a moving view do not wait for it.
+  // The commands that change the tolerance, the offset or the field make it anew, before they return.
   bench.run("triangles tolerance=0.3%");
   EXPECT_GT(bench.explorer().shownContour()->mesh.triangles.size(), triangles);
-  bench.run("surface offset=0.05");
-  bench.explorer().frame(4);
-  EXPECT_EQ(bench.explorer().shownContour(), nullptr);
-  bench.explorer().frame();
+  const double area = surfaceArea(bench.explorer().shownContour()->mesh);
+  for (const char* const line : {"surface offset=0.05", "build analytic:torus target-error=1e-3 estimator=embedded"}) {
+    bench.run(line);
+    ASSERT_NE(bench.explorer().shownContour(), nullptr) << line;
+    EXPECT_GT(surfaceArea(bench.explorer().shownContour()->mesh), 1.05 * area) << line;
+  }
+  bench.run("undo");
   ASSERT_NE(bench.explorer().shownContour(), nullptr);
-  bench.run("build analytic:torus target-error=1e-3 estimator=embedded");
-  EXPECT_EQ(bench.explorer().shownContour(), nullptr);
+  EXPECT_NEAR(surfaceArea(bench.explorer().shownContour()->mesh), area, 0.02 * area);
+  bench.run("redo; ui click view/tolerance; surface offset=0.02");  // a text field is open
+  EXPECT_NE(bench.explorer().shownContour(), nullptr);
   EXPECT_THAT(bench.failure("triangles tolerance=0"), HasSubstr("tolerance"));
   EXPECT_THAT(bench.failure("triangles tolerance=1e-9"), HasSubstr("tolerance"));
   EXPECT_EQ(bench.view().trianglesTolerance, "0.3%") << "a tolerance that fails changes nothing";
+}
+
+TEST(Explorer, trianglesAreHiddenIfTheirContourCannotBeMade) {
+  Bench bench;
+  bench.run(kTorus);
+  bench.run("triangles shown=true tolerance=0.02");
+  bench.run("combine \"scale(builtin:box, 1000000)\" max-steps=1");
+  EXPECT_FALSE(bench.view().triangles);
+  EXPECT_THAT(bench.err.str(), HasSubstr("hpsdf: warning: the triangles are hidden: tolerance: must be at least"));
+  EXPECT_NO_THROW(bench.explorer().frame());
+  EXPECT_THAT(bench.failure("triangles shown=true"), HasSubstr("tolerance: must be at least"));
+  bench.run("triangles shown=true tolerance=1%");
+  EXPECT_NE(bench.explorer().shownContour(), nullptr);
 }
 
 TEST(Explorer, theFieldIsBlendedOnceForAllContours) {

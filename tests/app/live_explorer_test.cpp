@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <random>
 #include <sstream>
@@ -412,23 +413,83 @@ TEST(LiveWork, measurementsForAFrameCannotBeCancelled) {
   EXPECT_GE(frames, 1);
 }
 
-/// Cancels all work.
-class Canceller final : public WorkListener {
+/// Notes whether a contour was made, and cancels contours if asked to.
+class ContourListener final : public WorkListener {
  public:
-  void report(std::string_view, double) override {}
-  bool wantsCancel() override { return true; }
-  void ended() override {}
+  explicit ContourListener(Session& session) : session_(session) { session.setListener(this); }
+  ~ContourListener() override { session_.setListener(nullptr); }
+  void report(std::string_view task, double) override {
+    if (task == "meshing") isContour_ = true;
+  }
+  bool wantsCancel() override { return isContour_ && cancels; }
+  void ended() override {
+    contours += isContour_ ? 1 : 0;
+    isContour_ = false;
+  }
+  std::atomic<bool> cancels = true;
+  int contours = 0;  ///< number of contours that were begun
+
+ private:
+  Session& session_;
+  std::atomic<bool> isContour_ = false;
 };
 
 TEST(LiveWork, theContourOfShownTrianglesCanBeCancelled) {
   Desk desk;
-  Canceller canceller;
-  desk.session().setListener(&canceller);
+  desk.run(kFirst);
+  ContourListener listener(desk.session());
   EXPECT_THROW(desk.run("triangles shown=true"), Cancelled);
-  desk.session().setListener(nullptr);
   EXPECT_FALSE(desk.explorer().view().triangles) << "nothing has changed";
-  desk.run("triangles shown=true");
+  listener.cancels = false;
+  desk.run("triangles shown=true tolerance=1%");
   EXPECT_NE(desk.explorer().shownContour(), nullptr);
+
+  listener.cancels = true;
+  EXPECT_THROW(desk.run("surface offset=0.05"), Cancelled);
+  EXPECT_EQ(desk.explorer().view().surfaceOffset, 0);
+  EXPECT_NE(desk.explorer().shownContour(), nullptr) << "the former one is kept";
+
+  // A cancelled contour of a new field leaves the field, without triangles.
+  desk.explorer().run("build analytic:torus target-error=1e-3");
+  EXPECT_FALSE(desk.explorer().view().triangles);
+  EXPECT_THAT(desk.explorer().message, HasSubstr("the triangles are hidden: their contour was cancelled"));
+  const int before = listener.contours;
+  desk.explorer().frame();
+  EXPECT_EQ(listener.contours, before) << "no frame makes a contour";
+}
+
+TEST(LiveWork, theContourIsMadeWhenAGestureHasEnded) {
+  Desk desk;
+  desk.run(kFirst);
+  desk.run("triangles shown=true tolerance=1%");
+  Recording recording(desk.explorer(), {});
+  ContourListener listener(desk.session());
+  listener.cancels = false;
+  const auto drag = [&](double by) {
+    desk.moveTo("view/offset");
+    const auto [x, y] = desk.explorer().ui().pointer();
+    desk.press();
+    for (int i = 1; i <= 4; ++i) {
+      desk.move(x + by * i / 4, y);
+      desk.explorer().frame(i);
+    }
+    EXPECT_EQ(desk.explorer().shownContour(), nullptr);
+    EXPECT_EQ(listener.contours, 0);
+    desk.release();
+  };
+  drag(20);
+  EXPECT_EQ(listener.contours, 1);
+  EXPECT_NE(desk.explorer().shownContour(), nullptr);
+  EXPECT_TRUE(desk.explorer().isStale()) << "the picture is drawn again, with the triangles";
+  EXPECT_THAT(recording.script(), HasSubstr("surface offset="));
+  const double offset = desk.explorer().view().surfaceOffset;
+
+  listener.contours = 0;
+  listener.cancels = true;
+  EXPECT_THROW(drag(40), Cancelled);
+  EXPECT_EQ(desk.explorer().view().surfaceOffset, offset) << "the gesture is undone";
+  EXPECT_NE(desk.explorer().shownContour(), nullptr);
+  EXPECT_THAT(recording.script(), HasSubstr("undo"));
 }
 
 TEST(Registry, theWindowIsForTheCommandLine) {

@@ -7,6 +7,8 @@
 #include <set>
 #include <sstream>
 
+#include "console/console.h"
+#include "console/interrupt.h"
 #include "explorer/exact_outline.h"
 #include "explorer/worst_places.h"
 #include "hpsdf/detail/build_settings.h"
@@ -90,6 +92,8 @@ Explorer::Explorer(Session& session) : session_(session) {
 }
 
 void Explorer::change(ViewState next) {
+  const bool isGesture = running_ && ui_.busy();
+  if (!isGesture) makeContour(next);
   // `before_` is the history before a gesture, such as the drag of a slider. A command that replaces the previous
   // command of the same gesture starts from this history again.
   if (!replaces_) before_ = {view_, undone_.size(), redone_};
@@ -104,7 +108,9 @@ void Explorer::change(ViewState next) {
 
 bool Explorer::goBack(std::vector<ViewState>& from, std::vector<ViewState>& to) {
   if (from.empty()) return false;
-  to.push_back(std::exchange(view_, withFrameOf(view_, from.back())));
+  ViewState next = withFrameOf(view_, from.back());
+  makeContour(next);
+  to.push_back(std::exchange(view_, std::move(next)));
   from.pop_back();
   session_.setExplanation({});
   return true;
@@ -213,6 +219,51 @@ void Explorer::fieldChanged() {
   if (rebuilding_ == Rebuilding::no) settings_.clear();  // the settings belong to the previous field
   if (view_.operands == kOwnOperands && !session_.current().field.metadata().source.exactness) view_.operands.clear();
   ++fields_;
+  try {
+    makeContour(view_);
+  } catch (const Cancelled&) {
+    if (InterruptGuard::interrupted()) throw;
+    hideTriangles(view_, "their contour was cancelled");
+  }
+}
+
+/// True if `view` shows the triangles of a contour that is not known.
+bool Explorer::lacksContour(const ViewState& view) const {
+  if (!view.triangles || !session_.hasField()) return false;
+  return !session_.knowsContour(view.surfaceOffset, contourTolerance(view, session_.current().field));
+}
+
+/// Makes the contour whose triangles `view` shows, because no frame makes it. If it cannot be made, such as for a
+/// tolerance that is too small for this field, the triangles are hidden.
+void Explorer::makeContour(ViewState& view) {
+  if (!lacksContour(view)) return;
+  try {
+    session_.contour(view.surfaceOffset, contourTolerance(view, session_.current().field));
+  } catch (const Error& error) {
+    hideTriangles(view, error.what());
+  }
+}
+
+/// Hides the triangles in `view`, and tells the user why.
+void Explorer::hideTriangles(ViewState& view, const std::string& why) {
+  view.triangles = false;
+  const std::string text = "the triangles are hidden: " + why;
+  warn(session_.console(), text);
+  if (running_) message = text;
+}
+
+/// Ends a gesture if the mouse is idle. During a gesture, such as the drag of a slider, no contour is made, because it
+/// would be outdated at once; it is made here by a command, so that it can be cancelled.
+void Explorer::finishGesture() {
+  if (ui_.busy()) return;
+  lastKind_.clear();
+  if (!lacksContour(view_)) return;
+  try {
+    run("triangles shown=true");
+  } catch (const Cancelled&) {
+    run(canUndo() ? "undo" : "triangles shown=false");
+    throw;
+  }
 }
 
 void Explorer::showMesh(const TriangleMesh& mesh, const Box& domain) { preview_.showMesh(mesh, domain, view_.backend); }
@@ -324,7 +375,7 @@ void Explorer::input(const Input& event) {
   std::vector<std::string> late;
   drawPanels(nullptr, late);
   for (const std::string& command : late) run(command);
-  if (!ui_.busy()) lastKind_.clear();
+  finishGesture();
 }
 
 const std::map<std::string, Widget>& Explorer::widgets() {
@@ -431,8 +482,8 @@ std::string Explorer::pictureKey() const {
   shown.open = {};
   shown.scroll = {};
   shown.worstPage = 0;
-  return fmt::format("{} {}x{} {} {}", scriptOf(shown), layout.canvas.width(), layout.canvas.height(), fields_,
-                     preview_.changes());
+  return fmt::format("{} {}x{} {} {} {}", scriptOf(shown), layout.canvas.width(), layout.canvas.height(), fields_,
+                     preview_.changes(), lacksContour(view_));
 }
 
 render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
@@ -465,20 +516,16 @@ render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData ref
   }
 }
 
-/// Returns the contour whose triangles the picture shows. A rough picture of a moving view does not wait for a contour
-/// that is not known yet.
-render::ShownMesh Explorer::contourToDraw(int shrink) {
-  if (!view_.triangles) return {};
-  const double tolerance = contourTolerance(view_, session_.current().field);
-  if (shrink > 1 && !session_.knowsContour(view_.surfaceOffset, tolerance)) return {};
-  return {&session_.contour(view_.surfaceOffset, tolerance).mesh, tolerance};
+const Contour* Explorer::shownContour() const {
+  if (!view_.triangles || !session_.hasField() || lacksContour(view_)) return nullptr;
+  return &session_.contour(view_.surfaceOffset, contourTolerance(view_, session_.current().field));
 }
 
-const Contour* Explorer::shownContour() {
-  if (!view_.triangles) return nullptr;
-  const double tolerance = contourTolerance(view_, session_.current().field);
-  if (!session_.knowsContour(view_.surfaceOffset, tolerance)) return nullptr;
-  return &session_.contour(view_.surfaceOffset, tolerance);
+/// Returns the mesh whose triangles the picture shows. There is none during a gesture that changes the surface.
+render::ShownMesh Explorer::contourToDraw() const {
+  const Contour* const contour = shownContour();
+  if (contour == nullptr) return {};
+  return {&contour->mesh, contourTolerance(view_, session_.current().field)};
 }
 
 std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const Field* other, int shrink) {
@@ -488,7 +535,7 @@ std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const 
   render::ReferenceData reference = session_.reference(colors.by, colors.mesh, colors.other);
   if (!view_.slice && !view_.defects.empty()) reference.defects = &session_.defects(view_.defects);
   if (view_.slice && !view_.operands.empty()) reference.outlined = session_.operands(view_.operands);
-  reference.mesh = contourToDraw(shrink);
+  reference.mesh = contourToDraw();
   if (other != nullptr && (colors.by == render::ColorBy::degree || colors.by == render::ColorBy::depth)) {
     std::set<int> levels;
     for (const FieldStatistics& all : {figures(), session_.otherFigures(view_.beside)})

@@ -38,7 +38,9 @@ class Explorer final : public SessionExtension {
 
   const ViewState& view() const { return view_; }
   /// Makes `next` the explorer's state. `undo` returns to the previous state. Undo treats all changes of one
-  /// mouse gesture as one change, and never changes the frame size or the renderer.
+  /// mouse gesture as one change, and never changes the frame size or the renderer. If `next` shows the triangles of
+  /// a contour that is not known yet, the contour is made first, unless a mouse gesture lasts; `Cancelled` is thrown
+  /// if this is cancelled, and the triangles are hidden if it fails.
   void change(ViewState next);
   /// Returns to the state before the last change. `undo` and `redo` return false if there is no state to return
   /// to.
@@ -59,8 +61,9 @@ class Explorer final : public SessionExtension {
   /// std::nullopt if unknown.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
 
-  /// Handles one mouse or keyboard event: draws the panels, then runs the commands that the widgets request.
-  /// Exceptions of these commands are passed on to the caller. While long work runs, an event can only cancel
+  /// Handles one mouse or keyboard event: draws the panels, then runs the commands that the widgets request. The
+  /// contour of shown triangles is made once a gesture of the mouse has ended; if this is cancelled, the gesture is
+  /// undone. Exceptions of commands are passed on to the caller. While long work runs, an event can only cancel
   /// the work or, if there is no field yet, change the view of what is shown in its stead.
   void input(const Input& event);
   /// Ends all input that a recorded script cannot reproduce: releases the mouse buttons, closes open lists and discards
@@ -128,7 +131,7 @@ class Explorer final : public SessionExtension {
   const std::vector<std::size_t>& worst(std::size_t count);
   /// Returns the contour whose triangles the picture shows, or nullptr if it shows none or if the contour is not known
   /// yet.
-  const Contour* shownContour();
+  const Contour* shownContour() const;
   /// Returns the field's values at the mouse pointer, or std::nullopt if the pointer is not over the field.
   std::optional<Readout> readout();
 
@@ -158,7 +161,11 @@ class Explorer final : public SessionExtension {
   std::optional<std::string> clickCommand();
   std::string wheelCommand(double notches) const;
   std::string dragCommand(double dx, double dy) const;
-  render::ShownMesh contourToDraw(int shrink);
+  render::ShownMesh contourToDraw() const;
+  bool lacksContour(const ViewState& view) const;
+  void makeContour(ViewState& view);
+  void hideTriangles(ViewState& view, const std::string& why);
+  void finishGesture();
   render::Drawn drawBeside(const Field& other, render::ReferenceData reference, const render::ScaleOptions& scale,
                            int shrink);
   /// Draws the pictures of the current field and of the second field, if there is one, in a common colour scale.

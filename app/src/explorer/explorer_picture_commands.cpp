@@ -267,12 +267,13 @@ void addTrianglesCommand(Registry& registry) {
   registry.addForScripts({
       .name = "triangles",
       .summary = "Show the triangles that 'contour' would write.",
-      .help =
-          "The picture of the surface shows their edges, a slice the line in which its plane cuts them, with dots "
-          "where "
-          "the line bends if there is room. They are made for the offset of 'surface', which can take seconds, and "
-          "kept until the field, the offset or the tolerance changes. The statistics say how many there are and how "
-          "far they are from the surface.",
+      .help = "The picture of the surface shows their edges, a slice the line in which its plane cuts them, with dots "
+              "where "
+              "the line bends if there is room. They are made for the offset of 'surface', anew by each command that "
+              "changes "
+              "the field, the offset or the tolerance, which can take seconds; where they cannot be made for another "
+              "field, "
+              "they are hidden. The statistics say how many there are and how far they are from the surface.",
       .examples = {"triangles shown=true", "triangles tolerance=0.5%"},
       .parameters =
           {{"shown", flag(""), "Draws the triangles."},
