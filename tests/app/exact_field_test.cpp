@@ -104,7 +104,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"color", "color degree; shot output=$out/shot.png"},
     {"cells", "cells boxes degrees=exact; shot output=$out/shot.png"},
     {"arrows", "arrows 30; shot output=$out/shot.png"},
-    {"triangles", "triangles shown=true tolerance=1%; shot output=$out/shot.png"},
+    {"triangles", "triangles shown=true tolerance=1% simplify=true; shot output=$out/shot.png"},
     {"beside", "beside $field; color difference other=$field; shot output=$out/shot.png; beside none"},
     {"panel", "show slice size=480x360; panel all=true; shot output=$out/shot.png"},
     {"worst", "show slice size=480x360; panel worst=true; worst by=gradient page=1; shot output=$out/shot.png"},

@@ -59,7 +59,7 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
             "camera 41.3,-17.25,0.7 target=0.1,0.2,-0.05 up=z projection=orthographic\n"
             "surface offset=0.03125 cracks=true defects=builtin:box clip=y clip-offset=0.1 shown=false\n"
             "cells boxes degrees=2,4-6 depths=0-2 ; arrows 31 ; plane in-space=true operands=builtin:box\n"
-            "triangles shown=true tolerance=2.5%\n"
+            "triangles shown=true tolerance=2.5% simplify=true\n"
             "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
             "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
             "worst by=gradient on=surface page=2 mark=0.1,0.25,-0.5 ; panel build=false bar=false left-scroll=3\n"
@@ -377,6 +377,14 @@ TEST(Explorer, theTrianglesOfTheContourAreShownAndCounted) {
   const support::TemporaryDirectory folder;
   bench.run("contour output=" + (folder / "t.ply").string() + " tolerance=1%");
   EXPECT_EQ(readMesh(folder / "t.ply").triangles.size(), triangles);
+
+  // It can be simplified.
+  bench.run("triangles simplify=true");
+  EXPECT_LT(2 * bench.explorer().shownContour()->mesh.triangles.size(), triangles);
+  bench.run("contour output=" + (folder / "s.ply").string() + " tolerance=1% simplify=true");
+  EXPECT_EQ(readMesh(folder / "s.ply").triangles.size(), bench.explorer().shownContour()->mesh.triangles.size());
+  bench.run("ui click view/simplify");
+  EXPECT_EQ(bench.explorer().shownContour()->mesh.triangles.size(), triangles);
 
   // The commands that change the tolerance, the offset or the field make it anew, before they return.
   bench.run("triangles tolerance=0.3%");

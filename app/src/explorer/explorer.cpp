@@ -230,7 +230,7 @@ void Explorer::fieldChanged() {
 /// True if `view` shows the triangles of a contour that is not known.
 bool Explorer::lacksContour(const ViewState& view) const {
   if (!view.triangles || !session_.hasField()) return false;
-  return !session_.knowsContour(view.surfaceOffset, contourTolerance(view, session_.current().field));
+  return !session_.knowsContour(contourChoice(view, session_.current().field));
 }
 
 /// Makes the contour whose triangles `view` shows, because no frame makes it. If it cannot be made, such as for a
@@ -238,7 +238,7 @@ bool Explorer::lacksContour(const ViewState& view) const {
 void Explorer::makeContour(ViewState& view) {
   if (!lacksContour(view)) return;
   try {
-    session_.contour(view.surfaceOffset, contourTolerance(view, session_.current().field));
+    session_.contour(contourChoice(view, session_.current().field));
   } catch (const Error& error) {
     hideTriangles(view, error.what());
   }
@@ -260,6 +260,9 @@ void Explorer::finishGesture() {
   if (!lacksContour(view_)) return;
   try {
     run("triangles shown=true");
+  } catch (const Error& error) {
+    run("triangles shown=false");
+    message = error.what();
   } catch (const Cancelled&) {
     run(canUndo() ? "undo" : "triangles shown=false");
     throw;
@@ -518,14 +521,14 @@ render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData ref
 
 const Contour* Explorer::shownContour() const {
   if (!view_.triangles || !session_.hasField() || lacksContour(view_)) return nullptr;
-  return &session_.contour(view_.surfaceOffset, contourTolerance(view_, session_.current().field));
+  return &session_.contour(contourChoice(view_, session_.current().field));
 }
 
 /// Returns the mesh whose triangles the picture shows. There is none during a gesture that changes the surface.
 render::ShownMesh Explorer::contourToDraw() const {
   const Contour* const contour = shownContour();
   if (contour == nullptr) return {};
-  return {&contour->mesh, contourTolerance(view_, session_.current().field)};
+  return {&contour->mesh, contourChoice(view_, session_.current().field).tolerance};
 }
 
 std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const Field* other, int shrink) {

@@ -146,9 +146,10 @@ void changeCells(ViewState& view, const Arguments& arguments, Session&) {
 void changeTriangles(ViewState& view, const Arguments& arguments, Session& session) {
   if (arguments.given("shown")) view.triangles = arguments.flag("shown");
   if (arguments.given("tolerance")) view.trianglesTolerance = arguments.text("tolerance");
+  if (arguments.given("simplify")) view.trianglesSimplified = arguments.flag("simplify");
   if (!view.triangles || !session.hasField()) return;
   // The contour is made here, where it can be cancelled, and not while a frame is drawn.
-  session.contour(view.surfaceOffset, contourTolerance(view, session.current().field));
+  session.contour(contourChoice(view, session.current().field));
 }
 
 void changeArrows(ViewState& view, const Arguments& arguments, Session&) { view.arrows = arguments.whole("apart"); }
@@ -274,12 +275,15 @@ void addTrianglesCommand(Registry& registry) {
               "the field, the offset or the tolerance, which can take seconds; where they cannot be made for another "
               "field, "
               "they are hidden. The statistics say how many there are and how far they are from the surface.",
-      .examples = {"triangles shown=true", "triangles tolerance=0.5%"},
+      .examples = {"triangles shown=true", "triangles tolerance=0.5% simplify=true"},
       .parameters =
           {{"shown", flag(""), "Draws the triangles."},
            {"tolerance", number().above(0).orShare().in("field units"),
             "The tolerance of the mesh, as for 'contour': a length, or a percentage of the longest side of the "
-            "domain. It is 0.1% unless you set it."}},
+            "domain. It is 0.1% unless you set it."},
+           {"simplify", flag(""),
+            "Merges vertices as far as the tolerance allows, as 'contour' does. It takes three to five times as "
+            "long."}},
       .action = changing(changeTriangles),
   });
 }

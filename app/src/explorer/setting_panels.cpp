@@ -74,7 +74,10 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Fi
 /// Draws the controls of the triangles that the command `contour` would write.
 void drawTriangles(const Controls& controls, const ViewState& view) {
   controls.checkbox("view/triangles", "triangles", view.triangles, "triangles shown=");
-  if (view.triangles) controls.field("view/tolerance", "tolerance", view.trianglesTolerance, "triangles tolerance=");
+  if (!view.triangles) return;
+  ImGui::SameLine();
+  controls.checkbox("view/simplify", "simplified", view.trianglesSimplified, "triangles simplify=");
+  controls.field("view/tolerance", "tolerance", view.trianglesTolerance, "triangles tolerance=");
 }
 
 /// Draws the controls for the limits of the colour scale. `automatic` holds the limits that the present picture uses.

@@ -66,11 +66,12 @@ render::Plane planeOf(const ViewState& view, const Field& field) {
 
 std::string defaultContourTolerance() { return fmt::format("{}%", 100 * kDefaultContourTolerance); }
 
-double contourTolerance(const ViewState& view, const Field& field) {
+ContourChoice contourChoice(const ViewState& view, const Field& field) {
   const std::string& text = view.trianglesTolerance;
   const bool isShare = text.ends_with('%');
   const double number = parseNumber(isShare ? text.substr(0, text.size() - 1) : text).value();
-  return isShare ? number / 100 * field.domain().sizes().maxCoeff() : number;
+  const double tolerance = isShare ? number / 100 * field.domain().sizes().maxCoeff() : number;
+  return {view.surfaceOffset, tolerance, view.trianglesSimplified};
 }
 
 std::string levelText(const std::vector<int>& levels) {
@@ -110,7 +111,8 @@ std::string scriptOf(const ViewState& view) {
   return fmt::format("show {} size={}x{} samples={} {}\n", view.slice ? "slice" : "surface", view.width, view.height,
                      view.samples, backendText(view.backend)) +
          cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + cellsLine(view.cells) +
-         fmt::format("triangles shown={} tolerance={}\n", view.triangles, view.trianglesTolerance) +
+         fmt::format("triangles shown={} tolerance={} simplify={}\n", view.triangles, view.trianglesTolerance,
+                     view.trianglesSimplified) +
          fmt::format("arrows {}\n", view.arrows) + colorLine(view.surfaceColors, "surface") +
          colorLine(view.sliceColors, "slice") + fmt::format("beside {}\n", wordOrNone(view.beside)) +
          fmt::format("worst by={} on={} page={} mark={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",

@@ -49,6 +49,7 @@ struct ViewState {
   render::ShownCells cells;
   bool triangles = false;                                      ///< draws the triangles of the surface's contour
   std::string trianglesTolerance = defaultContourTolerance();  ///< as text, such as "0.002" or "0.1%"
+  bool trianglesSimplified = false;                            ///< merges vertices of the contour
   int arrows = 0;                                              ///< spacing of gradient arrows in pixels; 0 for none
 
   std::string beside;  ///< file of another field, drawn beside the current one with the same settings, or empty
@@ -76,8 +77,8 @@ struct ViewState {
 render::SlicePicture slicePicture(const ViewState& view, const Field& field);
 render::SurfacePicture surfacePicture(const ViewState& view, const Field& field);
 
-/// Returns the tolerance of the contour that the explorer shows, in the units of the field.
-double contourTolerance(const ViewState& view, const Field& field);
+/// Returns the choices for the contour whose triangles the explorer shows.
+ContourChoice contourChoice(const ViewState& view, const Field& field);
 
 /// Returns a list of degrees or depths as text: "2,4", or "all" for an empty list.
 std::string levelText(const std::vector<int>& levels);

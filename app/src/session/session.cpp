@@ -135,14 +135,14 @@ const Field& Session::continuousField() {
   return *blended_;
 }
 
-const Contour& Session::contour(double offset, double tolerance) {
-  if (!knowsContour(offset, tolerance)) {
+const Contour& Session::contour(const ContourChoice& choice) {
+  if (!knowsContour(choice)) {
     const Field& field = continuousField();
     contour_ = withProgress(console_, [&](const Progress& progress) {
-      const ContourOptions options{.offset = offset, .tolerance = tolerance};
+      const ContourOptions options{.offset = choice.offset, .tolerance = choice.tolerance, .simplify = choice.simplify};
       return hpsdf::contour(field, options, progress);
     });
-    contourOf_ = {offset, tolerance};
+    contourOf_ = choice;
   }
   return *contour_;
 }

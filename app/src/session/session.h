@@ -30,6 +30,14 @@ class SessionExtension {
   virtual void fieldChanged() = 0;
 };
 
+/// The choices for a contour of the current field. Lengths are in the field's units.
+struct ContourChoice {
+  double offset = 0;
+  double tolerance = 0;
+  bool simplify = false;
+  bool operator==(const ContourChoice&) const = default;
+};
+
 /// The state that is kept between commands: the current field, its renderer, and data that was computed for
 /// the field.
 class Session {
@@ -140,12 +148,10 @@ class Session {
   const Field& continuousField();
 
   /// Returns the contour that the command `contour` would write: of `continuousField`.
-  /// The last one is kept. `offset` and `tolerance` are in the field's units. Throws as `hpsdf::contour` does.
-  const Contour& contour(double offset, double tolerance);
+  /// The last one is kept. Throws as `hpsdf::contour` does.
+  const Contour& contour(const ContourChoice& choice);
   /// True if `contour` would return the contour that is kept.
-  bool knowsContour(double offset, double tolerance) const {
-    return contour_ && contourOf_ == std::pair(offset, tolerance);
-  }
+  bool knowsContour(const ContourChoice& choice) const { return contour_ && contourOf_ == choice; }
 
   /// Returns a renderer of the current field. The renderer is kept for later calls, because uploading the field
   /// takes longer than drawing most pictures.
@@ -167,7 +173,7 @@ class Session {
   std::string operandsOf_;        // argument of the call that loaded `operands_`
   std::optional<Field> blended_;  // copy of the current field, for contours
   std::optional<Contour> contour_;
-  std::pair<double, double> contourOf_;                      // offset and tolerance of `contour_`
+  ContourChoice contourOf_;                                  // choices for `contour_`
   std::vector<std::unique_ptr<Other>> others_;               // most recently used first; renderers keep references
   std::shared_ptr<const DistanceFunction> exact_;            // distance to the field's own surface
   std::shared_ptr<const DistanceFunction> exactOfArgument_;  // distance to `surfaceArgument_`
