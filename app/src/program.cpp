@@ -92,7 +92,7 @@ int runProgram(std::span<const std::string> words, const Console& console) {
     requireWritten(console.out.flush());  // for help and version
     return kExitDone;
   } catch (const CancelledPartway& cancelled) {
-    console.err << "hpsdf: cancelled; " << cancelled.kept() << std::endl;
+    console.err << "hpsdf: cancelled; " << printable(cancelled.kept()) << std::endl;
     return cancelledStatus();
   } catch (const Cancelled&) {
     console.err << "hpsdf: cancelled; nothing is half-written" << std::endl;

@@ -142,7 +142,7 @@ TEST_F(FieldFile, infoDescribesAnyFieldThatLoads) {
   save(Field(data), at("evil.hpsdf"));
   const Outcome text = run({{"info", at("evil.hpsdf")}});
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_THAT(text.out, HasSubstr("evil  [2J\xff.obj\n"));
+  EXPECT_THAT(text.out, HasSubstr("evil\\n\\x1b[2J\\xff.obj\n"));
   EXPECT_THAT(text.out, HasSubstr("-inf, nan"));
   EXPECT_THAT(text.out, Not(HasSubstr("\x1b")));
   const Outcome json = run({{"info", at("evil.hpsdf"), "--json"}});
@@ -181,13 +181,29 @@ TEST_F(FieldFile, queryReadsAndWritesFiles) {
   EXPECT_EQ(run({{"query", field(), "--json"}, ""}).out, "[]\n");
 }
 
+TEST_F(FieldFile, errorsAreOneLineForAnyName) {
+  const std::pair<const char*, const char*> names[] = {
+      {"two\nlines", "two\\nlines"},
+      {"tab\tand\rreturn", "tab\\tand\\rreturn"},
+      {"\x1b[2Jclear\x7f", "\\x1b[2Jclear\\x7f"},
+      {"next\xc2\x85line", "next\\u0085line"},
+      {"grün 東京 😀 \\n", "grün 東京 😀 \\n"},
+      {"\xfc", "\\xfc"},                                        // ü in Latin-1
+      {"\xe6\x9d", "\\xe6\\x9d"},                               // the begin of a character
+      {"\xc0\xaf \xe0\x80\xaf", "\\xc0\\xaf \\xe0\\x80\\xaf"},  // longer than need be
+      {"\xed\xa0\x80", "\\xed\\xa0\\x80"},                      // half of a surrogate pair
+      {"\xf4\x90\x80\x80", "\\xf4\\x90\\x80\\x80"}};            // beyond the last character
+  for (const auto& [name, shown] : names)
+    expectRefused({{"info", at(name + std::string(".hpsdf"))}}, at(shown + std::string(".hpsdf: no such file")));
+}
+
 TEST_F(FieldFile, badPointsAreRefusedByLine) {
   for (const char* bad : {"1 2", "1 2 3 4", "a b c", "1,,2", "1 2 3x", "nan 0 0", "1 inf 2", ",1,2,3"}) {
     writeFile(at("points.txt"), "0 0 0\n" + std::string(bad) + "\n");
     expectRefused({{"query", field(), at("points.txt"), "-o", at("out.csv")}}, "points.txt:2: expected three finite");
   }
   writeFile(at("points.txt"), "1 2 \x1b[2J\n");
-  expectRefused({{"query", field(), at("points.txt")}}, "found '1 2  [2J'");
+  expectRefused({{"query", field(), at("points.txt")}}, "found '1 2 \\x1b[2J'");
   const Outcome first = run({{"query", field()}, "nan,nan,nan\n"});
   EXPECT_EQ(first.status, 2);
   EXPECT_THAT(first.err, HasSubstr("stdin:1: expected three finite numbers"));

@@ -175,7 +175,7 @@ TEST_F(MeshProcess, believesNoAnswer) {
   EXPECT_THAT(answer("exec sleep 100", 0.2), HasSubstr("takes more than 0.2 s"));
   EXPECT_THAT(answer("exec >&-; exec sleep 100", 0.2), HasSubstr("takes more than 0.2 s"));
   EXPECT_THAT(errorOf(file, kPlenty, folder_ / "none"), HasSubstr("no process can be started"));
-  EXPECT_THAT(answer("printf 'refused: no\\nmesh \\033[2J'"), HasSubstr(": no mesh  [2J"));
+  EXPECT_THAT(answer("printf 'refused: no\\nmesh \\033[2J'"), HasSubstr(": no\\nmesh \\x1b[2J"));
   EXPECT_THAT(answer("printf 'out of memory'"), HasSubstr("takes more than 1.00 MB of memory"));
 
   saveMesh(importMesh(file).mesh, folder_ / "answer.ply");

@@ -194,9 +194,9 @@ class Batch {
       throw CancelledPartway(fmt::format(
           "{} of {} meshes are finished and kept; the same command continues with the others", done_, meshes_.size()));
     }
-    console_.err << fmt::format("{}: {} built, {} skipped, {} built elsewhere, {} failed, {}\n", folder_.string(),
-                                count(Status::built), count(Status::skipped), count(Status::elsewhere),
-                                count(Status::failed), durationText(secondsSince(start)))
+    console_.err << fmt::format("{}: {} built, {} skipped, {} built elsewhere, {} failed, {}\n",
+                                printable(folder_.string()), count(Status::built), count(Status::skipped),
+                                count(Status::elsewhere), count(Status::failed), durationText(secondsSince(start)))
                  << std::flush;
     if (const std::size_t failed = count(Status::failed); failed > 0)
       throw Failed(fmt::format("{}: {} of {} meshes failed; the lines above say why", arguments_.text("batch"), failed,

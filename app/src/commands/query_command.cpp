@@ -121,7 +121,7 @@ void runQuery(Session& session, const Arguments& arguments) {
   });
   if (!output) return;
   output->commit();
-  session.console().err << fmt::format("{}: {}\n", arguments.text("output"),
+  session.console().err << fmt::format("{}: {}\n", printable(arguments.text("output")),
                                        ofBoxes ? countOf(count, "box", "boxes") : countOf(count, "point", "points"));
 }
 

@@ -48,7 +48,7 @@ struct Console {
 };
 
 /// Writes one line to the stream `err`, in place of a progress line. Any thread may call it. Control characters in
-/// `text`, which file names may contain, become blanks.
+/// `text`, which file names may contain, are escaped.
 void note(const Console& console, std::string_view text);
 void warn(const Console& console, std::string_view text);
 

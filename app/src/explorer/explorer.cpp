@@ -16,6 +16,7 @@
 #include "pictures/picture_arguments.h"
 #include "session/field_operands.h"
 #include "session/field_summary.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
@@ -249,7 +250,7 @@ void Explorer::hideTriangles(ViewState& view, const std::string& why) {
   view.triangles = false;
   const std::string text = "the triangles are hidden: " + why;
   warn(session_.console(), text);
-  if (running_) message = text;
+  if (running_) message = printable(text);
 }
 
 /// Ends a gesture if the mouse is idle. During a gesture, such as the drag of a slider, no contour is made, because it
@@ -262,7 +263,7 @@ void Explorer::finishGesture() {
     run("triangles shown=true");
   } catch (const Error& error) {
     run("triangles shown=false");
-    message = error.what();
+    message = printable(error.what());
   } catch (const Cancelled&) {
     run(canUndo() ? "undo" : "triangles shown=false");
     throw;

@@ -6,8 +6,31 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
+#include <utility>
 
 namespace hpsdf::app {
+namespace {
+
+constexpr std::pair<char, const char*> kNamedControls[] = {{'\n', "\\n"}, {'\r', "\\r"}, {'\t', "\\t"}};
+
+/// Returns the number of bytes of the character with which `text` begins, or 0 if `text` does not begin with valid
+/// UTF-8 (The Unicode Standard, table 3-7).
+std::size_t utf8Length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  const unsigned first = byte(0);
+  if (first < 0x80) return 1;
+  if (first < 0xc2 || first > 0xf4) return 0;
+  const std::size_t length = first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
+  const unsigned least = first == 0xe0 ? 0xa0 : first == 0xf0 ? 0x90 : 0x80;
+  const unsigned greatest = first == 0xed ? 0x9f : first == 0xf4 ? 0x8f : 0xbf;
+  if (byte(1) < least || byte(1) > greatest) return 0;
+  for (std::size_t i = 2; i < length; ++i)
+    if (byte(i) < 0x80 || byte(i) > 0xbf) return 0;
+  return length;
+}
+
+}  // namespace
 
 std::string vectorText(const Vector3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
 
@@ -60,13 +83,20 @@ std::string shellWord(const std::string& word) {
 
 std::string printable(std::string_view text) {
   std::string line;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : '\0');
-    const bool isC1Control =
-        byte == 0xc2 && next >= 0x80 && next < 0xa0;  // control characters U+0080 to U+009F in UTF-8
-    line += std::iscntrl(byte) != 0 || isC1Control ? ' ' : text[i];
-    if (isC1Control) ++i;
+  while (!text.empty()) {
+    const std::size_t length = utf8Length(text);
+    const std::string_view character = text.substr(0, std::max<std::size_t>(length, 1));
+    const auto first = static_cast<unsigned char>(text[0]);
+    if (length == 2 && first == 0xc2 && static_cast<unsigned char>(text[1]) < 0xa0)  // control characters after ASCII
+      line += fmt::format("\\u{:04x}", static_cast<unsigned char>(text[1]));
+    else if (const auto* named = std::ranges::find(kNamedControls, text[0], &std::pair<char, const char*>::first);
+             named != std::end(kNamedControls))
+      line += named->second;
+    else if (length == 0 || std::iscntrl(first) != 0)
+      line += fmt::format("\\x{:02x}", first);
+    else
+      line += character;
+    text.remove_prefix(character.size());
   }
   return line;
 }

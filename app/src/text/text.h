@@ -46,8 +46,8 @@ std::string plainName(const std::string& source);
 /// Returns a word, quoted for a shell if it contains characters that a shell would interpret.
 std::string shellWord(const std::string& word);
 
-/// Replaces control characters by blanks, so that text from untrusted files can neither break a line nor
-/// control the terminal.
+/// Escapes control characters and bytes that are not UTF-8, such as "\n", "\x1b" and "\xff", so that names and text
+/// from untrusted files can neither break a line nor control the terminal. All else stays as it is, backslashes too.
 std::string printable(std::string_view text);
 
 /// Formats one indented line of a summary: a label and its value.

@@ -19,6 +19,7 @@
 #include "files/text_file.h"
 #include "language/script.h"
 #include "session/field_summary.h"
+#include "text/text.h"
 #include "window/live_work.h"
 #include "window/recording.h"
 
@@ -290,7 +291,7 @@ class Window {
 
   /// Shows an error in the window and writes it to the terminal, since the readout panel may be closed.
   void showError(const std::string& error) {
-    explorer_.message = withoutPosition(error);
+    explorer_.message = printable(withoutPosition(error));
     const std::lock_guard lock(messageMutex());
     explorer_.session().console().err << "hpsdf: " << explorer_.message << std::endl;
   }
