@@ -50,6 +50,9 @@ class BlockSearch {
  public:
   BlockSearch(const Field& field, double voxel, double band)
       : index_(field), voxel_(voxel), band_(band), box_(boxOfLevelSet(field, index_, band)) {
+    if (!box_.sizes().allFinite())
+      throw Error(ErrorKind::option, "voxel",
+                  "the band of such voxels exceeds the range of numbers; give smaller voxels");
     const double longest = std::max(box_.min().cwiseAbs().maxCoeff(), box_.max().cwiseAbs().maxCoeff()) / voxel;
     if (!(longest < kMostVoxels))
       throw Error(ErrorKind::option, "voxel",

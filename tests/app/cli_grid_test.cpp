@@ -47,7 +47,8 @@ TEST_F(Grids, refuseWhatHasNoEffectOrDoesNotFit) {
   expectRefused({{"export", field(), "-o", at("x.cdf"), "--double"}}, "double has no effect on a .cdf", {});
   expectRefused({{"export", field(), "-o", at("x.vti"), "--voxel", "0.1", "--resolution", "9"}}, "excludes", {});
   expectRefused({{"export", field(), "-o", at("x.vti"), "--voxel", "1e-6"}}, "give larger voxels", {});
-  expectRefused({{"export", field(), "-o", at("x.npy"), "--voxel", "1e-300"}}, "give larger voxels", {});
+  expectRefused({{"export", field(), "-o", at("x.npy"), "--voxel", "1e-320"}},
+                "voxel: the box has more than 1073741824 voxels along an axis; give larger voxels", {});
   expectRefused({{"export", field(), "-o", at("x.npy"), "--resolution", "1e7"}}, "give larger voxels", {});
   expectRefused({{"export", field(), "-o", at("x.vtu"), "--order", "11"}}, "order", {});
   expectRefused({{"export", field(), "-o", at("none/x.vti")}}, "none/x.vti", {});
@@ -108,7 +109,8 @@ TEST_F(Grids, ofOpenVdbBecomeFields) {
 
   const std::set<std::string> before = namesIn(folder_.path());
   expectRefused({{"export", field(), "-o", at("x.vdb"), "--voxel", "1e-7"}}, "give larger voxels", before);
-  expectRefused({{"export", field(), "-o", at("x.nvdb"), "--voxel", "1e-300"}}, "give larger voxels", before);
+  expectRefused({{"export", field(), "-o", at("x.nvdb"), "--voxel", "1e-320"}}, "give larger voxels", before);
+  expectRefused({{"export", field(), "-o", at("x.vdb"), "--voxel", "1e308"}}, "give smaller voxels", before);
   expectRefused({{"export", field(), "-o", at("x.vdb"), "--band", "0"}}, "band", before);
   const std::string whole = readFile(at("grid.vdb"));
   writeFile(at("cut.vdb"), whole.substr(0, whole.size() / 2));

@@ -92,14 +92,18 @@ TEST(Grids, layoutsCoverTheDomainByCellsOrByMultiplesOfVoxels) {
 }
 
 TEST(Grids, refuseMorePointsThanMemoryHolds) {
-  for (const double voxel : {1e-7, 1e-300}) {
-    try {
-      gridOfVoxels(torus().domain(), voxel);
-      FAIL();
-    } catch (const Error& error) {
-      EXPECT_EQ(error.kind(), ErrorKind::limit) << error.what();
+  const Box far(Vector3::Constant(1), Vector3::Constant(2));
+  for (const Box& box : {torus().domain(), far})
+    for (const double voxel : {1e-7, 1e-12, 1e-300, 1e-320}) {
+      try {
+        gridOfVoxels(box, voxel);
+        FAIL();
+      } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), voxel == 1e-7 ? ErrorKind::limit : ErrorKind::option) << error.what();
+        EXPECT_EQ(std::string(error.what()).find("inf"), std::string::npos) << error.what();
+        EXPECT_NE(std::string(error.what()).find("give larger voxels"), std::string::npos) << error.what();
+      }
     }
-  }
   EXPECT_THROW(sampleGrid(torus(), {.points = {4000000000u, 4000000000u, 4000000000u}}, true), Error);
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <string>
 
 #include "arrays/npy.h"
 #include "grids/grid_memory.h"
@@ -14,6 +15,7 @@ namespace hpsdf {
 namespace {
 
 constexpr std::size_t kPointsOfGridQuery = 4096;
+constexpr int kMostVoxels = 1 << 30;  ///< along an axis; far more than memory can hold
 
 /// Returns the position of the point with this number, counted with x fastest.
 Vector3 gridPosition(const GridLayout& layout, std::size_t number) {
@@ -65,6 +67,9 @@ GridLayout gridOfCells(const Box& box, const std::array<std::uint32_t, 3>& cells
 GridLayout gridOfVoxels(const Box& box, double voxel) {
   if (!(voxel > 0) || !std::isfinite(voxel))
     throw Error(ErrorKind::option, "voxel", "the size of a voxel must be a positive length");
+  if (!(box.sizes().maxCoeff() / voxel < kMostVoxels))
+    throw Error(ErrorKind::option, "voxel",
+                "the box has more than " + std::to_string(kMostVoxels) + " voxels along an axis; give larger voxels");
   const Vector3 first = (box.min() / voxel).array().ceil(), last = (box.max() / voxel).array().floor();
   const Vector3 points = last - first + Vector3::Ones();
   if (!(points.minCoeff() >= 1))
