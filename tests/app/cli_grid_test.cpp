@@ -85,6 +85,14 @@ TEST_F(Grids, ofVtkAndNumPyBecomeFields) {
       EXPECT_NEAR(again.value(x), torus.value(x), 0.02) << x.transpose();
     EXPECT_EQ(again.metadata().source.name, name);
   }
+  // A note tells of a domain that reaches beyond the samples.
+  const auto notes = [&](const std::string& domain) {
+    return run({{"build", at("grid.vti"), "-o", at("wide.hpsdf"), "--max-steps", "8", "--domain", domain}}).err;
+  };
+  EXPECT_THAT(notes("-3,-1,-1,1,1,1"), AllOf(HasSubstr("the domain reaches beyond the grid's samples"),
+                                             HasSubstr(": --domain -1.1,-1,-1,1,1,1 ends where the samples do")));
+  EXPECT_THAT(notes("-1,-1,-1,1.1,1,1"), Not(HasSubstr("beyond the grid")));
+
   ASSERT_EQ(run({{"export", field(), "-o", at("unit.npy"), "--resolution", "20"}}).status, 0);
   const Outcome unit = run({{"build", at("unit.npy"), "-o", at("unit.hpsdf"), "--target-error", "1e-2"}});
   EXPECT_EQ(unit.status, 0) << unit.err;

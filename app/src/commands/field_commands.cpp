@@ -157,7 +157,8 @@ MESH is a file (OBJ, PLY, STL, OFF, 3DS, glTF), the mesh of a built-in shape (bu
 shape whose distance is known in closed form (analytic:SHAPE,…); 'hpsdf shapes' lists the shapes. It may also be a grid of
 distances: a level set of OpenVDB (.vdb), image data of VTK (.vti) or an array of NumPy (.npy, with --spacing). Distances
 between its samples are interpolated tricubically, and a line tells the likely error of that; the field's own error, which
-is measured against the interpolation, comes on top.
+is measured against the interpolation, comes on top. Beyond the samples of a .vti or .npy, distances are too great: let the
+domain end there.
 
 Say how exact the field must be with --tolerance: 0.01 in the mesh's units, or 0.02% of its longest side. The error of the
 distance then exceeds it nowhere within --within of the surface; farther away 1 % of the further distance is allowed in

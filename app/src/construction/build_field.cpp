@@ -23,6 +23,22 @@ void warnOfCutSurface(const Console& console, const Box& surface, const Box& dom
                               domain.intersects(surface) ? "part of the surface" : "the whole surface"));
 }
 
+/// Tells what distances are beyond the samples of a grid, if the domain reaches there.
+void noteBeyondSamples(const Console& console, const Box& samples, const Box& domain) {
+  if (samples.isEmpty()) return;
+  const Vector3 negligible = Vector3::Constant(0.01 * samples.sizes().maxCoeff());
+  if (Box(samples.min() - negligible, samples.max() + negligible).contains(domain)) return;
+  const Box common = domain.intersection(samples);
+  const Vector3& a = common.min();
+  const Vector3& b = common.max();
+  note(console, fmt::format("the domain reaches beyond the grid's samples; there the distance is that at the nearest "
+                            "wall of the grid and the way to it, which is too great and bends at the walls, where many "
+                            "small leaves follow it{}",
+                            common.isEmpty() ? std::string()
+                                             : fmt::format(": --domain {},{},{},{},{},{} ends where the samples do",
+                                                           a.x(), a.y(), a.z(), b.x(), b.y(), b.z())));
+}
+
 void warnOfErrorLeft(const Console& console, const FieldMetadata& built) {
   if (built.settings.maxError > 0 && built.measuredError > built.settings.maxError)
     warn(console,
@@ -122,6 +138,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     if (options.certified && !isShell && prepared.report && !prepared.report->closed())
       throw Error("certified: the mesh has holes, beside which nothing is proven: close them, or leave certified out");
     warnOfCutSurface(console, box, domain);
+    noteBeyondSamples(console, prepared.samples, domain);
     if (console.listener != nullptr && !prepared.function) console.listener->showMesh(prepared.mesh, domain);
 
     // Set up the exact distance function and measure how long this takes.

@@ -76,13 +76,27 @@ struct SharedDistance {
   const TriangleSearch& triangleSearch() const { return exact->triangleSearch(); }
 };
 
-/// Returns the distance of a surface that has no mesh: of an analytic shape or a grid.
-std::optional<DistanceFunction> functionOf(const Console& console, const std::string& surface,
-                                           const GridPlacement& placement) {
-  if (surface.starts_with(kAnalytic)) return shapes::analytic(surface);
-  if (isGridName(surface)) return DistanceFunction(readGridSurface(console, surface, placement));
-  if (placement.isGiven()) throw Error("spacing and origin belong to an array of NumPy (.npy): leave them out");
-  return std::nullopt;
+/// Returns a surface that has no mesh, an analytic shape or a grid. Returns std::nullopt for other surfaces.
+std::optional<PreparedSurface> surfaceWithoutMesh(const Console& console, const std::string& surface,
+                                                  const GridPlacement& placement) {
+  PreparedSurface prepared;
+  if (surface.starts_with(kAnalytic)) {
+    prepared.function = shapes::analytic(surface);
+  } else if (isGridName(surface)) {
+    GridDistance grid = readGridSurface(console, surface, placement);
+    prepared.samples = grid.domain();
+    prepared.function = DistanceFunction(std::move(grid));
+  } else {
+    if (placement.isGiven()) throw Error("spacing and origin belong to an array of NumPy (.npy): leave them out");
+    return std::nullopt;
+  }
+  return prepared;
+}
+
+/// Returns where a normalization takes a box.
+Box normalizedBox(const Box& box, const Normalization& to) {
+  if (box.isEmpty()) return box;
+  return Box(to.scale * (box.min() - to.center), to.scale * (box.max() - to.center));
 }
 
 /// Reports which inside test (method to tell inside from outside) was chosen. A closed mesh without self-intersections
@@ -106,7 +120,7 @@ void tellInsideTest(const Console& console, const std::string& surface, const Me
 DistanceFunction normalizedFunction(const DistanceFunction& distance) {
   const Normalization to = normalizationOf(distance.source().box);
   Source source = distance.source();
-  source.box = Box(to.scale * (source.box.min() - to.center), to.scale * (source.box.max() - to.center));
+  source.box = normalizedBox(source.box, to);
   source.normalization = to;
   return DistanceFunction(NormalizedDistance{distance, to}, source);
 }
@@ -135,12 +149,13 @@ ImportedMesh importSurface(const Console& console, const std::string& surface) {
 
 PreparedSurface prepareSurface(const Console& console, const std::string& surface, bool normalizes,
                                const GridPlacement& placement) {
-  PreparedSurface prepared;
-  prepared.function = functionOf(console, surface, placement);
-  if (prepared.function) {
-    if (normalizes) prepared.function = normalizedFunction(*prepared.function);
-    return prepared;
+  if (std::optional<PreparedSurface> known = surfaceWithoutMesh(console, surface, placement)) {
+    if (!normalizes) return *std::move(known);
+    known->function = normalizedFunction(*known->function);
+    known->samples = normalizedBox(known->samples, known->function->source().normalization);
+    return *std::move(known);
   }
+  PreparedSurface prepared;
   ImportedMesh imported = importSurface(console, surface);
   prepared.report = imported.report;
   if (normalizes) prepared.normalization = normalizationOf(boundingBox(imported.mesh));

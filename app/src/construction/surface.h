@@ -36,6 +36,7 @@ struct PreparedSurface {
   TriangleMesh mesh;
   std::optional<MeshReport> report;  ///< report on the mesh before normalization
   Normalization normalization;
+  Box samples = {};  ///< box of a grid's samples; empty if the distance is known everywhere
 
   Box box() const { return function ? function->source().box : boundingBox(mesh); }
 };
