@@ -160,7 +160,7 @@ TEST_F(Combine, mistakesAreOneLineWithTheColumn) {
   expectColumn("union(builtin:box, none.obj)", "20: none.obj: no such file");
   expectColumn("union(builtin:box, none.vti)", "20: none.vti: no such file");
   expectColumn("union(builtin:box, move(builtin:box, 1e17, 0, 0))", "25: builtin:box: moves and scales put it at");
-  expectColumn("union(builtin:box, \"no\nne.obj\")", "20: no ne.obj: no such file");
+  expectColumn("union(builtin:box, \"no\nne.obj\")", "20: no\\nne.obj: no such file");
   expectColumn("union(builtin:box, builtin:sphere,radius=0)", "20: ");
   writeFile(at("broken.ply"), "ply\nformat");
   expectRefused({{"combine", "offset(" + at("broken.ply") + ", 1)", "-o", at("x.hpsdf")}},
