@@ -131,6 +131,39 @@ TEST_F(Combine, fieldsAreVerifiedByTheirExpression) {
   expectRefused({{"verify", at("c.hpsdf"), "union(builtin:box, builtin:torus)"}}, "not from union(", {"c.hpsdf"});
   expectRefused({{"verify", at("c.hpsdf"), "offset(builtin:box, 1)"}}, "only Boolean expressions of closed meshes",
                 {"c.hpsdf"});
+  for (const char* const other : {"offset(builtin:box, 0.1)", "shell(builtin:box, 0.1)", "offset(builtin:box, -0.1)",
+                                  "smooth-union(builtin:box, builtin:torus, 0.1)"}) {
+    ASSERT_EQ(combine(other, {"--max-steps", "3"}).status, 0);
+    expectRefused({{"verify", at("c.hpsdf"), other}}, "only Boolean expressions of closed meshes", {"c.hpsdf"});
+    expectRefused({{"verify", at("c.hpsdf")}}, "only Boolean expressions of closed meshes", {"c.hpsdf"});
+  }
+}
+
+/// Two folders have files of the same names with different contents.
+TEST_F(Combine, filesOfTheSameNameWithOtherContentsAreRefused) {
+  fs::create_directory(at("other"));
+  saveMesh(shapes::mesh("box"), at("a.obj"));
+  saveMesh(shapes::mesh("box,height=0.3"), at("other/a.obj"));
+  const auto united = [&](const std::string& file) { return "union(" + at(file) + ", builtin:torus)"; };
+  for (const bool normalizes : {false, true}) {
+    std::vector<std::string> options = {"--max-steps", "3"};
+    if (normalizes) options.emplace_back("--normalize");
+    ASSERT_EQ(combine(united("other/a.obj"), options).status, 0);
+    expectRefused({{"verify", at("c.hpsdf"), united("a.obj")}}, "the contents of these files were others");
+    expectRefused({{"slice", at("c.hpsdf"), "-o", at("x.png"), "--cpu", "--operands", "own"}},
+                  "the files of these names are others than those from which the field was made");
+    EXPECT_EQ(run({{"verify", at("c.hpsdf"), united("other/a.obj"), "--points", "100"}}).status, 0);
+    ASSERT_EQ(combine(united("a.obj"), options).status, 0);
+    EXPECT_EQ(run({{"slice", at("c.hpsdf"), "-o", at("x.png"), "--cpu", "--operands", "own"}}).status, 0);
+    fs::remove(at("x.png"));
+
+    // A single file is found under its name, without an expression.
+    ASSERT_EQ(combine(at("other/a.obj"), options).status, 0);
+    expectRefused({{"verify", at("c.hpsdf")}}, "the contents of these files were others");
+    EXPECT_EQ(run({{"verify", at("c.hpsdf"), at("other/a.obj"), "--points", "100"}}).status, 0);
+    ASSERT_EQ(combine(at("a.obj"), options).status, 0);
+    EXPECT_EQ(run({{"verify", at("c.hpsdf"), "--points", "100"}}).status, 0);
+  }
 }
 
 TEST_F(Combine, takesGridsAsOperands) {

@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -390,6 +391,31 @@ TEST(Combine, exactnessFollowsTheOperands) {
   EXPECT_EQ(CombinedDistance(support::boxOfTwo(), {.insideTest = InsideTest::winding}).exactness(),
             Exactness::everywhere);
   EXPECT_EQ(exactnessOf(DistanceFunction(CombinedDistance(unite(box, ball)))), Exactness::outside);
+}
+
+TEST(Combine, fingerprintsTellContentsFromEachOther) {
+  const TriangleMesh box = shapes::mesh("box"), other = shapes::mesh("box,height=1.4");
+  const Field field = build(shapes::analytic("sphere"), domainAround(boundingBox(box)), {.maxSteps = 2});
+  const Field finer = build(shapes::analytic("sphere"), domainAround(boundingBox(box)), {.maxSteps = 9});
+  EXPECT_EQ(fingerprint(Expression(box)), fingerprint(box));
+  EXPECT_EQ(fingerprint(combine::unite(box, field)), fingerprint(combine::unite(Expression(box).renamed("b"), field)));
+  const std::vector<Expression> all = {box,
+                                       other,
+                                       combine::unite(box, field),
+                                       combine::unite(other, field),
+                                       combine::unite(box, finer),
+                                       combine::unite(field, box),
+                                       combine::intersect(box, field),
+                                       combine::offset(box, 0.1),
+                                       combine::offset(box, 0.2),
+                                       combine::shell(box, 0.1),
+                                       combine::shell(box, 0.1, ShellSide::inward),
+                                       combine::offset(shapes::analytic("sphere"), 0.1),
+                                       combine::offset(shapes::analytic("torus"), 0.1)};
+  std::set<std::uint64_t> found;
+  for (const Expression& expression : all) found.insert(fingerprint(expression));
+  EXPECT_EQ(found.size(), all.size());
+  EXPECT_EQ(CombinedDistance(all[2]).source().fingerprint, fingerprint(all[2]));
 }
 
 TEST(Combine, shellsHaveTheirMaterialOnTheSide) {

@@ -89,8 +89,16 @@ bool isExpression(const std::string& surface) {
          std::ranges::find(operations(), name, &OperationDescription::name) != operations().end();
 }
 
-CombinedDistance combinedDistance(const Console& console, const std::string& expression, const Source& source) {
-  const Expression loaded = withLoadedOperands(console, parseExpression(expression), source.insideTest);
+/// Returns true for an expression, and for the file or shape of a single operand that 'combine' normalized: the
+/// fingerprint of its field is that of the mesh before.
+bool isCombined(const std::string& surface, const Source& source) {
+  const bool isSingle = source.exactness && !source.normalization.isIdentity() && !surface.starts_with(kAnalytic);
+  return isExpression(surface) || isSingle;
+}
+
+CombinedDistance combinedDistance(const Console& console, const std::string& surface, const Source& source) {
+  const Expression expression = isExpression(surface) ? parseExpression(surface) : Expression::named(surface);
+  const Expression loaded = withLoadedOperands(console, expression, source.insideTest);
   return withProgress(
       console, [&](const Progress& progress) { return CombinedDistance(loaded, distanceOptions(source), progress); });
 }
@@ -102,10 +110,7 @@ DistanceFunction inUnitsOf(const Source& source, const DistanceFunction& distanc
 
 ReferenceSurface combinedReference(const Console& console, const std::string& expression, const Source& source) {
   const CombinedDistance combined = combinedDistance(console, expression, source);
-  if (combined.boundary() == nullptr)
-    throw Error(
-        "a field is measured at triangles, which only Boolean expressions of closed meshes have; "
-        "'hpsdf combine' prints the errors of all fields that it builds");
+  if (combined.boundary() == nullptr) throw Error(std::string(kNeedsTriangles));
   ReferenceSurface reference;
   reference.distance = std::make_shared<const DistanceFunction>(inUnitsOf(source, CombinedDistance(combined)));
   const Normalization to = reference.distance->source().normalization;
@@ -123,12 +128,13 @@ ReferenceSurface combinedReference(const Console& console, const std::string& ex
 }  // namespace
 
 bool isMadeFrom(const Source& candidate, const Source& source) {
+  if (source.exactness && source.fingerprint == 0) return candidate.name == source.name;  // an older field of 'combine'
   return candidate.fingerprint == source.fingerprint && (source.fingerprint != 0 || candidate.name == source.name);
 }
 
 ReferenceSurface referenceSurface(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {
-    if (isExpression(surface)) {
+    if (isCombined(surface, source)) {
       ReferenceSurface reference = combinedReference(console, surface, source);
       reference.fieldIsMadeFromIt = isMadeFrom(reference.distance->source(), source);
       return reference;
@@ -146,7 +152,7 @@ ReferenceSurface referenceSurface(const Console& console, const std::string& sur
 std::shared_ptr<const DistanceFunction> exactDistance(const Console& console, const std::string& surface,
                                                       const Source& source) {
   return namingSurface(surface, [&] {
-    if (isExpression(surface)) {
+    if (isCombined(surface, source)) {
       const DistanceFunction combined = inUnitsOf(source, combinedDistance(console, surface, source));
       warnIfForeign(console, surface, combined.source(), source);
       return std::make_shared<const DistanceFunction>(combined);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "console/console.h"
 #include "hpsdf/exact_distance.h"
@@ -24,8 +25,14 @@ struct ReferenceSurface {
   bool fieldIsMadeFromIt = false;
 };
 
-/// Returns true if a field with the source `source` was made from the surface `candidate`. Meshes are known by their
-/// fingerprints, analytic shapes by their names.
+/// Says why a field of some expressions cannot be compared with them.
+constexpr std::string_view kNeedsTriangles =
+    "a field is measured at triangles, which only Boolean expressions of closed meshes have; 'hpsdf combine' prints "
+    "the "
+    "errors of all fields that it builds";
+
+/// Returns true if a field with the source `source` was made from the surface `candidate`. Meshes and expressions are
+/// known by their fingerprints, analytic shapes by their names.
 bool isMadeFrom(const Source& candidate, const Source& source);
 
 /// Loads a mesh file, a shape or a Boolean expression of closed meshes and converts it to the units of a field that was

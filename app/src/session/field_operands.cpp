@@ -35,6 +35,15 @@ Expression inUnitsOf(const Source& source, Expression expression) {
   return combine::scaled(combine::moved(std::move(expression), -center), scale);
 }
 
+/// Throws `Error` if the files that a field names are not those from which it was made.
+void refuseOtherFiles(const Source& source, const Expression& loaded) {
+  if (source.fingerprint == 0 || fingerprint(loaded) == source.fingerprint) return;
+  throw Error(
+      "operands: the files of these names are others than those from which the field was made; give the "
+      "expression with their paths: '" +
+      source.name + "'");
+}
+
 }  // namespace
 
 std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const CurrentField& current,
@@ -43,6 +52,7 @@ std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const 
   const DistanceOptions options{.insideTest = source.insideTest};
   const Expression loaded = withLoadedOperands(
       console, expression == kOwnOperands ? ownExpression(current) : parseExpression(expression), options.insideTest);
+  if (expression == kOwnOperands) refuseOtherFiles(source, loaded);
   std::vector<render::OutlinedSolid> solids;
   for (const Expression& operand : booleanOperands(loaded)) {
     DistanceFunction distance = withProgress(console, [&](const Progress& progress) -> DistanceFunction {

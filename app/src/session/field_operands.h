@@ -16,8 +16,9 @@ constexpr std::string_view kOwnOperands = "own";
 
 /// Loads the operands of an expression, in the units of the current field. The files of `kOwnOperands` are looked
 /// for beside the field's file and in the current folder.
-/// Throws `Error` for a field that `combine` did not build, for mistakes in the expression and for files that cannot be
-/// read, and `Cancelled` after Ctrl-C.
+/// Throws `Error` for a field that `combine` did not build, for mistakes in the expression, for files that cannot be
+/// read, and for files of `kOwnOperands` with other contents than when the field was built, and `Cancelled` after
+/// Ctrl-C.
 std::vector<render::OutlinedSolid> loadedOperands(const Console& console, const CurrentField& current,
                                                   const std::string& expression);
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "construction/reference_surface.h"
 #include "construction/surface.h"
 #include "hpsdf/error.h"
 
@@ -40,7 +41,10 @@ static std::string knownSurface(const CurrentField& current) {
 std::string surfaceOf(const CurrentField& current, const char* asked) {
   if (std::string known = knownSurface(current); !known.empty()) return known;
   const std::string& source = current.field.metadata().source.name;
-  if (current.field.metadata().source.exactness)
+  const std::optional<Exactness>& exactness = current.field.metadata().source.exactness;
+  if (exactness && *exactness != Exactness::everywhere)
+    throw Error(fmt::format("{} was made from {}: {}", current.name, source, kNeedsTriangles));
+  if (exactness)
     throw Error(
         fmt::format("{}: this needs the solids that it was made from; give {} as an expression with the paths of "
                     "its files: '{}'",
@@ -55,6 +59,10 @@ void refuseForeign(const CurrentField& current, const ReferenceSurface& referenc
                    std::string_view otherwise) {
   if (reference.fieldIsMadeFromIt) return;
   const Source& source = current.field.metadata().source;
+  if (reference.distance->source().name == source.name)
+    throw Error(
+        fmt::format("{} was made from {}, but the contents of these files were others than in {}; give the path{}",
+                    current.name, source.name, surface, otherwise));
   throw Error(fmt::format("{} was made from {}, not from {}; give that{}{}", current.name,
                           source.name.empty() ? "something unknown" : source.name, surface,
                           source.exactness ? "" : " mesh", otherwise));

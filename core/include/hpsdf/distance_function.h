@@ -46,8 +46,9 @@ enum class Exactness : std::uint8_t {
 /// A description of where a signed distance comes from. It is stored with each field that is built from this
 /// distance.
 struct Source {
-  std::string name = {};          ///< the mesh file's name without its path, or the shape's specification
-  std::uint64_t fingerprint = 0;  ///< 64-bit hash of the mesh (function `fingerprint`), 0 without a mesh
+  std::string name = {};  ///< the mesh file's name without its path, or the shape's specification
+  /// 64-bit hash of the mesh, the grid's samples or the combined solids; 0 for an analytic shape or another function
+  std::uint64_t fingerprint = 0;
   std::uint64_t vertices = 0;
   std::uint64_t faces = 0;
   Box box = {};                                   ///< smallest box of the surface in world units; empty if unknown

@@ -259,6 +259,7 @@ CombinedDistance::CombinedDistance(const Expression& expression, const DistanceO
     if (isBoolean) data->boundary = compiler.lastBoundary();
   });
   data->source = {.name = combine::shortened(textOf(expression)),
+                  .fingerprint = fingerprint(expression),
                   .box = data->root->box,
                   .exactness = data->root->exactSides.exactness()};
   data_ = std::move(data);

@@ -5,6 +5,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -93,6 +94,11 @@ std::string textOf(const Expression& expression);
 /// each name. An `Error` that `load` throws is thrown again as one about "expression" that names the column of the
 /// leaf.
 Expression withOperands(const Expression& expression, const std::function<Expression(const std::string& name)>& load);
+
+/// Returns a 64-bit hash of the operations and of the solids' contents, by which a field tells whether files are those
+/// that it was made from. The names of meshes and fields do not count; functions without a fingerprint count by their
+/// names. A single mesh has the mesh's fingerprint, and a single function that of its source.
+std::uint64_t fingerprint(const Expression& expression);
 
 /// Functions that make expressions in C++. All of them throw `Error` as `Expression::operation` does.
 namespace combine {
