@@ -27,9 +27,8 @@ struct ReferenceSurface {
 
 /// Says why a field of some expressions cannot be compared with them.
 constexpr std::string_view kNeedsTriangles =
-    "a field is measured at triangles, which only Boolean expressions of closed meshes have; 'hpsdf combine' prints "
-    "the "
-    "errors of all fields that it builds";
+    "a field is measured at triangles, which only Boolean expressions of closed meshes have; "
+    "'hpsdf combine' prints the errors of all fields that it builds";
 
 /// Returns true if a field with the source `source` was made from the surface `candidate`. Meshes and expressions are
 /// known by their fingerprints, analytic shapes by their names.
