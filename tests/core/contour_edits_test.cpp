@@ -5,9 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "contour/cells/implicit_surface.h"
+#include "contour/edits/improvement.h"
+#include "contour/edits/mesh_editor.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
@@ -102,18 +109,64 @@ TEST(ContourEdits, doNotDependOnThreads) {
   EXPECT_EQ(one.greatestGap, two.greatestGap);
 }
 
-/// Returns the share of triangles whose normals point away from the field's gradient in their middle.
-double foldedShare(const TriangleMesh& mesh, const Field& field) {
-  const auto folded = std::ranges::count_if(mesh.triangles, [&](const Triangle& triangle) {
-    const auto [a, b, c] = cornersOf(mesh, triangle);
-    return (b - a).cross(c - a).dot(field.valueAndGradient((a + b + c) / 3).gradient) < 0;
-  });
-  return double(folded) / double(mesh.triangles.size());
-}
-
 TEST(ContourEdits, leaveHardlyAnyTriangleFolded) {
   const Field gear = exactField("gear");
-  EXPECT_LT(foldedShare(contour(gear, {.tolerance = 0.005}).mesh, gear), 2e-4);
+  EXPECT_LT(support::foldedShare(contour(gear, {.tolerance = 0.005}).mesh, gear), 2e-4);
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+// Rounds in which vertices are merged: each reports the share of edges that were tried before it.
+
+struct Rounds {
+  std::vector<double> triedShares;
+  std::size_t trianglesLeft;
+};
+
+/// Merges vertices of a sphere's mesh. With an accuracy below 0 all are refused.
+Rounds mergeVertices(TriangleMesh& mesh, double tolerance, double accuracy) {
+  static const Field sphere =
+      build([](const Vector3& x) { return x.norm() - 1; }, support::cubeOf(1.2), {.targetError = 1e-9});
+  const contouring::ImplicitSurface surface(sphere, 0, 1e-3 * tolerance, std::nullopt, 0);
+  contouring::EditedMesh edited(mesh.vertices, mesh.triangles);
+  Rounds rounds;
+  const Progress progress{.report = [&](std::string_view, double share) { rounds.triedShares.push_back(share); },
+                          .cancelled = [&] { return rounds.triedShares.size() > 1000; }};
+  contouring::MeshEditor editor(surface, {tolerance, accuracy, false, tolerance}, progress, edited);
+  contouring::simplify(editor);
+  mesh = std::move(edited).finish();
+  rounds.trianglesLeft = mesh.triangles.size();
+  return rounds;
+}
+
+TriangleMesh sphereOfTriangles(int subdivisions) {
+  TriangleMesh mesh = shapes::mesh("sphere,subdivisions=" + std::to_string(subdivisions));
+  for (Vector3& vertex : mesh.vertices) vertex.normalize();
+  return mesh;
+}
+
+/// Neighbours of an edge that is tried wait for a later round. What was refused is not tried again where nothing
+/// changes.
+TEST(ContourEdits, everyRoundTriesOtherEdgesUntilAllWereTriedOnce) {
+  TriangleMesh mesh = sphereOfTriangles(3);
+  const Rounds rounds = mergeVertices(mesh, 0.1, -1);
+  EXPECT_EQ(rounds.trianglesLeft, 1280u);
+  EXPECT_GT(rounds.triedShares.size(), 4u);
+  EXPECT_EQ(std::ranges::adjacent_find(rounds.triedShares, std::greater_equal()), rounds.triedShares.end());
+  EXPECT_GT(rounds.triedShares.back(), 0.9);
+}
+
+TEST(ContourEdits, endAfterFiveRoundsThatMergeHardlyAnyVertices) {
+  TriangleMesh mesh = sphereOfTriangles(4);
+  EXPECT_EQ(mergeVertices(mesh, 0.1, -1).triedShares.size(), 5u);
+  EXPECT_EQ(mesh.triangles.size(), 5120u);
+}
+
+/// Edges beside merged ones are tried again, so that hardly any is left of which the ends can be merged.
+TEST(ContourEdits, leaveHardlyAnyEdgeThatCanBeMerged) {
+  TriangleMesh mesh = sphereOfTriangles(3);
+  const std::size_t few = mergeVertices(mesh, 0.02, 1e-5).trianglesLeft;
+  EXPECT_LT(few, 1280u / 2);
+  EXPECT_GE(mergeVertices(mesh, 0.02, 1e-5).trianglesLeft, few - few / 20);
 }
 
 TEST(ContourEdits, canBeCancelledWhileVerticesAreMerged) {

@@ -17,6 +17,7 @@
 #include "hpsdf/shapes.h"
 #include "support/contour_defects.h"
 #include "support/contour_fields.h"
+#include "support/offset_boxes.h"
 #include "support/random_field.h"
 
 namespace hpsdf {
@@ -93,6 +94,13 @@ TEST(Contour, keepsSharpEdgesAndCorners) {
         std::ranges::any_of(found.mesh.vertices, [&](const Vector3& x) { return (x - at).norm() < 1e-9; });
     EXPECT_TRUE(isFound) << at.transpose();
   }
+}
+
+TEST(Contour, ofABoxsOffsetsRoundsItsEdgesOutsideAndKeepsThemInside) {
+  const Field box = blended(exactField("box"));
+  const double offset = 0.05, tolerance = 0.01;
+  support::expectOffsetBoxes(contour(box, {.offset = offset, .tolerance = tolerance}).mesh,
+                             contour(box, {.offset = -offset, .tolerance = tolerance}).mesh, offset, tolerance);
 }
 
 TEST(Contour, ofPartsWithSharpEdgesIsAClosedManifoldWithinTheTolerance) {

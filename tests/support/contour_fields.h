@@ -1,6 +1,7 @@
 #pragma once
 // Fields of which tests make contours, and points at which they measure these.
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -41,6 +42,15 @@ inline std::vector<Vector3> pointsOf(const TriangleMesh& mesh, int along) {
       for (int k = 0; i + k <= along; ++k) points.emplace_back((i * a + k * b + (along - i - k) * c) / along);
   }
   return points;
+}
+
+/// Returns the share of triangles whose normals point away from the field's gradient in their middle.
+inline double foldedShare(const TriangleMesh& mesh, const Field& field) {
+  const auto folded = std::ranges::count_if(mesh.triangles, [&](const Triangle& triangle) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    return (b - a).cross(c - a).dot(field.valueAndGradient((a + b + c) / 3).gradient) < 0;
+  });
+  return double(folded) / double(mesh.triangles.size());
 }
 
 }  // namespace hpsdf::support
