@@ -6,6 +6,7 @@
 
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
+#include "support/near_points.h"
 
 namespace hpsdf::bench {
 
@@ -53,30 +54,7 @@ std::vector<Vector3> uniformPoints(std::size_t count) {
   return points;
 }
 
-std::vector<Vector3> nearPoints(std::size_t count, double reach) {
-  const TriangleMesh& mesh = bunny();
-  std::vector<double> areas;
-  std::vector<Vector3> normals;
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3 normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-    areas.push_back(normal.norm());
-    normals.push_back(normal.normalized());
-  }
-  std::mt19937_64 random(2016);
-  std::discrete_distribution<std::size_t> byArea(areas.begin(), areas.end());
-  std::uniform_real_distribution<double> uniform(0, 1);
-  std::vector<Vector3> points(count);
-  for (Vector3& x : points) {
-    const std::size_t triangle = byArea(random);
-    const auto& [a, b, c] = mesh.triangles[triangle];
-    const double toCorner = std::sqrt(uniform(random));
-    const double alongSide = uniform(random);
-    const double height = reach * (2 * uniform(random) - 1);
-    x = (1 - toCorner) * mesh.vertices[a] + toCorner * (1 - alongSide) * mesh.vertices[b] +
-        toCorner * alongSide * mesh.vertices[c] + height * normals[triangle];
-  }
-  return points;
-}
+std::vector<Vector3> nearPoints(std::size_t count, double reach) { return support::pointsNear(bunny(), count, reach); }
 
 double rmsError(const std::vector<Vector3>& points, const std::vector<double>& values) {
   std::vector<double> exact(points.size());

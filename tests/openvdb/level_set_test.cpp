@@ -14,6 +14,7 @@
 #include "hpsdf/build.h"
 #include "hpsdf/shapes.h"
 #include "level_set_grid.h"
+#include "support/near_points.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
@@ -118,7 +119,7 @@ TEST(LevelSet, ofTheBunnyIsAsExactAsOpenVdbs) {
   if (!mesh) GTEST_SKIP() << "HPSDF_MESHES is not set";
   openvdb::initialize();
   const ExactDistance exact(*mesh);
-  const std::vector<Vector3> points = pointsNear(*mesh, 200'000, 0.02);
+  const std::vector<Vector3> points = support::pointsNear(*mesh, 200'000, 0.02);
   std::vector<double> expected(points.size());
   exact(points, expected);
   const double theirs = rmsDifference(trilinear(*levelSetOfMesh(*mesh), points), expected);

@@ -16,6 +16,7 @@
 
 #include "bunny.h"
 #include "hpsdf/build.h"
+#include "support/near_points.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
@@ -180,7 +181,7 @@ TEST_F(ReadLevelSet, givesTheBunnyInFewerBytes) {
   const auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(*transform, vertices, triangles, 3);
   const GridDistance distance = vdb::loadVdb(write(grid));
 
-  const std::vector<Vector3> points = pointsNear(*mesh, 200'000, 0.02);
+  const std::vector<Vector3> points = support::pointsNear(*mesh, 200'000, 0.02);
   std::vector<double> expected(points.size()), values(points.size());
   ExactDistance exact(*mesh);
   exact(points, expected);

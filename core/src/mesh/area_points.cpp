@@ -23,10 +23,19 @@ AreaPoints::AreaPoints(const TriangleMesh& mesh) : mesh_(mesh) {
     throw Error("points near the surface: the surface has no area; give a mesh with faces");
 }
 
-Vector3 AreaPoints::draw(detail::Random& random) const {
-  const auto [a, b, c] = cornersOf(mesh_, mesh_.triangles[triangles_.draw(random)]);
+AreaPoints::Drawn AreaPoints::drawOnTriangle(detail::Random& random) const {
+  const std::size_t triangle = triangles_.draw(random);
+  const auto [a, b, c] = cornersOf(mesh_, mesh_.triangles[triangle]);
   const double side = std::sqrt(random.unit()), along = random.unit();
-  return (1 - side) * a + side * (1 - along) * b + side * along * c;
+  return {(1 - side) * a + side * (1 - along) * b + side * along * c, triangle};
+}
+
+Vector3 AreaPoints::draw(detail::Random& random) const { return drawOnTriangle(random).point; }
+
+Vector3 AreaPoints::drawWithin(double reach, detail::Random& random) const {
+  const Drawn drawn = drawOnTriangle(random);
+  const auto [a, b, c] = cornersOf(mesh_, mesh_.triangles[drawn.triangle]);
+  return drawn.point + reach * (2 * random.unit() - 1) * (b - a).cross(c - a).normalized();
 }
 
 }  // namespace hpsdf::mesh

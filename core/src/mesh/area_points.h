@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <vector>
 
 #include "hpsdf/detail/random_points.h"
@@ -32,7 +32,18 @@ class AreaPoints {
 
   Vector3 draw(detail::Random& random) const;
 
+  /// Draws a point in the same way and moves it along the normal of its triangle by up to `reach` to either side,
+  /// uniformly in height.
+  Vector3 drawWithin(double reach, detail::Random& random) const;
+
  private:
+  struct Drawn {
+    Vector3 point;
+    std::size_t triangle;
+  };
+
+  Drawn drawOnTriangle(detail::Random& random) const;
+
   const TriangleMesh& mesh_;
   SelectBySize triangles_;
 };
