@@ -2,29 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hpsdf/continuity.h"
+#include "hpsdf/detail/exact_samples.h"
+#include "support/combined_contours.h"
 
 namespace hpsdf::bench {
 namespace {
 
 /// Returns the vertices of a mesh, and random points of its triangles, uniformly distributed in area.
 std::vector<Vector3> pointsOf(const TriangleMesh& mesh) {
-  constexpr std::size_t kCount = 400'000;
-  std::vector<double> areas;
-  for (const Triangle& triangle : mesh.triangles) {
-    const auto [a, b, c] = cornersOf(mesh, triangle);
-    areas.push_back((b - a).cross(c - a).norm());
-  }
-  std::mt19937_64 random(2026);
-  std::discrete_distribution<std::size_t> byArea(areas.begin(), areas.end());
-  std::uniform_real_distribution<double> uniform(0, 1);
-  std::vector<Vector3> points = mesh.vertices;
-  for (std::size_t i = 0; i < kCount; ++i) {
-    const auto [a, b, c] = cornersOf(mesh, mesh.triangles[byArea(random)]);
-    const double root = std::sqrt(uniform(random)), share = uniform(random);
-    points.emplace_back((1 - root) * a + root * (1 - share) * b + root * share * c);
-  }
+  std::vector<Vector3> points = sampleSurface(mesh, boundingBox(mesh), {.count = 400'000, .seed = 2026});
+  points.insert(points.end(), mesh.vertices.begin(), mesh.vertices.end());
   return points;
 }
 
@@ -42,6 +32,15 @@ double greatestDistance(const TriangleMesh& from, const ExactDistance& to) {
 const Field& contourField() {
   static const Field field = blended(build(bunnyDistance(), paperDomain(), {.targetError = 1e-7}));
   return field;
+}
+
+const std::vector<TriangleMesh>& combinedContours() {
+  static const std::vector<TriangleMesh> meshes = [] {
+    std::vector<TriangleMesh> made;
+    for (auto& one : support::contoursOfCombinations(10)) made.push_back(std::move(one.contour.mesh));
+    return made;
+  }();
+  return meshes;
 }
 
 void countMesh(benchmark::State& state, const TriangleMesh& mesh) {

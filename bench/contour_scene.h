@@ -13,6 +13,9 @@ inline const ContourOptions kContourOptions{.tolerance = 0.0095};
 /// Returns the bunny's field for the target error τ = 1e-7, blended.
 const Field& contourField();
 
+/// Returns the contours of some random combinations of solids, those of the tests.
+const std::vector<TriangleMesh>& combinedContours();
+
 /// Reports the number of a mesh's triangles and its Hausdorff distance to the bunny: both ways, at vertices and at
 /// 400,000 random points of triangles.
 void countMesh(benchmark::State& state, const TriangleMesh& mesh);
