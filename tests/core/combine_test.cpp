@@ -484,7 +484,7 @@ TEST(Combine, fieldsAreAsAccurateAsASpheresAtTheSameTarget) {
   const DistanceFunction ball(ballFunction, Source{.box = Box(Vector3::Constant(-0.7), Vector3::Constant(0.7))});
   const double ofSphere = accuracyOf(ball, ballFunction).rms;
 
-  const TriangleMesh fine = sphere(0.7, 6);
+  const TriangleMesh fine = sphere(0.7, 5);
   const Expression balls = unite(moved(fine, {0.4, 0, 0}), moved(fine, {-0.4, 0, 0}));
   const Accuracy ofUnion = accuracyOf(CombinedDistance(balls), twoBalls);
   EXPECT_LT(ofUnion.rms, 1.5 * ofSphere);
@@ -600,7 +600,7 @@ TEST(Combine, randomBooleansHaveTheSignsOfTheirOperands) {
     const Expression expression = randomExpression(seed, someSolids(), {.isBooleanOnly = true});
     try {
       const CombinedDistance combined(expression);
-      expectBoolean(expression, combined, support::placesIn(combined.source().box, 2000, seed));
+      expectBoolean(expression, combined, support::placesIn(combined.source().box, 500, seed));
     } catch (const Error& error) {
       EXPECT_THAT(error.what(), testing::HasSubstr("nothing is left"));
       ++refused;
@@ -675,7 +675,7 @@ TEST(Combine, meshesOfTheCollection) {
                                        unite(bunny, moved(rotated(bunny, {1, 2, 3}, 70), {0.2, 0.1, 0}))}) {
     SCOPED_TRACE(textOf(expression));
     const CombinedDistance combined(expression);
-    EXPECT_GT(expectBoolean(expression, combined, support::placesIn(combined.source().box, 20'000)), 1000);
+    EXPECT_GT(expectBoolean(expression, combined, support::placesIn(combined.source().box, 4000)), 200);
   }
 }
 

@@ -137,7 +137,7 @@ TEST(Steering, stagesOfAnOptimalConstructionAreThoseOfShorterOnes) {
 TEST(Steering, bytesAreALimitThatIsMadeUseOf) {
   for (const Criterion criterion : {Criterion::paper, Criterion::optimal}) {
     double lastRms = HUGE_VAL;
-    for (const std::uint64_t bytes : {100000u, 400000u, 1600000u}) {
+    for (const std::uint64_t bytes : {50000u, 150000u, 450000u}) {
       const Field field = build(spheres, cube(), {.targetError = 0, .maxBytes = bytes, .criterion = criterion});
       EXPECT_LE(field.bytes(), bytes);
       EXPECT_GT(field.bytes(), 0.85 * double(bytes));
@@ -171,7 +171,7 @@ TEST(Steering, bytesAreNeverExceeded) {
   both([](BuildOptions& o) { o.blend = 0.1, o.bounds = true; });
   int built = 0, refused = 0;
   for (BuildOptions& options : ways)
-    for (const std::uint64_t bytes : {6000u, 8000u, 11000u, 13000u, 16000u, 24000u, 100000u}) {
+    for (const std::uint64_t bytes : {6000u, 8000u, 11000u, 13000u, 16000u, 24000u, 50000u}) {
       options.targetError = 0;
       options.maxBytes = bytes;
       try {

@@ -23,25 +23,14 @@
 #include "hpsdf/shapes.h"
 #include "hpsdf/verify.h"
 #include "support/made_meshes.h"
+#include "support/tolerance_checks.h"
 
 namespace hpsdf {
 namespace tolerance_test {
 
-/// Returns the greatest error over the allowed error at random points near the surface and in the domain.
-double greatestRatio(const Field& field, const DistanceFunction& distance, const TriangleMesh& surface) {
-  const FieldMetadata& metadata = field.metadata();
-  const AllowedError allowed = allowedError(metadata.settings, metadata.referenceLength);
-  const SampleOptions options{.count = 50'000, .seed = 3};
-  double greatest = 0;
-  for (const ExactSamples& samples : {sampleNear(distance, surface, field.domain(), allowed.within, options),
-                                      sampleUniform(distance, field.domain(), 0, options)}) {
-    std::vector<double> values(samples.points.size());
-    field.values(samples.points, values);
-    for (std::size_t n = 0; n < values.size(); ++n)
-      greatest = std::max(greatest, std::abs(values[n] - samples.distances[n]) / allowed.at(samples.distances[n]));
-  }
-  return greatest;
-}
+using support::greatestRatio;
+using support::greatestRatioOnLine;
+using support::halfway;
 
 TEST(Tolerance, allowsMoreFarFromTheSurface) {
   const AllowedError allowed{.tolerance = 0.5, .within = 2};
@@ -52,11 +41,11 @@ TEST(Tolerance, allowsMoreFarFromTheSurface) {
 }
 
 TEST(Tolerance, isKept) {
-  for (const char* shape : {"torus,segments=24,sides=12", "gear,teeth=5"}) {
+  for (const char* shape : {"torus,segments=16,sides=8", "gear,teeth=3"}) {
     const TriangleMesh mesh = shapes::mesh(shape);
     const ExactDistance distance(mesh);
     std::size_t before = 0;
-    for (const double tolerance : {0.03, 0.006}) {
+    for (const double tolerance : {0.04, 0.015}) {
       SCOPED_TRACE(std::string(shape) + ", tolerance " + std::to_string(tolerance));
       const Field field = build(distance, domainAround(mesh), {.tolerance = tolerance});
       EXPECT_LE(greatestRatio(field, distance, mesh), 1);
@@ -87,30 +76,9 @@ TEST(Tolerance, seesKinksThatPassBetweenThePoints) {
   }
 }
 
-/// Returns the greatest error, over the tolerance, of a field of a distance with a kink, on the line through `from`
-/// along an axis. The field begins with a single cell.
-double greatestRatioOnLine(const std::function<double(const Vector3&)>& distance, double tolerance, const Vector3& from,
-                           int axis) {
-  const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
-  const Field field = build(distance, domain, {.grid = {1, 1, 1}, .tolerance = tolerance, .within = 10});
-  double worst = 0;
-  for (double t = -1; t <= 1; t += 0.0005) {
-    Vector3 x = from;
-    x[axis] = t;
-    worst = std::max(worst, std::abs(field.value(x) - distance(x)));
-  }
-  return worst / tolerance;
-}
-
-/// Returns the distance between two parallel faces, whose kink is the plane halfway.
-std::function<double(const Vector3&)> halfway(int axis, double at) {
-  return [axis, at](const Vector3& x) { return std::abs(x[axis] - at) - 0.25; };
-}
-
 TEST(Tolerance, seesKinksWhereTheErrorIsGreaterElsewhereInTheCell) {
-  for (int i = 0; i < 40; ++i)
-    for (const double tolerance : {0.005, 0.01, 0.02, 0.04, 0.08}) {
-      const double at = -0.975 + i * 0.05;
+  for (const double at : {-0.975, -0.625, -0.275, 0.075, 0.425, 0.775})
+    for (const double tolerance : {0.01, 0.04}) {
       EXPECT_LE(greatestRatioOnLine(halfway(2, at), tolerance, {0.1, 0.3, 0}, 2), 1)
           << "kink at " << at << ", tolerance " << tolerance;
     }
@@ -134,11 +102,11 @@ TEST(Tolerance, seesKinksWhereTheDistanceIsCurved) {
 }
 
 TEST(Tolerance, isKeptAtAnyScale) {
-  const TriangleMesh mesh = shapes::mesh("gear,teeth=5");
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=3");
   const TriangleMesh large = support::moved(mesh, {1e4, 0, 0}, 1000);
   const ExactDistance distance(mesh), distanceOfLarge(large);
-  const Field field = build(distance, domainAround(mesh), {.tolerance = 0.01});
-  const Field fieldOfLarge = build(distanceOfLarge, domainAround(large), {.tolerance = 10});
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 0.03});
+  const Field fieldOfLarge = build(distanceOfLarge, domainAround(large), {.tolerance = 30});
   EXPECT_NEAR(double(fieldOfLarge.bytes()) / double(field.bytes()), 1, 0.1);
   EXPECT_LE(greatestRatio(fieldOfLarge, distanceOfLarge, large), 1);
 }
@@ -167,10 +135,10 @@ TEST(Tolerance, takesExactLeavesWhereTheseAreSmaller) {
 }
 
 TEST(Tolerance, doesNotDependOnThreads) {
-  const TriangleMesh mesh = shapes::mesh("gear,teeth=7");
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=3");
   const ExactDistance distance(mesh);
-  const Field one = build(distance, domainAround(mesh), {.tolerance = 0.01, .threads = 1});
-  const Field all = build(distance, domainAround(mesh), {.tolerance = 0.01});
+  const Field one = build(distance, domainAround(mesh), {.tolerance = 0.03, .threads = 1});
+  const Field all = build(distance, domainAround(mesh), {.tolerance = 0.03});
   EXPECT_EQ(one.data().nodes, all.data().nodes);
   EXPECT_EQ(one.data().coefficients, all.data().coefficients);
   EXPECT_EQ(one.data().exact.lists, all.data().exact.lists);
@@ -241,7 +209,7 @@ TEST(Tolerance, saysWhereItCannotBeKept) {
 }
 
 TEST(Tolerance, foretellsBytesOnceAndEarly) {
-  const TriangleMesh mesh = shapes::mesh("gear,teeth=9");
+  const TriangleMesh mesh = shapes::mesh("gear,teeth=5");
   const ExactDistance distance(mesh);
   std::vector<Forecast> forecasts;
   double fraction = 0, fractionThen = 1;
@@ -251,41 +219,12 @@ TEST(Tolerance, foretellsBytesOnceAndEarly) {
                                 forecasts.push_back(forecast);
                                 fractionThen = fraction;
                               }};
-  const Field field = build(distance, domainAround(mesh), {.tolerance = 2e-3}, progress);
+  const Field field = build(distance, domainAround(mesh), {.tolerance = 5e-3}, progress);
   ASSERT_EQ(forecasts.size(), 1U);
   EXPECT_LE(fractionThen, 0.1);
   EXPECT_GT(forecasts[0].seconds, 0);
   EXPECT_GT(forecasts[0].bytes, double(field.bytes()) / 2);
   EXPECT_LT(forecasts[0].bytes, double(field.bytes()) * 2);
-}
-
-/// A plate lies in a single plane of the base grid's cells, which a sample of every so many cells must not prefer.
-TEST(Tolerance, foretellsBytesOfAPlateInAFineGrid) {
-  TriangleMesh bumpy;  // 25 x 25 vertices in the plane x = 0, moved by a few thousandths, on both sides
-  bumpy.name = "plate";
-  constexpr std::uint32_t kSide = 25;
-  for (const double side : {-0.02, 0.02})
-    for (std::uint32_t i = 0; i < kSide * kSide; ++i) {
-      const double y = -0.9 + 1.8 * (i % kSide) / (kSide - 1), z = -0.9 + 1.8 * (i / kSide) / (kSide - 1);
-      bumpy.vertices.emplace_back(side + 0.01 * std::sin(9 * y) * std::cos(7 * z), y, z);
-    }
-  for (const std::uint32_t first : {0U, kSide * kSide})
-    for (std::uint32_t y = 0; y + 1 < kSide; ++y)
-      for (std::uint32_t z = 0; z + 1 < kSide; ++z) {
-        const std::uint32_t a = first + z * kSide + y, b = a + 1, c = a + kSide, d = c + 1;
-        const bool isFront = first > 0;
-        bumpy.triangles.push_back(isFront ? Triangle{a, b, d} : Triangle{a, d, b});
-        bumpy.triangles.push_back(isFront ? Triangle{a, d, c} : Triangle{a, c, d});
-      }
-  const ExactDistance distance(bumpy);
-  const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
-  for (const std::uint32_t grid : {14U, 15U}) {
-    double foretold = 0;
-    const Progress progress{.forecast = [&](const Forecast& forecast) { foretold = forecast.bytes; }};
-    const Field field = build(distance, domain, {.grid = {grid, grid, grid}, .tolerance = 0.009}, progress);
-    EXPECT_GT(foretold, 0.5 * double(field.bytes())) << grid;
-    EXPECT_LT(foretold, 1.5 * double(field.bytes())) << grid;
-  }
 }
 
 TEST(Tolerance, isRefusedEarlyWhereMemoryIsShort) {
@@ -304,12 +243,13 @@ TEST(Tolerance, isRefusedEarlyWhereMemoryIsShort) {
 }
 
 TEST(Tolerance, canBeCertified) {
-  const TriangleMesh mesh = shapes::mesh("torus,segments=16,sides=8");
+  const TriangleMesh mesh = shapes::mesh("torus,segments=12,sides=6");
   const ExactDistance distance(mesh);
-  const BuildOptions checked{.tolerance = 0.02}, certified{.tolerance = 0.02, .certified = true};
+  const double tolerance = 0.04;
+  const BuildOptions checked{.tolerance = tolerance}, certified{.tolerance = tolerance, .certified = true};
   const Field field = build(distance, domainAround(mesh), certified);
   EXPECT_TRUE(field.metadata().settings.certified);
-  EXPECT_LE(field.metadata().measuredError, 0.02);
+  EXPECT_LE(field.metadata().measuredError, tolerance);
   EXPECT_LE(greatestRatio(field, distance, mesh), 1);
   EXPECT_GT(field.bytes(), build(distance, domainAround(mesh), checked).bytes());
 }
