@@ -5,9 +5,13 @@ function(hpsdf_compile_quickly target)
 endfunction()
 
 # The instruction sets for which Highway compiles code: SSE4, AVX2, AVX-512 and none. SSSE3 is left out, because nearly
-# every processor that has it has SSE4 too.
+# every processor that has it has SSE4 too. HPSDF_FEW_INSTRUCTION_SETS leaves AVX2 and none.
 function(hpsdf_instruction_sets target)
-  target_compile_definitions(${target} PRIVATE HWY_DISABLED_TARGETS=HWY_SSSE3)
+  if(HPSDF_FEW_INSTRUCTION_SETS)
+    target_compile_definitions(${target} PRIVATE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4|HWY_AVX3)")
+  else()
+    target_compile_definitions(${target} PRIVATE HWY_DISABLED_TARGETS=HWY_SSSE3)
+  endif()
 endfunction()
 
 # Settings that every target of ours shares: warnings, sanitizers, the same floating-point results on every machine.
