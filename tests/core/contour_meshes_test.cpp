@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <map>
+#include <numbers>
+#include <utility>
 #include <vector>
 
 #include "hpsdf/exact_distance.h"
@@ -50,6 +54,53 @@ TEST(ContourMeshes, ofAnInstalledBunnyAndItsOffsetsAreClosedManifolds) {
   const std::filesystem::path file = "/usr/share/glmark2/models/bunny.obj";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not installed (package glmark2-data)";
   expectClosedManifolds(importMesh(file).mesh);
+}
+
+/// An edge of a mesh by its ends.
+struct Segment {
+  Vector3 from, to;
+};
+
+/// Returns the edges between two triangles whose normals differ by more than an angle in degrees.
+std::vector<Segment> sharpEdges(const TriangleMesh& mesh, double degrees) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Vector3>> normalsOf;
+  for (const Triangle& triangle : mesh.triangles) {
+    const auto [a, b, c] = cornersOf(mesh, triangle);
+    const Vector3 normal = (b - a).cross(c - a).normalized();
+    for (std::size_t k = 0; k < 3; ++k) normalsOf[std::minmax(triangle[k], triangle[(k + 1) % 3])].push_back(normal);
+  }
+  std::vector<Segment> edges;
+  for (const auto& [ends, normals] : normalsOf)
+    if (normals.size() == 2 && normals[0].dot(normals[1]) < std::cos(degrees * std::numbers::pi / 180))
+      edges.push_back({mesh.vertices[ends.first], mesh.vertices[ends.second]});
+  return edges;
+}
+
+double distanceTo(const Segment& segment, const Vector3& point) {
+  const Vector3 along = segment.to - segment.from;
+  const double t = std::clamp((point - segment.from).dot(along) / along.squaredNorm(), 0.0, 1.0);
+  return (segment.from + t * along - point).norm();
+}
+
+/// The ends of 1 of 300 sharp edges of the mesh lie farther away, where sharp edges of the surface end or run through
+/// cells without a vertex of their own.
+TEST(ContourMeshes, ofAPartFollowItsSharpEdges) {
+  HPSDF_SKIP_WITHOUT_MESHES();
+  const TriangleMesh part = normalized(importMesh(support::testMesh("cad/fandisk.obj")).mesh);
+  const double longest = boundingBox(part).sizes().maxCoeff();
+  const Field field = blendedField(ExactDistance(part), cubeOf(1.1));
+  const Contour made = contour(field, {.tolerance = 1e-3 * longest});
+  const std::vector<Segment> edges = sharpEdges(part, 30);
+  std::size_t ends = 0, off = 0;
+  for (const Segment& edge : sharpEdges(made.mesh, 60))
+    for (const Vector3& end : {edge.from, edge.to}) {
+      const bool isOn =
+          std::ranges::any_of(edges, [&](const Segment& e) { return distanceTo(e, end) < 1e-3 * longest; });
+      ++ends;
+      off += isOn ? 0 : 1;
+    }
+  EXPECT_GT(ends, 2000u);
+  EXPECT_LT(double(off), 0.01 * double(ends));
 }
 
 /// Moves points along the gradient to the surface of a field.

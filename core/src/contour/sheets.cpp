@@ -30,6 +30,14 @@ std::uint32_t incidenceOf(const detail::Grouping& edgesOfLeaf, std::int32_t leaf
   return edgesOfLeaf.countBefore(cell) + static_cast<std::uint32_t>(std::ranges::find(edges, edge) - edges.begin());
 }
 
+/// Calls visit(number, leaf, edge) for each incidence, in ascending order.
+template <typename Visit>
+void forEachIncidence(const detail::Grouping& edgesOfLeaf, std::size_t cells, const Visit& visit) {
+  std::uint32_t incidence = 0;
+  for (std::size_t cell = 0; cell < cells; ++cell)
+    for (const std::uint32_t edge : edgesOfLeaf[cell]) visit(incidence++, static_cast<std::int32_t>(cell), edge);
+}
+
 /// A crossed edge on the boundary of a face.
 struct OnFace {
   std::int64_t along;  ///< position on the boundary, counter-clockwise from the face's lowest corner
@@ -110,7 +118,8 @@ Box boxOf(const ContourOctree& octree, const Link& link) {
 }
 
 Sheets::Sheets(const ContourOctree& octree, std::span<const CrossedEdge> edges) : around_(edges.size()) {
-  const detail::Grouping edgesOfLeaf = edgesOfLeaves(octree.cells().size(), edges);
+  const std::size_t cells = octree.cells().size();
+  const detail::Grouping edgesOfLeaf = edgesOfLeaves(cells, edges);
   links_ = findLinks(octree, edges, edgesOfLeaf);
   mesh::DisjointSets sets(edgesOfLeaf.count());
   for (const Link& link : links_)
@@ -119,24 +128,20 @@ Sheets::Sheets(const ContourOctree& octree, std::span<const CrossedEdge> edges) 
 
   // Sheets are numbered in the order of their first incidences.
   std::vector<std::uint32_t> sheetOf(edgesOfLeaf.count());
-  for (std::size_t cell = 0; cell < octree.cells().size(); ++cell) {
-    std::uint32_t incidence = edgesOfLeaf.countBefore(cell);
-    for (const std::uint32_t edge : edgesOfLeaf[cell]) {
-      const std::uint32_t lowest = sets.first(incidence);
-      if (lowest == incidence) {
-        sheetOf[incidence] = static_cast<std::uint32_t>(cells_.size());
-        cells_.push_back(static_cast<std::int32_t>(cell));
-      }
-      const std::uint32_t sheet = sheetOf[incidence++] = sheetOf[lowest];
-      for (std::size_t place = 0; place < 4; ++place)
-        if (edges[edge].cells[place] == cells_[sheet]) around_[edge][place] = sheet;
+  forEachIncidence(edgesOfLeaf, cells, [&](std::uint32_t incidence, std::int32_t cell, std::uint32_t edge) {
+    const std::uint32_t lowest = sets.first(incidence);
+    if (lowest == incidence) {
+      sheetOf[incidence] = static_cast<std::uint32_t>(cells_.size());
+      cells_.push_back(cell);
     }
-  }
+    sheetOf[incidence] = sheetOf[lowest];
+    for (std::size_t place = 0; place < 4; ++place)
+      if (edges[edge].cells[place] == cell) around_[edge][place] = sheetOf[incidence];
+  });
   edges_ = detail::Grouping(cells_.size(), [&](const auto& visit) {
-    for (std::size_t cell = 0; cell < octree.cells().size(); ++cell) {
-      std::uint32_t incidence = edgesOfLeaf.countBefore(cell);
-      for (const std::uint32_t edge : edgesOfLeaf[cell]) visit(sheetOf[incidence++], edge);
-    }
+    forEachIncidence(edgesOfLeaf, cells, [&](std::uint32_t incidence, std::int32_t, std::uint32_t edge) {
+      visit(sheetOf[incidence], edge);
+    });
   });
   linksOfEdge_ = detail::Grouping(edges.size(), [&](const auto& visit) {
     for (std::uint32_t n = 0; n < links_.size(); ++n)
