@@ -50,6 +50,22 @@ std::vector<double> valuesOf(const GridDistance& distance, const std::vector<Vec
 double quadratic(const Vector3& x) { return x.x() * x.x() - 2 * x.y() * x.z() + 0.5 * x.z() * x.z() + x.y() - 1.1; }
 Vector3 gradientOfQuadratic(const Vector3& x) { return {2 * x.x(), -2 * x.z() + 1, -2 * x.y() + x.z()}; }
 
+TEST(GridDistance, fingerprintsTellPlacesAndValuesApart) {
+  const auto fingerprintOf = [](const GridLayout& layout, double radius) {
+    RegularGrid grid = gridOf(kLayout, [&](const Vector3& x) { return (x - kLayout.box().center()).norm() - radius; });
+    grid.layout = layout;
+    return GridDistance(grid).source().fingerprint;
+  };
+  GridLayout moved = kLayout, scaled = kLayout;
+  moved.origin += Vector3(5, 0, 0);
+  scaled.spacing *= 2;
+  const std::uint64_t before = fingerprintOf(kLayout, 0.3);
+  EXPECT_EQ(fingerprintOf(kLayout, 0.3), before);
+  EXPECT_NE(fingerprintOf(kLayout, 0.31), before);
+  EXPECT_NE(fingerprintOf(moved, 0.3), before);
+  EXPECT_NE(fingerprintOf(scaled, 0.3), before);
+}
+
 TEST(GridDistance, reproducesQuadraticPolynomialsUpToTheBoundary) {
   const GridDistance distance(gridOf(kLayout, quadratic));
   const std::vector<Vector3> points = randomPoints(kLayout.box(), 1000);

@@ -124,9 +124,9 @@ std::string missedBy(const Contour& made) {
     return fmt::format("{} polygons of the mesh cross others: try another tolerance", grouped(made.flawed));
   if (made.unresolved > 0)
     return fmt::format(
-        "the mesh is farther from the surface than the tolerance in {} places, where it bends within the smallest "
-        "cells or is torn: allow a greater tolerance, or build the field more accurately",
-        grouped(made.unresolved));
+        "the mesh is farther from the surface than the tolerance in {}, where it bends within the smallest cells "
+        "or is torn: allow a greater tolerance, or build the field more accurately",
+        countOf(made.unresolved, "place", "places"));
   return "";
 }
 

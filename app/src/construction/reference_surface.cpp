@@ -10,6 +10,7 @@
 
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
+#include "construction/file_kind.h"
 #include "construction/operands.h"
 #include "construction/surface.h"
 #include "hpsdf/combine/combined_distance.h"
@@ -89,11 +90,11 @@ bool isExpression(const std::string& surface) {
          std::ranges::find(operations(), name, &OperationDescription::name) != operations().end();
 }
 
-/// Returns true for an expression, and for the file or shape of a single operand that 'combine' normalized: the
-/// fingerprint of its field is that of the mesh before.
+/// Returns true for an expression, for a field that is the single operand of 'combine', and for the file or shape of a
+/// single operand that 'combine' normalized: the fingerprint of its field is that of the mesh before.
 bool isCombined(const std::string& surface, const Source& source) {
   const bool isSingle = source.exactness && !source.normalization.isIdentity() && !surface.starts_with(kAnalytic);
-  return isExpression(surface) || isSingle;
+  return isExpression(surface) || isSingle || kindOfFile(surface) == FileKind::field;
 }
 
 CombinedDistance combinedDistance(const Console& console, const std::string& surface, const Source& source) {

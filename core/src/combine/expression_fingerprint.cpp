@@ -25,6 +25,7 @@ void addAll(Checksum& sum, const std::vector<T>& numbers) {
 
 void addAll(Checksum& sum, const QuantizedCoefficients& coefficients) {
   sum.add(bytesOf(coefficients.step));
+  sum.add(bytesOf(coefficients.meanBits));
   addAll(sum, coefficients.bytes);
 }
 

@@ -148,7 +148,7 @@ class Contouring {
   /// Checks the memory of so many cells, with as many edges for each as there are now, and of the search for crossings
   /// between triangles.
   void requireMemoryFor(std::size_t cells) const {
-    constexpr double kBytesOfEdge = 1500;
+    constexpr double kBytesOfEdge = 1900;
     // There is about one edge for each cell with different signs; the first edges are found later than the first cells.
     const auto crossed = static_cast<std::size_t>(std::ranges::count_if(samples_, &CellSamples::changesSign));
     const double edges = double(std::max(mesh_.edges().size(), crossed)) / double(octree_.cells().size());
@@ -343,7 +343,7 @@ class Contouring {
     const EditedMesh before = mesh;
     EditLimits denser = limits;
     denser.spacing = kDenserPoints * tolerance_;
-    const std::size_t missedBefore = measure(surface_, denser, progress_, before).missed;
+    const MeshErrors least = measure(surface_, denser, progress_, before);
     for (const double share : kSimplified) {
       mesh = before;
       limits.tolerance = share * tolerance_;
@@ -352,8 +352,11 @@ class Contouring {
       const MeshErrors errors = measure(surface_, denser, progress_, mesh);
       result_.greatestValue = errors.value;
       result_.greatestGap = missedCells_ > 0 ? std::max(result_.greatestGap, errors.gap) : errors.gap;
-      result_.unresolved = errors.missed + missedCells_;
-      if (errors.missed <= missedBefore) return;
+      // What missed the tolerance before is not to be blamed on merging.
+      const bool isAsGood = errors.missed <= least.missed && errors.value <= std::max(tolerance_, least.value) &&
+                            errors.gap <= std::max(tolerance_, least.gap);
+      result_.unresolved = (isAsGood ? missedPolygons_ : errors.missed) + missedCells_;
+      if (isAsGood) return;
     }
   }
 

@@ -27,6 +27,7 @@ detail::Grouping edgesOfLeaves(std::size_t cells, std::span<const CrossedEdge> e
 std::uint32_t incidenceOf(const detail::Grouping& edgesOfLeaf, std::int32_t leaf, std::uint32_t edge) {
   const auto cell = static_cast<std::size_t>(leaf);
   const std::span edges = edgesOfLeaf[cell];
+  assert(std::ranges::find(edges, edge) != edges.end());
   return edgesOfLeaf.countBefore(cell) + static_cast<std::uint32_t>(std::ranges::find(edges, edge) - edges.begin());
 }
 

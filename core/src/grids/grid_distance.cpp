@@ -1,9 +1,9 @@
 #include "hpsdf/input/grid_distance.h"
 
 #include <algorithm>
+#include <bit>
 #include <bitset>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <string>
 #include <unordered_map>
@@ -327,13 +327,20 @@ Box surfaceBoxOf(const GridDistance::Samples& samples) {
   return box;
 }
 
-std::uint64_t fingerprintOf(const std::vector<SampledBlocks::Block>& blocks) {
+/// Returns a hash of the samples' values and places.
+std::uint64_t fingerprintOf(const GridDistance::Samples& samples) {
   std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a over 64-bit numbers
-  visitSamples(blocks, [&](const SampleIndex&, double value) {
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &value, sizeof(bits));
+  const auto add = [&](std::uint64_t bits) {
     hash = (hash ^ bits) * 0x100000001b3;
     hash ^= hash >> 32;
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    add(std::bit_cast<std::uint64_t>(samples.origin[axis]));
+    add(std::bit_cast<std::uint64_t>(samples.spacing[axis]));
+  }
+  visitSamples(samples.blocks, [&](const SampleIndex& index, double value) {
+    for (const auto number : index) add(static_cast<std::uint64_t>(number));
+    add(std::bit_cast<std::uint64_t>(value));
   });
   return hash;
 }
@@ -343,7 +350,7 @@ Source sourceOf(const GridDistance::Samples& samples, Source source) {
   source.box = surfaceBoxOf(samples);
   if (source.box.isEmpty())
     throw Error(ErrorKind::file, "", "the grid has no surface: all of its values have the same sign");
-  source.fingerprint = fingerprintOf(samples.blocks);
+  source.fingerprint = fingerprintOf(samples);
   return source;
 }
 

@@ -33,7 +33,7 @@ struct GridLayout {
 GridLayout gridOfCells(const Box& box, const std::array<std::uint32_t, 3>& cells);
 
 /// Returns the grid of the points in `box` whose coordinates are multiples of `voxel`, as those of an OpenVDB grid with
-/// this voxel size are. Throws `Error` if `voxel` is not positive, if the box holds no such point, and if the grid
+/// this voxel size are. Throws `Error` if `voxel` is not positive, if the box holds no such point, or if the grid
 /// has more points than memory can hold.
 GridLayout gridOfVoxels(const Box& box, double voxel);
 

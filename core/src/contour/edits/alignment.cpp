@@ -81,15 +81,17 @@ void align(MeshEditor& editor) {
     std::ranges::stable_sort(proposed, std::greater{}, &ProposedFlip::value);
     std::vector<Edit> flips, chosen;
     for (ProposedFlip& one : proposed) flips.push_back(std::move(one.flip));
-    isOpen.assign(isOpen.size(), false);
-    for (const Edit& flip : flips)
-      for (const std::uint32_t n : flip.removed) isOpen[n] = true;
-    for (const std::size_t i : editor.independent(flips)) chosen.push_back(std::move(flips[i]));
+    const std::vector<std::size_t> independent = editor.independent(flips);
+    for (const std::size_t i : independent) chosen.push_back(flips[i]);
     if (chosen.empty()) return;
     const std::vector<bool> isMade = editor.make(chosen);
-    // The triangles of a flip that was refused stay as they are.
-    for (std::size_t i = 0; i < chosen.size(); ++i)
-      for (const std::uint32_t n : chosen[i].removed) isOpen[n] = isMade[i];
+    // A flip that was refused is not proposed again unless a triangle beside its edge changes, or is at another edge of
+    // which the flip was not tried.
+    std::vector<bool> isRefused(flips.size());
+    for (std::size_t i = 0; i < chosen.size(); ++i) isRefused[independent[i]] = !isMade[i];
+    isOpen.assign(isOpen.size(), false);
+    for (std::size_t i = 0; i < flips.size(); ++i)
+      for (const std::uint32_t n : flips[i].removed) isOpen[n] = isOpen[n] || !isRefused[i];
   }
 }
 

@@ -8,6 +8,7 @@
 #include "util/chunks.h"
 
 namespace hpsdf::contouring {
+
 std::vector<SurfacePoint> surfacePointsNear(const ImplicitSurface& surface, const EditLimits& limits,
                                             std::span<const Corners> triangles) {
   std::vector<Vector3> moved;
