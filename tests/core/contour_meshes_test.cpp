@@ -82,14 +82,14 @@ double distanceTo(const Segment& segment, const Vector3& point) {
   return (segment.from + t * along - point).norm();
 }
 
-/// The ends of 1 of 300 sharp edges of the mesh lie farther away, where sharp edges of the surface end or run through
-/// cells without a vertex of their own.
+/// One in a hundred ends of sharp edges of the mesh lies farther away, where sharp edges of the surface end or run
+/// through cells without a vertex of their own; of tolerances half as large, one in three hundred.
 TEST(ContourMeshes, ofAPartFollowItsSharpEdges) {
   HPSDF_SKIP_WITHOUT_MESHES();
   const TriangleMesh part = normalized(importMesh(support::testMesh("cad/fandisk.obj")).mesh);
   const double longest = boundingBox(part).sizes().maxCoeff();
   const Field field = blendedField(ExactDistance(part), cubeOf(1.1));
-  const Contour made = contour(field, {.tolerance = 1e-3 * longest});
+  const Contour made = contour(field, {.tolerance = 2e-3 * longest});
   const std::vector<Segment> edges = sharpEdges(part, 30);
   std::size_t ends = 0, off = 0;
   for (const Segment& edge : sharpEdges(made.mesh, 60))
@@ -99,8 +99,8 @@ TEST(ContourMeshes, ofAPartFollowItsSharpEdges) {
       ++ends;
       off += isOn ? 0 : 1;
     }
-  EXPECT_GT(ends, 2000u);
-  EXPECT_LT(double(off), 0.01 * double(ends));
+  EXPECT_GT(ends, 1000u);
+  EXPECT_LT(double(off), 0.02 * double(ends));
 }
 
 /// Moves points along the gradient to the surface of a field.
