@@ -282,7 +282,7 @@ void addTrianglesCommand(Registry& registry) {
             "The tolerance of the mesh, as for 'contour': a length, or a percentage of the longest side of the "
             "domain. It is 0.1% unless you set it."},
            {"simplify", flag(""),
-            "Merges vertices as far as the tolerance allows, as 'contour' does. It takes three to five times as "
+            "Merges vertices as far as the tolerance allows, as 'contour' does. It takes five to seven times as "
             "long."}},
       .action = changing(changeTriangles),
   });
