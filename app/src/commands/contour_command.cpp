@@ -196,7 +196,7 @@ const std::vector<Parameter> kContourParameters = {
     {"simplify", flag(),
      "Merge vertices as far as the tolerance allows. The mesh usually has a half to a fifteenth of the triangles, "
      "fewest "
-     "where the surface is flat, and takes three to five times as long."},
+     "where the surface is flat, and takes five to seven times as long."},
     {"no-normals", flag(), "Leave the normals of vertices out of the file. They are the field's gradients."},
     {"cut", choice({"wall", "open"}).byDefault("wall"),
      "Closes the mesh by a wall where the domain cuts the solid, or leaves it open there, half a tolerance within the "
