@@ -22,14 +22,16 @@ namespace include_direction_test {
 namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
-constexpr std::array<std::string_view, 5> kRooms = {"core", "render", "physics", "openvdb", "app"};
+constexpr std::array<std::string_view, 6> kRooms = {"core", "render", "physics", "openvdb", "app", "python"};
 constexpr std::size_t kMostFilesInFolder = 20;
 constexpr std::size_t kMostFilesInAppItself = 4;
 
 bool isRoom(std::string_view name) { return std::find(kRooms.begin(), kRooms.end(), name) != kRooms.end(); }
 
 /// Returns true if a file in the top-level folder `from` may include a file in the top-level folder `to`.
-bool mayInclude(std::string_view from, std::string_view to) { return from == to || to == "core" || from == "app"; }
+bool mayInclude(std::string_view from, std::string_view to) {
+  return from == to || to == "core" || (from == "app" && to != "python");
+}
 
 struct Include {
   std::string path;
@@ -157,7 +159,8 @@ std::set<std::string> quotedWords(const std::string& cell) {
 
 /// Reads table rows of the form "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
 Folders parseFolders(const std::string& design) {
-  static const std::regex row(R"(^\| `((?:core|render|physics|openvdb|app)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
+  static const std::regex row(
+      R"(^\| `((?:core|render|physics|openvdb|app|python)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
   Folders folders;
   std::istringstream stream(design);
   std::string line;

@@ -1,0 +1,115 @@
+#include "hpsdf/build.h"
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include "arrays.h"
+#include "build.h"
+#include "exact_distance.h"
+#include "mesh.h"
+#include "settings.h"
+#include "waiting.h"
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace hpsdf::python {
+namespace {
+
+/// A callable of Python as a distance. Any thread may call it; only one at a time runs Python.
+struct PythonDistance {
+  py::object callable;
+
+  void operator()(std::span<const Vector3> points, std::span<double> out) const {
+    const py::gil_scoped_acquire held;
+    const auto count = static_cast<py::ssize_t>(points.size());
+    const Doubles copied({count, py::ssize_t{3}}, reinterpret_cast<const double*>(points.data()));
+    const Doubles values = numbersOf(callable(copied), "the result of the callable");
+    if (values.ndim() != 1 || values.size() != count)
+      throw py::value_error("the result of the callable: expected an array of shape " + shapeText({count}) +
+                            " for points of shape " + shapeText({count, 3}) + ", got " +
+                            shapeText({values.shape(), values.shape() + values.ndim()}));
+    std::copy_n(values.data(), points.size(), out.data());
+  }
+};
+
+/// Returns the domain that `box` stands for: two corners, or 'cube' or 'box', enlarged by `margin` around a surface.
+Box domainFrom(const py::object& box, double margin, const Box& surface) {
+  if (py::isinstance<py::str>(box)) {
+    const auto word = box.cast<std::string>();
+    if (word != "cube" && word != "box")
+      throw Error(ErrorKind::option, "box", "expected 'cube', 'box' or two corners, got '" + word + "'");
+    if (surface.isEmpty())
+      throw Error(ErrorKind::option, "box", "expected the two corners of the domain, because the surface is unknown");
+    return domainAround(surface, word == "box" ? DomainShape::box : DomainShape::cube, margin);
+  }
+  const Points corners(box, "box");
+  if (corners.shape() != Shape{2})
+    throw py::value_error("box: expected two corners of three numbers, got an array of shape " +
+                          shapeText(corners.shape(3)));
+  return Box(corners.all()[0], corners.all()[1]);
+}
+
+/// Throws the errors of `checkBuild` as errors about options.
+void requireBuildable(const Box& domain, const BuildOptions& options) {
+  try {
+    checkBuild(domain, options);
+  } catch (const Error& error) {
+    if (error.kind() != ErrorKind::general) throw;
+    throw Error(ErrorKind::option, error.subject(), error.problem());
+  }
+}
+
+double longestSideOf(const Box& surface) { return surface.isEmpty() ? 0 : surface.sizes().maxCoeff(); }
+
+/// Builds the field of a distance with what is known of its surface.
+std::shared_ptr<Field> fieldOf(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+                               const py::object& progress) {
+  return std::make_shared<Field>(
+      resultOf(progress, [&](const Progress& link) { return build(distance, domain, options, link); }));
+}
+
+std::shared_ptr<Field> builtField(const py::object& surface, const py::object& box, double margin,
+                                  const std::string& insideTest, double thickness, const py::object& progress,
+                                  const py::kwargs& settings) {
+  const auto build = [&](const DistanceFunction& distance) {
+    const Box& known = distance.source().box;
+    const BuildOptions options = buildOptionsFrom(settings, longestSideOf(known));
+    const Box domain = domainFrom(box, margin, known);
+    requireBuildable(domain, options);
+    return fieldOf(distance, domain, options, progress);
+  };
+  if (py::isinstance<ExactDistance>(surface)) return build(surface.cast<const ExactDistance&>());
+  if (isMesh(surface)) {
+    const auto mesh = meshOf(surface);
+    const BuildOptions options = buildOptionsFrom(settings, longestSideOf(boundingBox(*mesh)));
+    const DistanceOptions inside = distanceOptions(insideTest, thickness, options.threads);
+    const auto distance = resultOf(progress, [&](const Progress& link) { return ExactDistance(*mesh, inside, link); });
+    return build(distance);
+  }
+  if (PyCallable_Check(surface.ptr()) == 0)
+    throw py::type_error("surface: expected a mesh, an ExactDistance or a callable, got '" +
+                         std::string(py::str(py::type::of(surface).attr("__name__"))) + "'");
+  const PythonDistance callable{surface};
+  return build(callable);
+}
+
+}  // namespace
+
+void addBuild(py::module_& module) {
+  const std::string doc =
+      "Builds the field of a mesh, of an ExactDistance, or of a callable.\n\n"
+      "surface: a TriangleMesh, an object with .vertices and .faces, an ExactDistance, or a callable that maps points, "
+      "shape (n, 3), to signed distances, shape (n,), negative inside. Any thread may call it.\n\n"
+      "box: the domain: two corners, or 'cube' or 'box' around the mesh, enlarged by the margin. inside_test and "
+      "thickness, of a mesh: as of ExactDistance. progress: a callable that takes the name of a task and the fraction "
+      "done. Ctrl-C cancels with KeyboardInterrupt.\n\n"
+      "Raises OptionError and MeshError, which are ValueErrors, LimitError, which is a MemoryError, and passes on what "
+      "the callables raise.\n\nThe options of the construction:\n" +
+      settingsHelp();
+  module.def("build", &builtField, "surface"_a, py::kw_only(), "box"_a = "cube", "margin"_a = 0.1,
+             "inside_test"_a = "automatic", "thickness"_a = 0.0, "progress"_a = py::none(), doc.c_str());
+}
+
+}  // namespace hpsdf::python

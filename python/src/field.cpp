@@ -1,0 +1,141 @@
+#include "field.h"
+
+#include <pybind11/stl/filesystem.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "arrays.h"
+#include "hpsdf/field.h"
+#include "hpsdf/field_file.h"
+#include "waiting.h"
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace hpsdf::python {
+namespace {
+
+constexpr std::size_t kValues = 1 << 20;     // points between two looks for signals: some tenths of a second
+constexpr std::size_t kGradients = 1 << 17;  // values with gradients that are held at a time: 4 MB
+
+/// A row of the array that `Field.cells` returns.
+struct CellRow {
+  double box[2][3];
+  std::int32_t degree;
+  std::int32_t depth;
+  double error;
+};
+
+py::object values(const Field& field, const py::object& argument, const py::object& out) {
+  Points points(argument);
+  Doubles result = resultArray(out, points.shape());
+  points.keepApartFrom(result);
+  const std::span<double> all(result.mutable_data(), points.count());
+  if (points.count() == 1)
+    all[0] = field.value(points.all()[0]);  // handing over the GIL would take longer
+  else
+    forEachPiece(points.count(), kValues, [&](std::size_t first, std::size_t count) {
+      field.values(points.all().subspan(first, count), all.subspan(first, count));
+    });
+  return out.is_none() ? unwrapped(result) : out;
+}
+
+/// Returns the two arrays of `out`, a tuple of values and gradients, or two times None if it is None.
+std::pair<py::object, py::object> twoArrays(const py::object& out) {
+  if (out.is_none()) return {py::none(), py::none()};
+  if (!py::isinstance<py::sequence>(out) || py::isinstance<py::array>(out) || py::len(out) != 2)
+    throw py::type_error("out: expected two arrays, one for the values and one for the gradients");
+  const auto both = py::reinterpret_borrow<py::sequence>(out);
+  return {both[0], both[1]};
+}
+
+py::object valuesAndGradients(const Field& field, const py::object& argument, const py::object& out) {
+  Points points(argument);
+  const auto [valueOut, gradientOut] = twoArrays(out);
+  Doubles value = resultArray(valueOut, points.shape(), "out[0]");
+  Doubles gradient = resultArray(gradientOut, points.shape(3), "out[1]");
+  points.keepApartFrom(value);
+  points.keepApartFrom(gradient);
+  double* const allValues = value.mutable_data();
+  auto* const allGradients = reinterpret_cast<Vector3*>(gradient.mutable_data());
+  std::vector<ValueAndGradient> piece(std::min(kGradients, points.count()));
+  forEachPiece(points.count(), kGradients, [&](std::size_t first, std::size_t count) {
+    field.valuesAndGradients(points.all().subspan(first, count), std::span(piece).first(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      allValues[first + i] = piece[i].value;
+      allGradients[first + i] = piece[i].gradient;
+    }
+  });
+  return py::make_tuple(valueOut.is_none() ? unwrapped(value) : valueOut, gradient);
+}
+
+py::array cells(const Field& field) {
+  std::vector<CellRow> rows;
+  field.forEachCell([&](const Cell& cell) {
+    const Vector3 low = cell.box.min(), high = cell.box.max();
+    rows.push_back(
+        {{{low.x(), low.y(), low.z()}, {high.x(), high.y(), high.z()}}, cell.degree, cell.depth, cell.error});
+  });
+  return py::array_t<CellRow>(static_cast<py::ssize_t>(rows.size()), rows.data());
+}
+
+py::array domain(const Field& field) {
+  Doubles corners({2, 3});
+  for (int axis = 0; axis < 3; ++axis) {
+    corners.mutable_at(0, axis) = field.domain().min()[axis];
+    corners.mutable_at(1, axis) = field.domain().max()[axis];
+  }
+  return corners;
+}
+
+std::string description(const Field& field) {
+  return "<hpsdf.Field: " + std::to_string(statistics(field).leaves) + " cells, " + precisionName(field) + ", " +
+         std::to_string(field.bytes()) + " bytes>";
+}
+
+void saved(const Field& field, const std::filesystem::path& path, bool compress) {
+  const py::gil_scoped_release released;
+  save(field, path, {.compress = compress});
+}
+
+std::shared_ptr<Field> loadedField(const std::filesystem::path& path) {
+  return std::make_shared<Field>(resultOf(py::none(), [&](const Progress&) { return load(path); }));
+}
+
+}  // namespace
+
+void addField(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(CellRow, box, degree, depth, error);
+  py::class_<Field, std::shared_ptr<Field>>(
+      module, "Field",
+      "A signed distance field: an octree of polynomials, negative inside. `build` makes one, `load` reads one.\n\n"
+      "Fields are immutable; several threads may use one at the same time. Outside the domain the value is an upper "
+      "bound of the distance.")
+      .def("__call__", &values, "points"_a, "out"_a = py::none(),
+           "Returns the values at points, shape (..., 3), as an array of shape (...), or as a float for one point of "
+           "shape (3,). Points and values have the units of the mesh.\n\n"
+           "points: float64 and C-contiguous without a copy; other real numbers are converted. out: a C-contiguous "
+           "array of float64 with the shape of the result, which receives and becomes it. Raises ValueError for other "
+           "shapes and TypeError for other types.")
+      .def("value_and_gradient", &valuesAndGradients, "points"_a, "out"_a = py::none(),
+           "Returns the values at points, shape (..., 3), and their gradients: two arrays of the shapes (...) and "
+           "(..., 3). out: two arrays for them, as of `__call__`.")
+      .def("save", &saved, "path"_a, py::kw_only(), "compress"_a = false,
+           "Writes the field as a .hpsdf file, whole or not at all; with compress=True smaller and more slowly. Raises "
+           "FileError (an OSError).")
+      .def(
+          "cells", &cells,
+          "Returns the cells as a structured array with the fields box, the lower and the upper corner; degree, 31 "
+          "for cells with triangles instead of a polynomial; depth, 0 for base cells; and error, the estimated squared "
+          "L2 error.")
+      .def_property_readonly("domain", &domain, "The lower and the upper corner of the domain: float64, shape (2, 3).")
+      .def_property_readonly("nbytes", &Field::bytes, "The bytes of memory that the field takes.")
+      .def("__repr__", &description);
+  module.def("load", &loadedField, "path"_a,
+             "Reads a field from a .hpsdf file. The file is not needed afterwards. Raises FileError (an OSError).");
+}
+
+}  // namespace hpsdf::python

@@ -1,0 +1,18 @@
+// The extension hpsdf._hpsdf, from which the package hpsdf takes all its names.
+#include <pybind11/pybind11.h>
+
+#include "build.h"
+#include "errors.h"
+#include "exact_distance.h"
+#include "field.h"
+#include "mesh.h"
+
+PYBIND11_MODULE(_hpsdf, module) {
+  using namespace hpsdf::python;
+  module.attr("__version__") = HPSDF_VERSION;
+  addErrors(module);
+  addMesh(module);
+  addExactDistance(module);
+  addField(module);
+  addBuild(module);
+}

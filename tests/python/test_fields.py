@@ -1,0 +1,64 @@
+"""Fields: equal to those of C++, files, cells and pickling."""
+
+import pickle
+
+import numpy
+import pytest
+
+import hpsdf
+
+
+def test_values_and_gradients_equal_those_of_the_program(field, points, query, tmp_path):
+    field.save(tmp_path / "torus.hpsdf")
+    columns = query(points, tmp_path / "torus.hpsdf")
+    value, gradient = field.value_and_gradient(points)
+    assert numpy.array_equal(value, columns["distance"].astype(float))
+    assert numpy.array_equal(field(points), value)
+    for axis in range(3):
+        assert numpy.array_equal(gradient[:, axis], columns["g" + "xyz"[axis]].astype(float))
+
+
+def test_files(field, points, tmp_path):
+    file = tmp_path / "torus.hpsdf"
+    field.save(file)
+    again = hpsdf.load(str(file))
+    field.save(tmp_path / "small.hpsdf", compress=True)
+    small = hpsdf.load(tmp_path / "small.hpsdf")
+    assert (tmp_path / "small.hpsdf").stat().st_size < file.stat().st_size
+    file.unlink()  # the field does not need its file
+    assert numpy.array_equal(again(points), field(points)) and numpy.array_equal(small(points), field(points))
+
+
+def test_files_that_cannot_be_read(field, tmp_path):
+    (tmp_path / "wrong.hpsdf").write_bytes(b"no field")
+    for wrong in (tmp_path / "none.hpsdf", tmp_path / "wrong.hpsdf", tmp_path):
+        with pytest.raises(OSError) as caught:
+            hpsdf.load(wrong)
+        assert isinstance(caught.value, hpsdf.FileError) and str(wrong) in str(caught.value)
+    with pytest.raises(hpsdf.FileError):
+        field.save(tmp_path / "no folder" / "torus.hpsdf")
+    with pytest.raises(TypeError):
+        hpsdf.load(3)
+
+
+def test_cells_fill_the_domain(field):
+    cells = field.cells()
+    assert cells.dtype.names == ("box", "degree", "depth", "error")
+    assert cells["box"].shape == (len(cells), 2, 3) and repr(field).startswith(f"<hpsdf.Field: {len(cells)} cells, ")
+    volumes = (cells["box"][:, 1] - cells["box"][:, 0]).prod(axis=1)
+    domain = field.domain
+    assert domain.shape == (2, 3)
+    assert abs(volumes.sum() / (domain[1] - domain[0]).prod() - 1) < 1e-12
+    assert (cells["degree"] >= 1).all() and (cells["depth"] <= 10).all() and (cells["error"] >= 0).all()
+    assert field.nbytes > 0
+
+
+def test_pickling(field, points):
+    again = pickle.loads(pickle.dumps(field))
+    assert numpy.array_equal(again(points), field(points))
+    assert numpy.array_equal(again.cells(), field.cells())
+
+
+def test_no_field_without_build_or_load():
+    with pytest.raises(TypeError):
+        hpsdf.Field()
