@@ -23,6 +23,7 @@ from ._hpsdf import (
     TriangleMesh,
     __version__,
     build,
+    jumps,
     load,
     load_mesh,
 )
@@ -40,6 +41,7 @@ __all__ = [
     "TriangleMesh",
     "__version__",
     "build",
+    "jumps",
     "load",
     "load_mesh",
 ]

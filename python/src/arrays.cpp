@@ -79,7 +79,8 @@ Doubles resultArray(const py::object& out, const Shape& shape, const char* name)
   if (shapeOf(array) != shape)
     throw py::value_error(prefix + " with the shape " + shapeText(shape) + ", got " + shapeText(shapeOf(array)));
   if (!array.writeable()) throw py::value_error(prefix + " that is writeable, got a read-only one");
-  if (!Doubles::check_(array)) throw py::value_error(prefix + " that is C-contiguous and aligned");
+  const bool isAligned = (array.flags() & py::detail::npy_api::constants::NPY_ARRAY_ALIGNED_) != 0;
+  if (!Doubles::check_(array) || !isAligned) throw py::value_error(prefix + " that is C-contiguous and aligned");
   return py::reinterpret_borrow<Doubles>(array);
 }
 

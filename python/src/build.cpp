@@ -104,7 +104,7 @@ void addBuild(py::module_& module) {
       "shape (n, 3), to signed distances, shape (n,), negative inside. Any thread may call it.\n\n"
       "box: the domain: two corners, or 'cube' or 'box' around the mesh, enlarged by the margin. inside_test and "
       "thickness, of a mesh: as of ExactDistance. progress: a callable that takes the name of a task and the fraction "
-      "done. Ctrl-C cancels with KeyboardInterrupt.\n\n"
+      "done, or True for a bar on standard error. Ctrl-C cancels with KeyboardInterrupt.\n\n"
       "Raises OptionError and MeshError, which are ValueErrors, LimitError, which is a MemoryError, and passes on what "
       "the callables raise.\n\nThe options of the construction:\n" +
       settingsHelp();

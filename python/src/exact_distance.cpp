@@ -96,7 +96,7 @@ void addExactDistance(py::module_& module) {
            "inside_test: 'automatic'; 'pseudonormal', for closed meshes without self-intersections; 'winding', for "
            "any mesh, whose holes are closed; 'shell', a wall of the given thickness (in mesh units) around open "
            "sheets; or 'outer_hull', as 'winding' but without inner walls. threads: greatest number of threads, 0 for "
-           "all. progress: a callable that takes the name of a task and the fraction done.\n\n"
+           "all. progress: as of build.\n\n"
            "Raises MeshError or OptionError, which are ValueErrors.")
       .def("__call__", &distances, "points"_a, "out"_a = py::none(),
            "Returns the signed distances of points, shape (..., 3), as an array of shape (...), or as a float for one "

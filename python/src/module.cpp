@@ -5,6 +5,7 @@
 #include "errors.h"
 #include "exact_distance.h"
 #include "field.h"
+#include "jumps.h"
 #include "mesh.h"
 
 PYBIND11_MODULE(_hpsdf, module) {
@@ -15,4 +16,5 @@ PYBIND11_MODULE(_hpsdf, module) {
   addExactDistance(module);
   addField(module);
   addBuild(module);
+  addJumps(module);
 }

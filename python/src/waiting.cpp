@@ -67,11 +67,39 @@ void attend(Work& work, const py::object& progress) {
   if (const auto report = work.takeReport()) progress(report->task, report->fraction);
 }
 
+/// The callable that gets reports: that of the caller, a bar that is closed in the end, or None.
+class Receiver {
+ public:
+  explicit Receiver(const py::object& progress) : callable_(progress) {
+    if (py::isinstance<py::bool_>(progress)) {
+      isBar_ = progress.cast<bool>();
+      callable_ = isBar_ ? py::module_::import("hpsdf._progress").attr("Bar")() : py::none();
+    } else if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0) {
+      throw py::type_error("progress: expected a callable that takes a task's name and a fraction, True or None");
+    }
+  }
+  Receiver(const Receiver&) = delete;
+  Receiver& operator=(const Receiver&) = delete;
+  ~Receiver() {
+    if (!isBar_) return;
+    const py::error_scope pending;
+    try {
+      callable_.attr("close")();
+    } catch (const py::error_already_set&) {  // a bar that cannot be closed is no reason to lose the result
+    }
+  }
+
+  const py::object& callable() const { return callable_; }
+
+ private:
+  py::object callable_;
+  bool isBar_ = false;
+};
+
 }  // namespace
 
 void waitFor(const py::object& progress, const std::function<void(const Progress&)>& work) {
-  if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0)
-    throw py::type_error("progress: expected a callable that takes a task's name and a fraction, or None");
+  const Receiver receiver(progress);
   Work shared;
   std::exception_ptr failed, interrupted;
   {
@@ -88,7 +116,7 @@ void waitFor(const py::object& progress, const std::function<void(const Progress
       if (interrupted) continue;
       const py::gil_scoped_acquire held;
       try {
-        attend(shared, progress);
+        attend(shared, receiver.callable());
       } catch (...) {
         interrupted = std::current_exception();
         shared.cancel();
@@ -98,7 +126,7 @@ void waitFor(const py::object& progress, const std::function<void(const Progress
   }
   if (interrupted) std::rethrow_exception(interrupted);
   if (failed) std::rethrow_exception(failed);
-  attend(shared, progress);
+  attend(shared, receiver.callable());
 }
 
 }  // namespace hpsdf::python

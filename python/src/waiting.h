@@ -15,7 +15,8 @@ namespace hpsdf::python {
 
 /// Does `work` in a thread of its own while the calling thread waits, without the GIL. The waiting thread calls
 /// `progress(task, fraction)`, unless it is None, up to twenty times a second, and looks as often whether a signal
-/// came. An exception of a signal's handler, such as KeyboardInterrupt after Ctrl-C, or of `progress` cancels the work
+/// came. If `progress` is True, a bar on standard error shows it.
+/// An exception of a signal's handler, such as KeyboardInterrupt after Ctrl-C, or of `progress` cancels the work
 /// and is rethrown when it has ended. Rethrows exceptions of `work`.
 void waitFor(const pybind11::object& progress, const std::function<void(const Progress&)>& work);
 

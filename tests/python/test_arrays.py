@@ -104,6 +104,8 @@ def test_wrong_arrays_for_results_are_refused(field, exact, points):
             query(points, out=numpy.empty(499))
         with pytest.raises(ValueError, match="C-contiguous"):
             query(points, out=numpy.empty(1000)[::2])
+        with pytest.raises(ValueError, match="aligned"):
+            query(points, out=numpy.frombuffer(bytearray(4001), dtype=numpy.float64, offset=1))
         with pytest.raises(ValueError, match="read-only"):
             query(points, out=read_only)
     with pytest.raises(TypeError, match="out: expected two arrays"):

@@ -91,6 +91,13 @@ def test_progress_is_reported(mesh):
     assert calls and all(isinstance(task, str) and 0 <= fraction <= 1 for task, fraction in calls)
 
 
+def test_a_bar_shows_progress(mesh, capsys):
+    hpsdf.build(mesh, target_error=1e-8, progress=True)
+    assert "%" in capsys.readouterr().err
+    hpsdf.build(mesh, target_error=1e-3, progress=False)
+    assert capsys.readouterr().err == ""
+
+
 def test_exceptions_of_progress_cancel(mesh):
     class Enough(Exception):
         pass

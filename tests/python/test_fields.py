@@ -53,6 +53,19 @@ def test_cells_fill_the_domain(field):
     assert field.nbytes > 0
 
 
+def test_jumps(mesh, field):
+    jumps = hpsdf.jumps(field)
+    assert jumps.shape[0] > len(field.cells()) and (jumps["max"] >= jumps["rms"] / 1.001).all() and jumps["max"].any()
+    for face in jumps[:50]:
+        at = face["worst"] + 1e-6 * (face["center"] - face["worst"])  # off the edges of the face
+        step = 1e-9 * numpy.eye(3)[face["axis"]]
+        assert abs(abs(field(at + step) - field(at - step)) - face["max"]) < 1e-5
+    blended = hpsdf.build(mesh, target_error=1e-4, continuity="exact")
+    assert hpsdf.jumps(blended, threads=1)["max"].max() < 1e-12
+    with pytest.raises(TypeError):
+        hpsdf.jumps(mesh)
+
+
 def test_pickling(field, points):
     again = pickle.loads(pickle.dumps(field))
     assert numpy.array_equal(again(points), field(points))
