@@ -3,12 +3,10 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "arrays.h"
-#include "hpsdf/field.h"
 #include "hpsdf/field_file.h"
 #include "waiting.h"
 
@@ -107,13 +105,14 @@ std::shared_ptr<Field> loadedField(const std::filesystem::path& path) {
 
 }  // namespace
 
-void addField(py::module_& module) {
+FieldClass addField(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(CellRow, box, degree, depth, error);
-  py::class_<Field, std::shared_ptr<Field>>(
+  FieldClass fields(
       module, "Field",
       "A signed distance field: an octree of polynomials, negative inside. `build` makes one, `load` reads one.\n\n"
       "Fields are immutable; several threads may use one at the same time. Outside the domain the value is an upper "
-      "bound of the distance.")
+      "bound of the distance.");
+  fields
       .def("__call__", &values, "points"_a, "out"_a = py::none(),
            "Returns the values at points, shape (..., 3), as an array of shape (...), or as a float for one point of "
            "shape (3,). Points and values have the units of the mesh.\n\n"
@@ -136,6 +135,7 @@ void addField(py::module_& module) {
       .def("__repr__", &description);
   module.def("load", &loadedField, "path"_a,
              "Reads a field from a .hpsdf file. The file is not needed afterwards. Raises FileError (an OSError).");
+  return fields;
 }
 
 }  // namespace hpsdf::python

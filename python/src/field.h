@@ -2,8 +2,14 @@
 
 #include <pybind11/pybind11.h>
 
+#include <memory>
+
+#include "hpsdf/field.h"
+
 namespace hpsdf::python {
 
-void addField(pybind11::module_& module);
+using FieldClass = pybind11::class_<Field, std::shared_ptr<Field>>;
+
+FieldClass addField(pybind11::module_& module);
 
 }  // namespace hpsdf::python

@@ -2,6 +2,7 @@
 #include <pybind11/pybind11.h>
 
 #include "build.h"
+#include "contour.h"
 #include "errors.h"
 #include "exact_distance.h"
 #include "field.h"
@@ -14,7 +15,8 @@ PYBIND11_MODULE(_hpsdf, module) {
   addErrors(module);
   addMesh(module);
   addExactDistance(module);
-  addField(module);
+  FieldClass fields = addField(module);
+  addContour(fields);
   addBuild(module);
   addJumps(module);
 }

@@ -66,6 +66,22 @@ def test_jumps(mesh, field):
         hpsdf.jumps(mesh)
 
 
+def test_contours_equal_those_of_the_program(field, program, tmp_path):
+    contour = field.contour(tolerance=0.01)
+    field.save(tmp_path / "torus.hpsdf")
+    program("contour", tmp_path / "torus.hpsdf", "-o", tmp_path / "torus.ply", "--tolerance", 0.01, "--keep-jumps")
+    theirs = hpsdf.load_mesh(tmp_path / "torus.ply")
+    assert numpy.array_equal(contour.vertices, theirs.vertices)
+    assert numpy.array_equal(contour.triangles, theirs.triangles)
+    assert abs(field(contour.vertices)).max() < 0.01
+    simple = field.contour(tolerance=0.01, offset=0.05, simplify=True)
+    assert 0 < len(simple.faces) < len(contour.faces)
+    with pytest.raises(hpsdf.OptionError, match="domain_cut: expected 'wall' or 'open', got 'walls'"):
+        field.contour(domain_cut="walls")
+    with pytest.raises(hpsdf.Error):
+        field.contour(tolerance=-1)
+
+
 def test_pickling(field, points):
     again = pickle.loads(pickle.dumps(field))
     assert numpy.array_equal(again(points), field(points))

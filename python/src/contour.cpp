@@ -1,0 +1,48 @@
+#include "contour.h"
+
+#include <memory>
+#include <string>
+
+#include "hpsdf/output/contour.h"
+#include "waiting.h"
+
+namespace py = pybind11;
+using namespace py::literals;
+
+namespace hpsdf::python {
+namespace {
+
+DomainCut domainCutOf(const std::string& word) {
+  if (word != "wall" && word != "open")
+    throw Error(ErrorKind::option, "domain_cut", "expected 'wall' or 'open', got '" + word + "'");
+  return word == "wall" ? DomainCut::wall : DomainCut::open;
+}
+
+std::shared_ptr<TriangleMesh> contourOf(const Field& field, double offset, double tolerance,
+                                        const std::string& domainCut, bool simplify, int threads,
+                                        const py::object& progress) {
+  const ContourOptions options = {.offset = offset,
+                                  .tolerance = tolerance,
+                                  .domainCut = domainCutOf(domainCut),
+                                  .simplify = simplify,
+                                  .threads = threads};
+  return std::make_shared<TriangleMesh>(
+      resultOf(progress, [&](const Progress& link) { return contour(field, options, link).mesh; }));
+}
+
+}  // namespace
+
+void addContour(FieldClass& fields) {
+  fields.def(
+      "contour", &contourOf, py::kw_only(), "offset"_a = 0.0, "tolerance"_a = 0.0, "domain_cut"_a = "wall",
+      "simplify"_a = false, "threads"_a = 0, "progress"_a = py::none(),
+      "Returns the mesh of the surface on which the field has the value `offset`, in units of length: closed and "
+      "without crossings, with sharp edges kept.\n\n"
+      "tolerance: greatest distance between the mesh and this surface; 0 for a thousandth of the domain's longest "
+      "side. domain_cut: 'wall' closes the mesh where the domain cuts the solid, 'open' ends it there. simplify: "
+      "merges vertices as far as the tolerance allows, which takes several times as long. The mesh follows the "
+      "steps by which the field jumps between its cells; a field built with continuity='exact' has none.\n\n"
+      "Raises Error for options out of range and LimitError (a MemoryError).");
+}
+
+}  // namespace hpsdf::python
