@@ -4,12 +4,12 @@
 #include <memory>
 #include <string>
 
-#include "arrays.h"
 #include "build.h"
+#include "convert/arrays.h"
+#include "convert/settings.h"
+#include "convert/waiting.h"
 #include "exact_distance.h"
 #include "mesh.h"
-#include "settings.h"
-#include "waiting.h"
 
 namespace py = pybind11;
 using namespace py::literals;

@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
+#include "convert/waiting.h"
 #include "hpsdf/output/contour.h"
-#include "waiting.h"
 
 namespace py = pybind11;
 using namespace py::literals;

@@ -5,10 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "arrays.h"
+#include "convert/arrays.h"
+#include "convert/waiting.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "mesh.h"
-#include "waiting.h"
 
 namespace py = pybind11;
 using namespace py::literals;

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "arrays.h"
+#include "convert/arrays.h"
+#include "convert/waiting.h"
 #include "hpsdf/field_file.h"
-#include "waiting.h"
 
 namespace py = pybind11;
 using namespace py::literals;

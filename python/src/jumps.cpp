@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <vector>
 
-#include "arrays.h"
+#include "convert/arrays.h"
+#include "convert/waiting.h"
 #include "hpsdf/field.h"
 #include "jumps.h"
-#include "waiting.h"
 
 namespace py = pybind11;
 using namespace py::literals;

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <string>
 
-#include "arrays.h"
+#include "convert/arrays.h"
+#include "convert/waiting.h"
 #include "hpsdf/mesh_file.h"
-#include "waiting.h"
 
 namespace py = pybind11;
 using namespace py::literals;

@@ -3,7 +3,7 @@
 
 #include "build.h"
 #include "contour.h"
-#include "errors.h"
+#include "convert/errors.h"
 #include "exact_distance.h"
 #include "field.h"
 #include "jumps.h"

@@ -1,4 +1,4 @@
-#include "waiting.h"
+#include "convert/waiting.h"
 
 #include <atomic>
 #include <chrono>
