@@ -20,12 +20,14 @@ from ._hpsdf import (
     LimitError,
     MeshError,
     OptionError,
+    Samples,
     TriangleMesh,
     __version__,
     build,
     jumps,
     load,
     load_mesh,
+    sample,
 )
 
 __all__ = [
@@ -38,12 +40,14 @@ __all__ = [
     "LimitError",
     "MeshError",
     "OptionError",
+    "Samples",
     "TriangleMesh",
     "__version__",
     "build",
     "jumps",
     "load",
     "load_mesh",
+    "sample",
 ]
 
 # Names of the extension are shown, and pickled, as names of the package.

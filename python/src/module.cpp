@@ -8,6 +8,7 @@
 #include "field.h"
 #include "jumps.h"
 #include "mesh.h"
+#include "samples.h"
 
 PYBIND11_MODULE(_hpsdf, module) {
   using namespace hpsdf::python;
@@ -19,4 +20,5 @@ PYBIND11_MODULE(_hpsdf, module) {
   addContour(fields);
   addBuild(module);
   addJumps(module);
+  addSamples(module);
 }

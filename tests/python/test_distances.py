@@ -30,6 +30,22 @@ def test_closest_points_agree_with_the_mesh(mesh, exact, points):
     assert single.point.shape == single.barycentric.shape == (3,)
 
 
+def test_samples_equal_those_of_the_program(mesh, exact, program, tmp_path):
+    samples = hpsdf.sample(mesh, surface=100, near=300, uniform=50, seed=7)
+    words = ("--surface", 100, "--near", 300, "--uniform", 50, "--seed", 7, "--double")
+    program("sample", "builtin:torus", "-o", tmp_path / "torus.npz", *words)
+    theirs = numpy.load(tmp_path / "torus.npz")
+    assert samples.points.shape == (450, 3)
+    for name in ("points", "distances", "gradients", "kinds"):
+        assert numpy.array_equal(getattr(samples, name), theirs[name]), name
+    assert numpy.array_equal(samples.distances[100:], exact(samples.points[100:]))
+    assert numpy.array_equal(samples.faces, exact.closest(samples.points).face)
+    alone = hpsdf.sample(mesh, surface=100, near=300, uniform=50, seed=7, threads=1)
+    assert all(numpy.array_equal(ours, same) for ours, same in zip(samples, alone))
+    with pytest.raises(TypeError):
+        hpsdf.sample(mesh, near=-1)
+
+
 def test_inside_tests(mesh):
     assert hpsdf.ExactDistance(mesh).inside_test == "pseudonormal"
     assert hpsdf.ExactDistance(mesh, inside_test="winding").inside_test == "winding"
