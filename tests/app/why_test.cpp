@@ -45,7 +45,7 @@ TEST_F(Why, findsTheMeshBesideTheField) {
   EXPECT_EQ(run({{"verify", at("solid.hpsdf"), "--points", "1000"}}).status, 0) << "verify finds it too";
 
   writeFile(at("solid.obj"), std::string(kTetrahedron) + "v 2 2 2\nf 1 2 5\n");
-  expectRefused({{"why", at("solid.hpsdf"), "0.2,0.2,0.1"}}, "was made from solid.obj, not from",
+  expectRefused({{"why", at("solid.hpsdf"), "0.2,0.2,0.1"}}, "the contents of these files were others",
                 {"solid.hpsdf", "solid.obj"});
   fs::remove(at("solid.obj"));
   expectRefused({{"why", at("solid.hpsdf"), "0.2,0.2,0.1"}}, "needs the mesh that it was made from", {"solid.hpsdf"});
