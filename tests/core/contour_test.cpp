@@ -128,23 +128,25 @@ TEST(Contour, ofBlendedExactLeavesTakesAboutAsMuchWorkAsOfOthers) {
 }
 
 /// Random leaves disagree, so that the surface jumps from leaf to leaf, and has parts of all sizes.
-TEST(Contour, ofRandomFieldsIsAClosedManifold) {
+class ContourOfARandomField : public testing::TestWithParam<unsigned> {};
+
+TEST_P(ContourOfARandomField, isAClosedManifoldOrAnOpenOne) {
+  const Field field = randomField(GetParam());
+  const double tolerance = 0.02 * field.domain().sizes().maxCoeff();
   std::size_t fans = 0;
-  for (unsigned seed = 0; seed < 6; ++seed) {
-    const Field field = randomField(seed);
-    for (const Field& one : {field, blended(field, 0.2)}) {
-      const Contour found = contour(one, {.tolerance = 0.02 * field.domain().sizes().maxCoeff()});
-      EXPECT_EQ(support::contourDefects(found.mesh), "") << seed;
-      EXPECT_GT(found.mesh.triangles.size(), 100u);
-      EXPECT_EQ(found.flawed, 0u);
-      fans += found.fans;
-      const Contour open =
-          contour(one, {.tolerance = 0.02 * field.domain().sizes().maxCoeff(), .domainCut = DomainCut::open});
-      EXPECT_EQ(support::contourDefects(open.mesh, true), "") << seed;
-    }
+  for (const Field& one : {field, blended(field, 0.2)}) {
+    const Contour found = contour(one, {.tolerance = tolerance});
+    EXPECT_EQ(support::contourDefects(found.mesh), "");
+    EXPECT_GT(found.mesh.triangles.size(), 100u);
+    EXPECT_EQ(found.flawed, 0u);
+    fans += found.fans;
+    const Contour open = contour(one, {.tolerance = tolerance, .domainCut = DomainCut::open});
+    EXPECT_EQ(support::contourDefects(open.mesh, true), "");
   }
   EXPECT_GT(fans, 0u);
 }
+
+INSTANTIATE_TEST_SUITE_P(Seeds, ContourOfARandomField, testing::Range(0U, 6U));
 
 TEST(Contour, isClosedByAWallOrOpenWhereTheDomainCutsTheSolid) {
   const Field cut = build(sphere, cubeOf(0.6), {.targetError = 1e-8});
