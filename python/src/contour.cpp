@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "convert/waiting.h"
 #include "hpsdf/output/contour.h"
@@ -18,6 +19,17 @@ DomainCut domainCutOf(const std::string& word) {
   return word == "wall" ? DomainCut::wall : DomainCut::open;
 }
 
+/// Issues a `RuntimeWarning` if the mesh is not all that was asked for.
+void warnOfMisses(const Contour& made) {
+  std::string text;
+  if (made.flawed > 0)
+    text = std::to_string(made.flawed) + " polygons of the contour cross others: try another tolerance";
+  else if (made.unresolved > 0)
+    text = "the contour misses the tolerance in " + std::to_string(made.unresolved) +
+           " places: allow a greater tolerance, or build the field more accurately";
+  if (!text.empty() && PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 std::shared_ptr<TriangleMesh> contourOf(const Field& field, double offset, double tolerance,
                                         const std::string& domainCut, bool simplify, int threads,
                                         const py::object& progress) {
@@ -26,8 +38,9 @@ std::shared_ptr<TriangleMesh> contourOf(const Field& field, double offset, doubl
                                   .domainCut = domainCutOf(domainCut),
                                   .simplify = simplify,
                                   .threads = threads};
-  return std::make_shared<TriangleMesh>(
-      resultOf(progress, [&](const Progress& link) { return contour(field, options, link).mesh; }));
+  Contour made = resultOf(progress, [&](const Progress& link) { return contour(field, options, link); });
+  warnOfMisses(made);
+  return std::make_shared<TriangleMesh>(std::move(made.mesh));
 }
 
 }  // namespace
@@ -42,6 +55,7 @@ void addContour(FieldClass& fields) {
       "side. domain_cut: 'wall' closes the mesh where the domain cuts the solid, 'open' ends it there. simplify: "
       "merges vertices as far as the tolerance allows, which takes several times as long. The mesh follows the "
       "steps by which the field jumps between its cells; a field built with continuity='exact' has none.\n\n"
+      "Issues a RuntimeWarning where the mesh misses the tolerance.\n\n"
       "Raises Error for options out of range and LimitError (a MemoryError).");
 }
 

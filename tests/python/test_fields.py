@@ -74,6 +74,9 @@ def test_contours_equal_those_of_the_program(field, program, tmp_path):
     assert numpy.array_equal(contour.vertices, theirs.vertices)
     assert numpy.array_equal(contour.triangles, theirs.triangles)
     assert abs(field(contour.vertices)).max() < 0.01
+    rough = hpsdf.build(hpsdf.load_mesh("builtin:gear"), target_error=1e-2, strategy="hp", continuity="none")
+    with pytest.warns(RuntimeWarning, match="misses the tolerance in [0-9]+ places"):
+        rough.contour(tolerance=0.05)
     simple = field.contour(tolerance=0.01, offset=0.05, simplify=True)
     assert 0 < len(simple.faces) < len(contour.faces)
     with pytest.raises(hpsdf.OptionError, match="domain_cut: expected 'wall' or 'open', got 'walls'"):
