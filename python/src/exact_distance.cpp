@@ -30,22 +30,17 @@ std::shared_ptr<ExactDistance> distanceTo(const py::object& mesh, const std::str
 }
 
 py::object distances(const ExactDistance& distance, const py::object& argument, const py::object& out) {
-  Points points(argument);
-  Doubles result = resultArray(out, points.shape());
-  points.keepApartFrom(result);
-  const std::span<double> values(result.mutable_data(), points.count());
-  forEachPiece(points.count(), kPiece, [&](std::size_t first, std::size_t count) {
-    distance(points.all().subspan(first, count), values.subspan(first, count));
+  return numberForEach(argument, out, [&](std::span<const Vector3> points, std::span<double> numbers) {
+    forEachPiece(points.size(), kPiece, [&](std::size_t first, std::size_t count) {
+      distance(points.subspan(first, count), numbers.subspan(first, count));
+    });
   });
-  return out.is_none() ? unwrapped(result) : out;
 }
 
 /// The class of the results of `closest`, a named tuple of Python.
 py::object& closestPointsClass() {
-  static auto* made = new py::object(py::module_::import("collections")
-                                         .attr("namedtuple")("ClosestPoints",
-                                                             py::make_tuple("distance", "point", "face", "barycentric"),
-                                                             "module"_a = "hpsdf"));
+  static auto* made =
+      new py::object(newNamedTuple("ClosestPoints", py::make_tuple("distance", "point", "face", "barycentric")));
   return *made;  // never destroyed, because the interpreter may end first
 }
 

@@ -28,17 +28,14 @@ struct CellRow {
 };
 
 py::object values(const Field& field, const py::object& argument, const py::object& out) {
-  Points points(argument);
-  Doubles result = resultArray(out, points.shape());
-  points.keepApartFrom(result);
-  const std::span<double> all(result.mutable_data(), points.count());
-  if (points.count() == 1)
-    all[0] = field.value(points.all()[0]);  // handing over the GIL would take longer
-  else
-    forEachPiece(points.count(), kValues, [&](std::size_t first, std::size_t count) {
-      field.values(points.all().subspan(first, count), all.subspan(first, count));
-    });
-  return out.is_none() ? unwrapped(result) : out;
+  return numberForEach(argument, out, [&](std::span<const Vector3> points, std::span<double> numbers) {
+    if (points.size() == 1)
+      numbers[0] = field.value(points[0]);  // handing over the GIL would take longer
+    else
+      forEachPiece(points.size(), kValues, [&](std::size_t first, std::size_t count) {
+        field.values(points.subspan(first, count), numbers.subspan(first, count));
+      });
+  });
 }
 
 /// Returns the two arrays of `out`, a tuple of values and gradients, or two times None if it is None.

@@ -30,11 +30,8 @@ py::array_t<Number> arrayOfNumbers(const std::vector<Item>& items) {
 
 /// The class of the results of `sample`, a named tuple of Python.
 py::object& samplesClass() {
-  static auto* made = new py::object(
-      py::module_::import("collections")
-          .attr("namedtuple")(
-              "Samples", py::make_tuple("points", "distances", "gradients", "kinds", "closest", "faces", "normals"),
-              "module"_a = "hpsdf"));
+  static auto* made = new py::object(newNamedTuple(
+      "Samples", py::make_tuple("points", "distances", "gradients", "kinds", "closest", "faces", "normals")));
   return *made;  // never destroyed, because the interpreter may end first
 }
 

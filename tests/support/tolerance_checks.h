@@ -1,5 +1,5 @@
 #pragma once
-// How far fields that were built within a tolerance keep to it.
+// Checks that fields that were built within a tolerance keep to it.
 
 #include <algorithm>
 #include <cmath>

@@ -352,7 +352,7 @@ class Contouring {
       const MeshErrors errors = measure(surface_, denser, progress_, mesh);
       result_.greatestValue = errors.value;
       result_.greatestGap = missedCells_ > 0 ? std::max(result_.greatestGap, errors.gap) : errors.gap;
-      // What missed the tolerance before is not to be blamed on merging.
+      // Merging is not to be blamed for what missed the tolerance before.
       const bool isAsGood = errors.missed <= least.missed && errors.value <= std::max(tolerance_, least.value) &&
                             errors.gap <= std::max(tolerance_, least.gap);
       result_.unresolved = (isAsGood ? missedPolygons_ : errors.missed) + missedCells_;

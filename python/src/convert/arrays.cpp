@@ -89,4 +89,18 @@ py::object unwrapped(const Doubles& result) {
   return py::float_(*result.data());
 }
 
+py::object numberForEach(const py::object& points, const py::object& out,
+                         const std::function<void(std::span<const Vector3>, std::span<double>)>& fill) {
+  Points given(points);
+  Doubles result = resultArray(out, given.shape());
+  given.keepApartFrom(result);
+  fill(given.all(), {result.mutable_data(), given.count()});
+  return out.is_none() ? unwrapped(result) : out;
+}
+
+py::object newNamedTuple(const char* name, const py::tuple& fields) {
+  using namespace py::literals;
+  return py::module_::import("collections").attr("namedtuple")(name, fields, "module"_a = "hpsdf");
+}
+
 }  // namespace hpsdf::python

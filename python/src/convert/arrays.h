@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -51,5 +52,12 @@ Doubles resultArray(const pybind11::object& out, const Shape& shape, const char*
 
 /// Returns a result for the caller: an array without axes as a float, any other as it is.
 pybind11::object unwrapped(const Doubles& result);
+
+/// Returns a number for each of the points, which `fill` sets: in `out` as of `resultArray`, or as of `unwrapped`.
+pybind11::object numberForEach(const pybind11::object& points, const pybind11::object& out,
+                               const std::function<void(std::span<const Vector3>, std::span<double>)>& fill);
+
+/// Returns a new class of named tuples that belongs to the package.
+pybind11::object newNamedTuple(const char* name, const pybind11::tuple& fields);
 
 }  // namespace hpsdf::python

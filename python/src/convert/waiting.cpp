@@ -14,13 +14,13 @@ namespace py = pybind11;
 namespace hpsdf::python {
 namespace {
 
-/// How far some work has come.
+/// The task that some work is at, and the fraction of it that is done.
 struct Report {
   std::string task;
   double fraction = 0;
 };
 
-/// What the thread that works and the thread that waits tell each other.
+/// Holds the messages between the thread that works and the thread that waits.
 class Work {
  public:
   Progress progress() {
