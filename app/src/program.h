@@ -3,7 +3,7 @@
 #include <span>
 #include <string>
 
-#include "console/failed.h"
+#include "hpsdf/app/failed.h"
 #include "session/session.h"
 
 namespace hpsdf::app {

@@ -12,8 +12,10 @@ import tempfile as _tempfile
 
 from ._hpsdf import (
     ClosestPoints,
+    CombinedDistance,
     Error,
     ExactDistance,
+    ExpectationError,
     Field,
     FieldError,
     FileError,
@@ -24,31 +26,46 @@ from ._hpsdf import (
     TriangleMesh,
     __version__,
     build,
+    combine,
     jumps,
     load,
     load_mesh,
     sample,
 )
+from . import _notebook
+from ._pictures import Picture, Session, probe, render, run, slice, verify
 
+# `from hpsdf import *` leaves out `slice`, which is a name of Python's own.
 __all__ = [
     "ClosestPoints",
+    "CombinedDistance",
     "Error",
     "ExactDistance",
+    "ExpectationError",
     "Field",
     "FieldError",
     "FileError",
     "LimitError",
     "MeshError",
     "OptionError",
+    "Picture",
     "Samples",
+    "Session",
     "TriangleMesh",
     "__version__",
     "build",
+    "combine",
     "jumps",
     "load",
     "load_mesh",
+    "probe",
+    "render",
+    "run",
     "sample",
+    "verify",
 ]
+
+_notebook.attach()
 
 # Names of the extension are shown, and pickled, as names of the package.
 for _name in __all__:

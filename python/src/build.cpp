@@ -6,9 +6,12 @@
 
 #include "build.h"
 #include "convert/arrays.h"
+#include "convert/callable.h"
 #include "convert/settings.h"
 #include "convert/waiting.h"
 #include "exact_distance.h"
+#include "hpsdf/combine/combined_distance.h"
+#include "hpsdf/verify.h"
 #include "mesh.h"
 
 namespace py = pybind11;
@@ -16,23 +19,6 @@ using namespace py::literals;
 
 namespace hpsdf::python {
 namespace {
-
-/// A callable of Python as a distance. Any thread may call it; only one at a time runs Python.
-struct PythonDistance {
-  py::object callable;
-
-  void operator()(std::span<const Vector3> points, std::span<double> out) const {
-    const py::gil_scoped_acquire held;
-    const auto count = static_cast<py::ssize_t>(points.size());
-    const Doubles copied({count, py::ssize_t{3}}, reinterpret_cast<const double*>(points.data()));
-    const Doubles values = numbersOf(callable(copied), "the result of the callable");
-    if (values.ndim() != 1 || values.size() != count)
-      throw py::value_error("the result of the callable: expected an array of shape " + shapeText({count}) +
-                            " for points of shape " + shapeText({count, 3}) + ", got " +
-                            shapeText({values.shape(), values.shape() + values.ndim()}));
-    std::copy_n(values.data(), points.size(), out.data());
-  }
-};
 
 /// Returns the domain that `box` stands for: two corners, or 'cube' or 'box', enlarged by `margin` around a surface.
 Box domainFrom(const py::object& box, double margin, const Box& surface) {
@@ -63,11 +49,12 @@ void requireBuildable(const Box& domain, const BuildOptions& options) {
 
 double longestSideOf(const Box& surface) { return surface.isEmpty() ? 0 : surface.sizes().maxCoeff(); }
 
-/// Builds the field of a distance with what is known of its surface.
+/// Builds the field of a distance and measures its errors, as the program does.
 std::shared_ptr<Field> fieldOf(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                                const py::object& progress) {
-  return std::make_shared<Field>(
-      resultOf(progress, [&](const Progress& link) { return build(distance, domain, options, link); }));
+  return std::make_shared<Field>(resultOf(progress, [&](const Progress& link) {
+    return measured(build(distance, domain, options, link), distance, options, link);
+  }));
 }
 
 std::shared_ptr<Field> builtField(const py::object& surface, const py::object& box, double margin,
@@ -81,6 +68,7 @@ std::shared_ptr<Field> builtField(const py::object& surface, const py::object& b
     return fieldOf(distance, domain, options, progress);
   };
   if (py::isinstance<ExactDistance>(surface)) return build(surface.cast<const ExactDistance&>());
+  if (py::isinstance<CombinedDistance>(surface)) return build(surface.cast<const CombinedDistance&>());
   if (isMesh(surface)) {
     const auto mesh = meshOf(surface);
     const BuildOptions options = buildOptionsFrom(settings, longestSideOf(boundingBox(*mesh)));
@@ -89,18 +77,18 @@ std::shared_ptr<Field> builtField(const py::object& surface, const py::object& b
     return build(distance);
   }
   if (PyCallable_Check(surface.ptr()) == 0)
-    throw py::type_error("surface: expected a mesh, an ExactDistance or a callable, got '" +
+    throw py::type_error("surface: expected a mesh, an ExactDistance, a CombinedDistance or a callable, got '" +
                          std::string(py::str(py::type::of(surface).attr("__name__"))) + "'");
-  const PythonDistance callable{surface};
-  return build(callable);
+  return build(distanceOfCallable(surface));
 }
 
 }  // namespace
 
 void addBuild(py::module_& module) {
   const std::string doc =
-      "Builds the field of a mesh, of an ExactDistance, or of a callable.\n\n"
-      "surface: a TriangleMesh, an object with .vertices and .faces, an ExactDistance, or a callable that maps points, "
+      "Builds the field of a mesh, of an ExactDistance or a CombinedDistance, or of a callable.\n\n"
+      "surface: a TriangleMesh, an object with .vertices and .faces, an ExactDistance, a CombinedDistance, or a "
+      "callable that maps points, "
       "shape (n, 3), to signed distances, shape (n,), negative inside. Any thread may call it.\n\n"
       "box: the domain: two corners, or 'cube' or 'box' around the mesh, enlarged by the margin. inside_test and "
       "thickness, of a mesh: as of ExactDistance. progress: a callable that takes the name of a task and the fraction "

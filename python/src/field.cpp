@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "convert/arrays.h"
@@ -86,6 +87,23 @@ py::array domain(const Field& field) {
   return corners;
 }
 
+/// Returns a read-only array that refers to the memory of `owner`.
+template <typename Number>
+py::array viewOf(const std::vector<Number>& numbers, const py::object& owner) {
+  py::array_t<Number> view(static_cast<py::ssize_t>(numbers.size()), numbers.data(), owner);
+  view.attr("flags").attr("writeable") = false;
+  return view;
+}
+
+py::array nodes(const py::object& self) { return viewOf(self.cast<const Field&>().data().nodes, self); }
+
+py::array coefficients(const py::object& self) {
+  const auto& stored = self.cast<const Field&>().data().coefficients;
+  if (const auto* doubles = std::get_if<std::vector<double>>(&stored)) return viewOf(*doubles, self);
+  if (const auto* floats = std::get_if<std::vector<float>>(&stored)) return viewOf(*floats, self);
+  return viewOf(std::get<QuantizedCoefficients>(stored).bytes, self);
+}
+
 std::string description(const Field& field) {
   return "<hpsdf.Field: " + std::to_string(statistics(field).leaves) + " cells, " + precisionName(field) + ", " +
          std::to_string(field.bytes()) + " bytes>";
@@ -127,6 +145,12 @@ FieldClass addField(py::module_& module) {
           "Returns the cells as a structured array with the fields box, the lower and the upper corner; degree, 31 "
           "for cells with triangles instead of a polynomial; depth, 0 for base cells; and error, the estimated squared "
           "L2 error.")
+      .def_property_readonly("nodes", &nodes,
+                             "The octree's nodes, uint64: a read-only view. docs/file-format.md describes their bits.")
+      .def_property_readonly("coefficients", &coefficients,
+                             "The coefficients of the cells' polynomials: a read-only view of float64 or float32, in "
+                             "units of length, or of uint8, the packed integers of quantized coefficients. "
+                             "docs/file-format.md describes both.")
       .def_property_readonly("domain", &domain, "The lower and the upper corner of the domain: float64, shape (2, 3).")
       .def_property_readonly("nbytes", &Field::bytes, "The bytes of memory that the field takes.")
       .def("__repr__", &description);

@@ -9,6 +9,8 @@
 #include "jumps.h"
 #include "mesh.h"
 #include "samples.h"
+#include "session.h"
+#include "solids.h"
 
 PYBIND11_MODULE(_hpsdf, module) {
   using namespace hpsdf::python;
@@ -21,4 +23,6 @@ PYBIND11_MODULE(_hpsdf, module) {
   addBuild(module);
   addJumps(module);
   addSamples(module);
+  addSolids(module);
+  addSession(module);
 }

@@ -9,7 +9,7 @@
 
 #include "cli_fixture.h"
 #include "commands/commands.h"
-#include "console/failed.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"

@@ -30,6 +30,7 @@ bool isRoom(std::string_view name) { return std::find(kRooms.begin(), kRooms.end
 
 /// Returns true if a file in the top-level folder `from` may include a file in the top-level folder `to`.
 bool mayInclude(std::string_view from, std::string_view to) {
+  if (from == "python") return to == from || to == "core" || to == "render" || to == "app";
   return from == to || to == "core" || (from == "app" && to != "python");
 }
 

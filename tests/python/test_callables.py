@@ -86,5 +86,5 @@ def test_wrong_results_are_refused(result, error, text):
 def test_a_callable_needs_corners():
     with pytest.raises(hpsdf.OptionError, match="box: expected the two corners of the domain"):
         hpsdf.build(sphere)
-    with pytest.raises(TypeError, match="surface: expected a mesh, an ExactDistance or a callable, got 'int'"):
+    with pytest.raises(TypeError, match="surface: expected a mesh, an ExactDistance, a CombinedDistance or a callable, got 'int'"):
         hpsdf.build(3, box=BOX)

@@ -11,10 +11,10 @@
 
 #include "check/baseline.h"
 #include "console/console.h"
-#include "console/failed.h"
 #include "files/data_table.h"
 #include "files/output_folder.h"
 #include "files/text_file.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/compare.h"

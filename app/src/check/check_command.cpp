@@ -6,10 +6,10 @@
 
 #include "check/baseline.h"
 #include "check/check.h"
-#include "console/failed.h"
 #include "console/version.h"
 #include "files/data_table.h"
 #include "files/text_file.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/render/image.h"
 #include "session/session.h"

@@ -9,10 +9,10 @@
 
 #include "commands/commands.h"
 #include "commands/contour_colors.h"
-#include "console/failed.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/mesh_file.h"

@@ -6,11 +6,11 @@
 #include <system_error>
 #include <utility>
 
-#include "console/failed.h"
 #include "console/interrupt.h"
 #include "construction/build_arguments.h"
 #include "construction/mesh_summary.h"
 #include "files/text_file.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "session/asked_errors.h"

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "commands/commands.h"
-#include "console/failed.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
 #include "construction/mesh_summary.h"
 #include "construction/surface.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/detail/sign_check.h"
 #include "hpsdf/mesh_file.h"

@@ -104,6 +104,14 @@ void report(Session& session, const Arguments& arguments, const Line& line, std:
   session.console().out << text << "\n";
 }
 
+render::Image drawProbe(Session& session, const Arguments& arguments) {
+  useField(session, arguments);
+  const Field& field = session.current().field;
+  const Line line = lineOf(field, arguments);
+  const auto [width, height] = arguments.size("size");
+  return render::drawLine(field, line, exactValues(session, arguments, line), width, height);
+}
+
 void runProbe(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const bool picture = isPicture(file);
@@ -157,6 +165,7 @@ and the columns of the cell are empty. The columns of the exact distance are emp
                    "hpsdf probe torus.hpsdf --from 0,0,0 --to 1,1,1 -o line.png --size 960x720"},
       .parameters = joined({{fieldParameter()}, kProbeParameters}),
       .action = runProbe,
+      .draw = drawProbe,
   });
 }
 

@@ -23,25 +23,6 @@ namespace {
 
 constexpr int kMostNestedScripts = 16;
 
-/// While this object lives, the session counts one more running script, and `json` decides whether commands report as
-/// JSON.
-class ScriptScope {
- public:
-  ScriptScope(Session& session, bool json) : session_(session), jsonBefore_(session.setJson(json)) {
-    ++session_.scriptDepth;
-  }
-  ~ScriptScope() {
-    --session_.scriptDepth;
-    session_.setJson(jsonBefore_);
-  }
-  ScriptScope(const ScriptScope&) = delete;
-  ScriptScope& operator=(const ScriptScope&) = delete;
-
- private:
-  Session& session_;
-  bool jsonBefore_;
-};
-
 void runRun(Session& session, const Arguments& arguments) {
   std::vector<std::string> words = arguments.texts("script");
   const std::vector<std::string> lines = arguments.texts("execute");

@@ -3,12 +3,12 @@
 #include <filesystem>
 
 #include "commands/commands.h"
-#include "console/failed.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
 #include "construction/reference_surface.h"
 #include "explorer/view_state.h"
 #include "files/text_file.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/face_steps.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/verify.h"

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "pictures/page_pictures.h"
+#include "pictures/legends.h"
 #include "text/text.h"
 
 namespace hpsdf::app {

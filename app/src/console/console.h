@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
+#include <map>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -44,6 +45,8 @@ struct Console {
   /// Program that reads mesh files in a separate process if assimp or Draco take part (mesh_process.h). If it is empty,
   /// this process reads them itself.
   std::filesystem::path meshReader = {};
+  /// Meshes in memory that take the place of files of their names. It may be null.
+  const std::map<std::string, TriangleMesh, std::less<>>* meshes = nullptr;
   std::string work = {};  ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
 };
 

@@ -104,14 +104,6 @@ Checkpoint checkpointAt(const Console& console, const std::filesystem::path& fil
   return checkpoint;
 }
 
-/// Measures a finished field, near the surface as far as the errors near it were asked for.
-Field measured(Field field, const BuildInput& input, const Progress& progress) {
-  const MeasureOptions options{.near = input.options.targetError.byDistance().nearDistance,
-                               .threads = input.options.threads};
-  const Measurement measurement = measure(field, *input.exact, options, progress);
-  return withMeasurement(std::move(field), measurement);
-}
-
 OfferField offerTo(WorkListener* listener) {
   if (listener == nullptr) return {};
   return [listener](const std::function<Field()>& fieldSoFar) { listener->offerField(fieldSoFar); };
@@ -189,10 +181,11 @@ BuiltField buildField(const Console& console, BuildInput input, const std::strin
     const auto start = std::chrono::steady_clock::now();
     Field field = withProgress(console, [&](const Progress& progress) {
       if (checkpoint.empty())
-        return measured(build(*input.exact, input.domain, input.options, progress, offerTo(console.listener)), input,
-                        progress);
+        return measured(build(*input.exact, input.domain, input.options, progress, offerTo(console.listener)),
+                        *input.exact, input.options, progress);
       const Checkpoint state = checkpointAt(console, checkpoint, arguments);
-      return measured(buildResumably(*input.exact, input.domain, input.options, state, progress), input, progress);
+      return measured(buildResumably(*input.exact, input.domain, input.options, state, progress), *input.exact,
+                      input.options, progress);
     });
     warnOfErrorLeft(console, field.metadata());
     noteOtherPrecision(console, input.options.coefficients, field);

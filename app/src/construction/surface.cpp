@@ -137,6 +137,9 @@ void requireMesh(const std::string& surface) {
 }
 
 ImportedMesh importSurface(const Console& console, const std::string& surface) {
+  if (console.meshes != nullptr)
+    if (const auto found = console.meshes->find(surface); found != console.meshes->end())
+      return {found->second, inspect(found->second)};
   requireMesh(surface);
   refuseWrittenOnly(surface);
   if (surface.starts_with(kBuiltin)) {

@@ -22,9 +22,9 @@ constexpr std::string_view kAnalytic = "analytic:";
 /// Returns true for the name of a shape, builtin:… or analytic:…, and false for the name of a file.
 bool isShape(std::string_view surface);
 
-/// Reads a mesh file or makes a built-in shape. All commands get their meshes from this function. The console's
-/// `meshReader` reads files that assimp or Draco take part in reading. Throws `Error`, also for an analytic shape or a
-/// grid, and `Cancelled` after Ctrl-C.
+/// Reads a mesh file, takes a mesh in memory of this name (`Console::meshes`) or makes a built-in shape. All commands
+/// get their meshes from this function. The console's `meshReader` reads files that assimp or Draco take part in
+/// reading. Throws `Error`, also for an analytic shape or a grid, and `Cancelled` after Ctrl-C.
 ImportedMesh importSurface(const Console& console, const std::string& surface);
 
 /// Throws `Error` if the name is that of an analytic shape or a grid, which have no mesh.

@@ -136,19 +136,24 @@ void runRebuild(Session& session, const Arguments& arguments) {
                                                            : std::nullopt);
 }
 
-void runShot(Session& session, const Arguments& arguments) {
-  const std::string file = arguments.text("output");
-  requirePng(file);
-  checkWritable(file);
-  session.current();
+render::Image drawShot(Session& session, const Arguments&) {
+  session.current();  // throws `Error` if there is no field
   Explorer& explorer = explorerOf(session);
   const render::Image frame = explorer.frame();
-  savePng(frame, file);
   render::Drawn picture = *explorer.picture();
   const UiRect canvas = layoutOf(explorer.view()).canvas;  // `pick` works only in the current field's picture
   picture.image = frame;
   picture.corner = {int(canvas.x0), int(canvas.y0)};
   session.setPicture(std::move(picture));
+  return frame;
+}
+
+void runShot(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  requirePng(file);
+  checkWritable(file);
+  const render::Image frame = drawShot(session, arguments);
+  savePng(frame, file);
   reportPicture(session, arguments, file, frame.width, frame.height, session.lastRenderer());
 }
 
@@ -266,6 +271,7 @@ void addFieldAndShotCommands(Registry& registry) {
       .examples = {"shot output=frame.png"},
       .parameters = {{"output", outputFile().as('o').required(), "*.png."}},
       .action = runShot,
+      .draw = drawShot,
       .drawsOnCpuBy = "'show cpu=true'",
   });
 }

@@ -16,6 +16,10 @@
 #include "hpsdf/error.h"
 #include "language/parameter.h"
 
+namespace hpsdf::render {
+struct Image;
+}
+
 namespace hpsdf::app {
 
 class Session;
@@ -67,6 +71,9 @@ struct Command {
   std::vector<std::string> examples = {};  ///< shell commands, or lines of a script if `scriptOnly` is true
   std::vector<Parameter> parameters = {};
   std::function<void(Session&, const Arguments&)> action = {};
+  /// Draws the picture that `action` writes into the file `output`. It is set for commands whose result is one picture,
+  /// and works without `output`.
+  std::function<render::Image(Session&, const Arguments&)> draw = {};
   /// Throws `Error` if the arguments contradict each other. All commands of a script are checked before its
   /// first command runs.
   std::function<void(const Arguments&)> check = {};
@@ -134,6 +141,9 @@ std::vector<std::string> outputFiles(const Command& command, const Arguments& ar
 /// Runs the command. Throws `Error` before any work starts if an output file is also one of the input files. If OpenGL
 /// cannot draw, throws an `Error` that says how the command draws without it.
 void perform(const Command& command, Session& session, const Arguments& arguments);
+
+/// Draws the picture of a command that has `Command::draw`. Throws as `perform` does.
+render::Image drawn(const Command& command, Session& session, const Arguments& arguments);
 
 /// Returns a description of the values that a parameter accepts, e.g. "a whole number from 1 to 30".
 std::string expectedValue(const Parameter& parameter);

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "console/failed.h"
+#include "hpsdf/app/failed.h"
+#include "hpsdf/render/image.h"
 #include "hpsdf/render/renderer.h"
 #include "language/registry.h"
 #include "language/script.h"
@@ -31,6 +32,16 @@ std::string cpuMeans(const Command& command) {
   return command.drawsOnCpuBy.empty() ? "on the CPU" : "with " + command.drawsOnCpuBy;
 }
 
+/// Does the work. If OpenGL cannot draw, throws an `Error` that says how the command draws without it.
+template <typename Work>
+auto advisingOnGl(const Command& command, const Work& work) {
+  try {
+    return work();
+  } catch (const render::GlError& error) {
+    throw Error(error.kind(), error.subject(), error.advising(cpuMeans(command)));
+  }
+}
+
 }  // namespace
 
 void perform(const Command& command, Session& session, const Arguments& arguments) {
@@ -40,11 +51,11 @@ void perform(const Command& command, Session& session, const Arguments& argument
       if (std::filesystem::equivalent(output, input, missing))
         throw Error(fmt::format("{}: is read by the same command; give the output another name", output));
     }
-  try {
-    command.action(session, arguments);
-  } catch (const render::GlError& error) {
-    throw Error(error.kind(), error.subject(), error.advising(cpuMeans(command)));
-  }
+  advisingOnGl(command, [&] { command.action(session, arguments); });
+}
+
+render::Image drawn(const Command& command, Session& session, const Arguments& arguments) {
+  return advisingOnGl(command, [&] { return command.draw(session, arguments); });
 }
 
 void runScript(Session& session, std::span<const Call> calls) {
@@ -54,7 +65,7 @@ void runScript(Session& session, std::span<const Call> calls) {
     } catch (const Failed& error) {
       throw Failed(call.where + ": " + error.what() + call.includedFrom, error.status());
     } catch (const Error& error) {
-      throw Error(call.where + ": " + error.what() + call.includedFrom);
+      throw Error(error.kind(), call.where, error.what() + call.includedFrom);
     }
   }
 }

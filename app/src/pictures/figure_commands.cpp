@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "console/failed.h"
+#include "hpsdf/app/failed.h"
 #include "hpsdf/detail/nearest_name.h"
 #include "language/expectation.h"
 #include "pictures/picture_commands.h"

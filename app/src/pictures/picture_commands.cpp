@@ -70,6 +70,19 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
   }
 }
 
+render::Image drawSlice(Session& session, const Arguments& arguments) {
+  render::SlicePicture picture = slicePicture(arguments);
+  render::checkPictureSize(picture.width, picture.height, picture.samples);
+  const Backend chosen = backend(arguments);
+  useField(session, arguments);
+  const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
+  render::Renderer& renderer = session.renderer(chosen);
+  const Field& field = session.current().field;
+  picture = slicePicture(arguments, shownBox(field));
+  session.setPicture(render::drawSlice(renderer, field, picture, reference));
+  return session.picture().image;
+}
+
 void runSlice(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const SliceFormat format = sliceFormat(file);
@@ -83,15 +96,14 @@ void runSlice(Session& session, const Arguments& arguments) {
   if (format == SliceFormat::png) render::checkPictureSize(picture.width, picture.height, picture.samples);
   const Backend chosen = backend(arguments);
   checkWritable(file);
-  useField(session, arguments);
-  const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
-  render::Renderer& renderer = session.renderer(chosen);
-  const Field& field = session.current().field;
-  picture = slicePicture(arguments, shownBox(field));
   if (format == SliceFormat::png) {
-    session.setPicture(render::drawSlice(renderer, field, picture, reference));
-    savePng(session.picture().image, file);
+    savePng(drawSlice(session, arguments), file);
   } else {
+    useField(session, arguments);
+    const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
+    render::Renderer& renderer = session.renderer(chosen);
+    const Field& field = session.current().field;
+    picture = slicePicture(arguments, shownBox(field));
     const render::SliceView view = render::sliceView(field, picture, picture.width, picture.height);
     const render::ViewBuffers buffers = renderer.slice(view, picture.width, picture.height);
     OutputFile out(file);
@@ -104,24 +116,30 @@ void runSlice(Session& session, const Arguments& arguments) {
       writeCsv(view, buffers, out);
     out.commit();
   }
-  reportPicture(session, arguments, file, picture.width, picture.height, renderer.description());
+  reportPicture(session, arguments, file, picture.width, picture.height, session.lastRenderer());
 }
 
-void runRender(Session& session, const Arguments& arguments) {
-  const std::string file = arguments.text("output");
-  requirePng(file);
+render::Image drawSurface(Session& session, const Arguments& arguments) {
   render::SurfacePicture picture = surfacePicture(arguments);
   const Backend chosen = backend(arguments);
-  checkWritable(file);
   useField(session, arguments);
   const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   picture = surfacePicture(arguments, shownBox(field));
   session.setPicture(render::drawSurface(renderer, field, picture, reference));
-  savePng(session.picture().image, file);
   noteOddSurface(session.console(), field, picture, session.picture().seen);
-  reportPicture(session, arguments, file, picture.width, picture.height, renderer.description());
+  return session.picture().image;
+}
+
+void runRender(Session& session, const Arguments& arguments) {
+  const std::string file = arguments.text("output");
+  requirePng(file);
+  const render::SurfacePicture picture = surfacePicture(arguments);
+  backend(arguments);  // throws `Error` before any work
+  checkWritable(file);
+  savePng(drawSurface(session, arguments), file);
+  reportPicture(session, arguments, file, picture.width, picture.height, session.lastRenderer());
 }
 
 using render::ColorBy;
@@ -242,6 +260,7 @@ cell is the word exact in a .csv and the number 31 in a .pfm.)"),
            kSizeSamplesArrows,
            backendParameters()}),
       .action = runSlice,
+      .draw = drawSlice,
       .check = checkSlice,
   };
 }
@@ -274,6 +293,7 @@ Command renderCommand() {
            kSizeSamplesArrows,
            backendParameters()}),
       .action = runRender,
+      .draw = drawSurface,
   };
 }
 

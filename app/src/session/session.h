@@ -186,4 +186,23 @@ class Session {
   std::unique_ptr<SessionExtension> extension_;
 };
 
+/// While this object lives, the session counts one more running script, and `json` decides whether commands report as
+/// JSON.
+class ScriptScope {
+ public:
+  ScriptScope(Session& session, bool json) : session_(session), jsonBefore_(session.setJson(json)) {
+    ++session_.scriptDepth;
+  }
+  ~ScriptScope() {
+    --session_.scriptDepth;
+    session_.setJson(jsonBefore_);
+  }
+  ScriptScope(const ScriptScope&) = delete;
+  ScriptScope& operator=(const ScriptScope&) = delete;
+
+ private:
+  Session& session_;
+  bool jsonBefore_;
+};
+
 }  // namespace hpsdf::app

@@ -17,7 +17,7 @@
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
 #include "language/script.h"
-#include "pictures/page_pictures.h"
+#include "pictures/legends.h"
 #include "pictures/picture_arguments.h"
 #include "session/backend.h"
 #include "session/field_summary.h"

@@ -102,6 +102,11 @@ double tornShare(const Field& field, const TriangleMesh& surface, const SampleOp
 /// Returns the field with a measurement of it in its metadata.
 Field withMeasurement(Field field, const Measurement& measurement);
 
+/// Measures a field that `build` has made with these options, near the surface as far as errors near it were asked for,
+/// and returns it with the measurement. Throws as `measure` does.
+Field measured(Field field, const DistanceFunction& distance, const BuildOptions& options,
+               const Progress& progress = {});
+
 struct VerifyOptions {
   std::size_t points = 1'000'000;     ///< number of samples, half uniform, half near the surface; at least 2
   std::uint64_t seed = 1;             ///< seed of the random points

@@ -4,6 +4,7 @@
 #include <exception>
 #include <string>
 
+#include "hpsdf/app/failed.h"
 #include "hpsdf/error.h"
 
 namespace py = pybind11;
@@ -22,6 +23,7 @@ struct ErrorClass {
 
 PyObject* baseClass = nullptr;  // the module's classes live as long as the process
 std::array<PyObject*, 6> classesByKind = {};
+PyObject* expectationClass = nullptr;
 
 PyObject* newClass(py::module_& module, const char* name, const char* doc, const py::tuple& parents) {
   const std::string fullName = std::string("hpsdf.") + name;
@@ -31,9 +33,9 @@ PyObject* newClass(py::module_& module, const char* name, const char* doc, const
   return made;
 }
 
-/// Raises an error of the library as an object of the class for its kind, with the attribute `subject`.
-void raise(const Error& error) {
-  const auto type = py::reinterpret_borrow<py::object>(classesByKind[static_cast<std::size_t>(error.kind())]);
+/// Raises an error of the library as an object of the class `raisedClass`, with the attribute `subject`.
+void raise(const Error& error, PyObject* raisedClass) {
+  const auto type = py::reinterpret_borrow<py::object>(raisedClass);
   const py::object raised = type(error.what());
   raised.attr("subject") = error.subject();
   PyErr_SetObject(type.ptr(), raised.ptr());
@@ -60,11 +62,16 @@ void addErrors(py::module_& module) {
   for (const ErrorClass& row : classes)
     classesByKind[static_cast<std::size_t>(row.kind)] =
         newClass(module, row.name, row.doc, py::make_tuple(py::handle(baseClass), py::handle(row.parent)));
+  expectationClass = newClass(module, "ExpectationError",
+                              "A figure is not what a script expects, or exceeds a limit that the caller set.",
+                              py::make_tuple(py::handle(baseClass), py::handle(PyExc_AssertionError)));
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
+    } catch (const app::Failed& error) {
+      raise(error, expectationClass);
     } catch (const Error& error) {
-      raise(error);
+      raise(error, classesByKind[static_cast<std::size_t>(error.kind())]);
     }
   });
 }

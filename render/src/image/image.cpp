@@ -37,28 +37,29 @@ constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
 std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }
 
-std::vector<char> encodePng(const Image& image) {
-  std::vector<char> bytes;
+}  // namespace
+
+std::string pngBytes(const Image& image) {
+  if (image.width <= 0 || image.height <= 0 || image.pixels.size() != std::size_t(image.width) * image.height)
+    throw Error("cannot write the picture: it has no pixels; draw one first");
+  std::string bytes;
   const auto append = [](void* context, void* data, int size) {
-    auto& out = *static_cast<std::vector<char>*>(context);
-    const char* begin = static_cast<const char*>(data);
-    out.insert(out.end(), begin, begin + size);
+    static_cast<std::string*>(context)->append(static_cast<const char*>(data), std::size_t(size));
   };
   if (!stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, image.pixels.data(), image.width * 3))
-    bytes.clear();
+    throw Error("cannot write the picture: not enough memory to compress it; make it smaller");
   return bytes;
 }
 
-}  // namespace
-
 void savePng(const Image& image, const std::filesystem::path& file) {
-  if (image.width <= 0 || image.height <= 0 || image.pixels.size() != std::size_t(image.width) * image.height)
-    throw Error(file.string() + ": cannot write the picture: it has no pixels; draw one first");
-  const std::vector<char> bytes = encodePng(image);
-  if (bytes.empty())
-    throw Error(file.string() + ": cannot write the picture: not enough memory to compress it; make it smaller");
+  std::string bytes;
+  try {
+    bytes = pngBytes(image);
+  } catch (const Error& error) {
+    throw Error(error.kind(), file.string(), error.what());
+  }
   OutputFile output(file);
-  output.write(std::string_view(bytes.data(), bytes.size()));
+  output.write(bytes);
   output.commit();
 }
 

@@ -202,4 +202,10 @@ Field withMeasurement(Field field, const Measurement& measurement) {
   return Field(std::move(data));
 }
 
+Field measured(Field field, const DistanceFunction& distance, const BuildOptions& options, const Progress& progress) {
+  const MeasureOptions points{.near = options.targetError.byDistance().nearDistance, .threads = options.threads};
+  const Measurement measurement = measure(field, distance, points, progress);
+  return withMeasurement(std::move(field), measurement);
+}
+
 }  // namespace hpsdf

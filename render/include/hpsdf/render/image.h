@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace hpsdf::render {
@@ -22,6 +23,10 @@ struct Image {
   Color& at(int x, int y) { return pixels[std::size_t(y) * width + x]; }
   const Color& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
 };
+
+/// Returns the picture as the bytes of a PNG file. Throws `hpsdf::Error` for a picture without pixels, and if there is
+/// not enough memory.
+std::string pngBytes(const Image& image);
 
 /// Writes the picture to a temporary file and then renames this file to `file`. If that fails, throws
 /// `hpsdf::Error`, which names the file.

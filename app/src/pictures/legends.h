@@ -1,5 +1,5 @@
 #pragma once
-// Pictures and legends for HTML pages: PNG files as bytes, the colours of legends as SVG.
+// Legends for HTML pages: the colours of legends as SVG.
 
 #include <map>
 #include <string>
@@ -8,9 +8,6 @@
 #include "hpsdf/render/picture.h"
 
 namespace hpsdf::app {
-
-/// Returns the picture as the bytes of a PNG file.
-std::string pngBytes(const render::Image& image);
 
 /// The colours of degrees or depths.
 using LevelColors = std::map<int, render::Color>;

@@ -1,9 +1,7 @@
-#include "pictures/page_pictures.h"
+#include "pictures/legends.h"
 
 #include <fmt/format.h>
 
-#include "files/output_folder.h"
-#include "files/text_file.h"
 #include "hpsdf/field.h"
 #include "hpsdf/types.h"
 #include "text/text.h"
@@ -16,12 +14,6 @@ constexpr int kColorBarWidth = 420;
 constexpr int kColorBarMargin = 30;  // space for the half of a mark's text that lies beside the bar
 
 }  // namespace
-
-std::string pngBytes(const render::Image& image) {
-  const TemporaryFolder folder;
-  savePng(image, folder.path() / "picture.png");
-  return readWholeFile((folder.path() / "picture.png").string());
-}
 
 LevelColors levelColors(const render::Legend& legend) {
   LevelColors colors;

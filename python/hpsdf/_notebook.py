@@ -1,0 +1,95 @@
+"""How fields and meshes show themselves in notebooks: as a picture and as tables of figures."""
+
+import base64
+import html
+
+from . import _hpsdf
+from ._pictures import Session
+
+_SIZE = (640, 400)
+
+
+def field_info(field):
+    """The figures of the field, as `hpsdf info --json` writes them, in a dict: the mesh and the settings that it was
+    made from, its sizes, its measured and estimated errors, and the shares of the volume by degree and depth.
+    """
+    return Session(field).perform("info")
+
+
+def mesh_report(mesh):
+    """The report on the mesh, as `hpsdf mesh --json` writes it, in a dict: counts, volume, area, whether it is closed,
+    its defects with their places, and how its inside is decided.
+    """
+    return Session().perform("mesh", mesh=mesh)
+
+
+def field_png(field):
+    """The picture of the field as the bytes of a PNG file; without OpenGL it is drawn by the CPU."""
+    return _picture(Session(field))._repr_png_()
+
+
+def field_html(field):
+    session = Session(field)
+    picture = base64.b64encode(_picture(session)._repr_png_()).decode("ascii")
+    info = session.perform("info")
+    rows = [
+        ("made from", (info["mesh"] or {}).get("name") or "a function"),
+        ("cells", f"{info['leaves']:,}"),
+        ("memory", _bytes_text(info["bytes"])),
+        *_error_rows(info["measured"]),
+    ]
+    image = f'<img alt="the surface of the field" src="data:image/png;base64,{picture}" width="{_SIZE[0]}"/>'
+    return f"<div>{_table('hpsdf.Field', rows)}{image}</div>"
+
+
+def mesh_html(mesh):
+    report = mesh_report(mesh)
+    verdict = report["verdict"]
+    defects = {name.replace("_", " "): found["count"] for name, found in report["defects"].items() if found["count"]}
+    rows = [
+        ("vertices, triangles", f"{report['vertices']:,}, {report['faces']:,}"),
+        ("parts", f"{report['parts']:,}"),
+        ("surface", "closed" if verdict["closed"] else "not closed"),
+        ("defects", ", ".join(f"{count:,} {name}" for name, count in defects.items()) or "none"),
+        ("volume, area", f"{report['volume']:.6g}, {report['area']:.6g}"),
+        ("inside test", report["sign"]["by"]),
+    ]
+    return _table(f"hpsdf.TriangleMesh {report['name']}".rstrip(), rows)
+
+
+def _picture(session):
+    try:
+        return session.render(size=_SIZE)
+    except _hpsdf.Error:
+        return session.render(size=_SIZE, cpu=True)
+
+
+def _error_rows(measured):
+    if not measured:
+        return []
+    near, domain = measured["near"], measured["domain"]
+    return [
+        ("error near the surface", f"RMS {near['rms']:.3g}, greatest {near['max']:.3g}"),
+        ("error over the domain", f"RMS {domain['rms']:.3g}, greatest {domain['max']:.3g}"),
+    ]
+
+
+def _bytes_text(count):
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            return f"{count / size:.2f} {unit}"
+    return f"{count} bytes"
+
+
+def _table(title, rows):
+    cells = "".join(f"<tr><th>{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>" for name, value in rows)
+    return f"<table><caption>{html.escape(title)}</caption>{cells}</table>"
+
+
+def attach():
+    """Gives the classes of the extension these methods."""
+    _hpsdf.Field.info = field_info
+    _hpsdf.Field._repr_png_ = field_png
+    _hpsdf.Field._repr_html_ = field_html
+    _hpsdf.TriangleMesh.report = mesh_report
+    _hpsdf.TriangleMesh._repr_html_ = mesh_html

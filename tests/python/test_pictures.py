@@ -1,0 +1,179 @@
+"""Pictures, figures and scripts: equal to those of the program, with fields and meshes of Python."""
+
+import json
+import pathlib
+import threading
+import time
+import warnings
+
+import numpy
+import pytest
+
+import hpsdf
+
+SIZE = (320, 200)
+
+
+@pytest.fixture(scope="module")
+def session(field):
+    return hpsdf.Session(field)
+
+
+@pytest.fixture
+def named(tmp_path, program):
+    """Returns a function that compares a picture with the one that the program draws with these words."""
+
+    def compare(picture, *words):
+        file = tmp_path / "program.png"
+        program(*words, "-o", file)
+        assert picture._repr_png_() == file.read_bytes()
+
+    return compare
+
+
+@pytest.fixture(scope="module")
+def file(field, tmp_path_factory):
+    made = tmp_path_factory.mktemp("fields") / "torus.hpsdf"
+    field.save(made)
+    return made
+
+
+def test_pictures_equal_those_of_the_program(file, mesh, named):
+    hidden = {"surface": False, "cells": "lines"}
+    loaded = hpsdf.Session()
+    loaded.run("load $file", file=file)  # captions name the file
+    words = ("--size", "320x200")
+    named(loaded.render(size=SIZE, color="degree", camera=(30, 20, 1.1)), "render", file, *words, "--color", "degree")
+    named(loaded.render(size=SIZE, cpu=True, **hidden), "render", file, *words, "--cpu", "--surface=false", "--cells", "lines")
+    named(loaded.slice(size=SIZE, axis="x", offset=numpy.float32(0.25)), "slice", file, *words, "--axis", "x", "--offset", "0.25")
+    named(loaded.probe((-1, 0, 0), [1, 0, 0], size=SIZE), "probe", file, *words, "--from=-1,0,0", "--to", "1,0,0")
+    error = loaded.slice(size=SIZE, color="error", mesh=mesh)
+    named(error, "slice", file, *words, "--color", "error", "--mesh", "builtin:torus")
+    assert (error != loaded.slice(size=SIZE, color="degree")).any(), "the comparison would not notice another picture"
+
+
+def test_pictures_are_arrays(field, session, tmp_path):
+    picture = hpsdf.render(field, size=SIZE)
+    assert isinstance(picture, numpy.ndarray) and picture.shape == (200, 320, 3) and picture.dtype == numpy.uint8
+    assert numpy.array_equal(picture, session.render(size=SIZE))
+    assert picture[:, :, 0].std() > 10, "the picture shows something"
+    picture.save(tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").read_bytes() == picture._repr_png_()
+    assert picture[0, 0]._repr_png_() is None and (picture / 2.0)._repr_png_() is None
+    assert hpsdf.slice(field, size=SIZE).shape == hpsdf.probe(field, (-1, 0, 0), (1, 0, 0), size=SIZE).shape
+
+
+def test_frames_and_pixels(session, field):
+    session.run("show slice; plane axis=x offset=0.1")
+    frame = session.frame()
+    assert frame.shape == (720, 1280, 3)
+    found = session.pick(640, 360)
+    assert found["position"][0] == pytest.approx(0.1) and found["value"] == pytest.approx(field(found["position"]), abs=1e-5)
+    assert session.pick(1, 1) is None
+    with pytest.raises(hpsdf.Error, match="no picture"):
+        hpsdf.Session(field).pick(1, 1)
+
+
+def test_options_that_are_not_accepted(session, field):
+    for wrong, word in (({"color": "deg"}, "degree"), ({"colour": "degree"}, "color"), ({"camera": (1, 2)}, "3 numbers"),
+                        ({"size": (4, 4)}, "16384"), ({"output": "x.png"}, "output"), ({"samples": 0}, "from 1")):
+        with pytest.raises(hpsdf.OptionError, match=word):
+            session.render(**wrong)
+    for wrong in ({"color": {}}, {"camera": object()}, {"camera": ["a", "b", "c"]}):
+        with pytest.raises(TypeError):
+            session.render(**wrong)
+    with pytest.raises(hpsdf.Error, match="no field"):
+        hpsdf.Session().render()
+    with pytest.raises(TypeError):
+        hpsdf.Session("field.hpsdf")
+
+
+def test_differences_of_two_fields(mesh, field, file, session):
+    other = hpsdf.build(mesh, target_error=1e-3)
+    picture = session.slice(size=SIZE, color="difference", other=other)
+    assert (picture != session.slice(size=SIZE, color="difference", other=field)).any()
+    with pytest.raises(OSError):
+        session.slice(color="difference", other=pathlib.Path("none.hpsdf"))
+
+
+def test_figures_equal_those_of_the_program(mesh, field, file, program):
+    figures = hpsdf.verify(field, mesh, points=2000)
+    expected = json.loads(program("verify", file, "builtin:torus", "--points", 2000, "--json"))
+    for part in ("uniform", "near_surface", "jumps", "steps", "worst"):
+        assert figures[part] == expected[part]
+    with pytest.raises(AssertionError, match="max-rms") as caught:
+        hpsdf.verify(field, mesh, points=2000, max_rms=1e-9)
+    assert isinstance(caught.value, hpsdf.ExpectationError) and isinstance(caught.value, hpsdf.Error)
+    with pytest.raises(hpsdf.Error, match="made from builtin:torus, not from mesh"):
+        hpsdf.verify(field, hpsdf.load_mesh("builtin:sphere"), points=2000)
+    info = json.loads(program("info", file, "--json"))
+    assert {**field.info(), "file_bytes": None} == {**info, "file_bytes": None}
+    assert mesh.report() == {**json.loads(program("mesh", "builtin:torus", "--json")), "name": "mesh"}
+
+
+def test_scripts(mesh, field, tmp_path, capsys):
+    text = hpsdf.run("build $shape target-error=1e-4; expect stats.leaves > 10", shape="builtin:torus")
+    assert "leaves" in text
+    reports = hpsdf.run("build $shape target-error=1e-5; info", shape=mesh, json=True)
+    assert len(reports) == 2 and reports[1]["leaves"] == len(field.cells())
+    assert hpsdf.run("load $it; info", it=field, json=True)[1]["leaves"] == len(field.cells())
+    assert hpsdf.run("", json=True) == []
+    script = tmp_path / "torus.hps"
+    script.write_text("build builtin:torus target-error=1e-4\nexpect stats.leaves > 1e6\n")
+    with pytest.raises(hpsdf.ExpectationError, match=r"torus\.hps:2:1: expected"):
+        hpsdf.run(script)
+    with pytest.raises(hpsdf.Error, match="script:1:1: .*'buidl'.*'build'"):
+        hpsdf.run("buidl builtin:torus")
+    with pytest.raises(hpsdf.FileError, match="none.hpsdf"):
+        hpsdf.run("load none.hpsdf")
+    with pytest.raises(OSError):
+        hpsdf.run(tmp_path / "none.hps")
+    session = hpsdf.Session()
+    session.run("build builtin:torus target-error=1e-4")
+    assert isinstance(session.field, hpsdf.Field) and hpsdf.Session().field is None
+
+
+def test_scripts_are_cancelled_by_their_progress():
+    def stop(task, fraction):
+        raise InterruptedError
+
+    session = hpsdf.Session()
+    start = time.monotonic()
+    with pytest.raises(InterruptedError):
+        session.run("build builtin:gear target-error=1e-13", progress=stop)
+    assert time.monotonic() - start < 60
+    assert "torus" in session.run("build builtin:torus target-error=1e-4"), "the session goes on"
+
+
+def test_one_session_in_several_threads(field, session):
+    expected = [session.slice(size=SIZE, offset=0.05 * n) for n in range(4)]
+    found = [None] * 4
+
+    def draw(n):
+        found[n] = session.slice(size=SIZE, offset=0.05 * n)
+
+    threads = [threading.Thread(target=draw, args=(n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(numpy.array_equal(one, other) for one, other in zip(found, expected))
+
+
+def test_notebooks_show_fields_and_meshes(mesh, field):
+    png = field._repr_png_()
+    assert png.startswith(b"\x89PNG") and len(png) > 5000
+    shown = field._repr_html_()
+    assert f"<td>{len(field.cells()):,}</td>" in shown and "error near the surface" in shown and "base64" in shown
+    report = mesh._repr_html_()
+    assert "32,768" in report and "<td>closed</td>" in report
+    open_mesh = hpsdf.TriangleMesh(mesh.vertices, mesh.triangles[:-1], name="<script>")
+    assert "not closed" in open_mesh._repr_html_() and "<script>" not in open_mesh._repr_html_()
+    function = hpsdf.build(lambda p: numpy.linalg.norm(p, axis=1) - 0.5, box=((-1,) * 3, (1,) * 3), target_error=1e-3)
+    assert "a function" in function._repr_html_()
+
+
+def test_help_lists_the_options():
+    assert "camera: " in hpsdf.render.__doc__ and "max_rms: " in hpsdf.verify.__doc__
+    for function in (hpsdf.render, hpsdf.slice, hpsdf.probe, hpsdf.verify):
+        assert "\noutput: " not in function.__doc__ and "    field: " not in function.__doc__
