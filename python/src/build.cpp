@@ -37,16 +37,6 @@ Box domainFrom(const py::object& box, double margin, const Box& surface) {
   return Box(corners.all()[0], corners.all()[1]);
 }
 
-/// Throws the errors of `checkBuild` as errors about options.
-void requireBuildable(const Box& domain, const BuildOptions& options) {
-  try {
-    checkBuild(domain, options);
-  } catch (const Error& error) {
-    if (error.kind() != ErrorKind::general) throw;
-    throw Error(ErrorKind::option, error.subject(), error.problem());
-  }
-}
-
 double longestSideOf(const Box& surface) { return surface.isEmpty() ? 0 : surface.sizes().maxCoeff(); }
 
 /// Builds the field of a distance and measures its errors, as the program does.
@@ -64,7 +54,7 @@ std::shared_ptr<Field> builtField(const py::object& surface, const py::object& b
     const Box& known = distance.source().box;
     const BuildOptions options = buildOptionsFrom(settings, longestSideOf(known));
     const Box domain = domainFrom(box, margin, known);
-    requireBuildable(domain, options);
+    checkBuild(domain, options);
     return fieldOf(distance, domain, options, progress);
   };
   if (py::isinstance<ExactDistance>(surface)) return build(surface.cast<const ExactDistance&>());

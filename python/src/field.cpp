@@ -17,8 +17,7 @@ using namespace py::literals;
 namespace hpsdf::python {
 namespace {
 
-constexpr std::size_t kValues = 1 << 20;     // points between two looks for signals: some tenths of a second
-constexpr std::size_t kGradients = 1 << 17;  // values with gradients that are held at a time: 4 MB
+constexpr std::size_t kQueries = 1 << 20;  // points between two looks for signals: some tenths of a second
 
 /// A row of the array that `Field.cells` returns.
 struct CellRow {
@@ -33,7 +32,7 @@ py::object values(const Field& field, const py::object& argument, const py::obje
     if (points.size() == 1)
       numbers[0] = field.value(points[0]);  // handing over the GIL would take longer
     else
-      forEachPiece(points.size(), kValues, [&](std::size_t first, std::size_t count) {
+      forEachPiece(points.size(), kQueries, [&](std::size_t first, std::size_t count) {
         field.values(points.subspan(first, count), numbers.subspan(first, count));
       });
   });
@@ -55,15 +54,11 @@ py::object valuesAndGradients(const Field& field, const py::object& argument, co
   Doubles gradient = resultArray(gradientOut, points.shape(3), "out[1]");
   points.keepApartFrom(value);
   points.keepApartFrom(gradient);
-  double* const allValues = value.mutable_data();
-  auto* const allGradients = reinterpret_cast<Vector3*>(gradient.mutable_data());
-  std::vector<ValueAndGradient> piece(std::min(kGradients, points.count()));
-  forEachPiece(points.count(), kGradients, [&](std::size_t first, std::size_t count) {
-    field.valuesAndGradients(points.all().subspan(first, count), std::span(piece).first(count));
-    for (std::size_t i = 0; i < count; ++i) {
-      allValues[first + i] = piece[i].value;
-      allGradients[first + i] = piece[i].gradient;
-    }
+  const std::span values(value.mutable_data(), points.count());
+  const std::span gradients(reinterpret_cast<Vector3*>(gradient.mutable_data()), points.count());
+  forEachPiece(points.count(), kQueries, [&](std::size_t first, std::size_t count) {
+    field.valuesAndGradients(points.all().subspan(first, count), values.subspan(first, count),
+                             gradients.subspan(first, count));
   });
   return py::make_tuple(valueOut.is_none() ? unwrapped(value) : valueOut, gradient);
 }

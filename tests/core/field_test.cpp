@@ -299,12 +299,18 @@ void expectBatchesEqualSingleQueries(const Field& field, std::span<const Vector3
   std::vector<ValueAndGradient> both(points.size());
   field.values(points, values);
   field.valuesAndGradients(points, both);
+  std::vector<double> separateValues(points.size());
+  std::vector<Vector3> gradients(points.size());
+  field.valuesAndGradients(points, separateValues, gradients);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const ValueAndGradient single = field.valueAndGradient(points[i]);
+    ASSERT_TRUE(sameBits(separateValues[i], single.value)) << points[i].transpose();
     ASSERT_TRUE(sameBits(values[i], field.value(points[i]))) << points[i].transpose();
     ASSERT_TRUE(sameBits(both[i].value, single.value)) << points[i].transpose();
-    for (int axis = 0; axis < 3; ++axis)
+    for (int axis = 0; axis < 3; ++axis) {
       ASSERT_TRUE(sameBits(both[i].gradient[axis], single.gradient[axis])) << points[i].transpose();
+      ASSERT_TRUE(sameBits(gradients[i][axis], single.gradient[axis])) << points[i].transpose();
+    }
   }
 }
 

@@ -11,8 +11,9 @@
 
 namespace hpsdf {
 
-/// Checks the arguments of `build`, which calls this function first. Throws `Error` for the first setting that is out
-/// of range, for a domain that is empty, flat or not finite, and for a base grid that does not fit into memory.
+/// Checks the arguments of `build`, which calls this function first. Throws `Error` (of the kind `option`) for the
+/// first setting that is out of range and for a domain that is empty, flat or not finite, and `MemoryLimitError` for a
+/// base grid that does not fit into memory.
 void checkBuild(const Box& domain, const BuildOptions& options);
 
 /// A function that is offered the field of a construction while this grows, for instance to show it. It may call

@@ -51,10 +51,12 @@ class Field {
   double value(const Vector3& x) const;
   ValueAndGradient valueAndGradient(const Vector3& x) const;
 
-  /// Evaluates the field at many points. The results are those of single queries, but come several times faster. Both
+  /// Evaluates the field at many points. The results are those of single queries, but come several times faster. All
   /// spans must have the same length.
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
+  void valuesAndGradients(std::span<const Vector3> points, std::span<double> values,
+                          std::span<Vector3> gradients) const;
 
   /// Returns the leaf that holds x. For x outside the domain, returns the leaf that holds the domain's closest
   /// point to x.

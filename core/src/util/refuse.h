@@ -20,6 +20,12 @@ template <typename... Parts>
   throw Error(messageOf(parts...));
 }
 
+/// Throws an `Error` about options, whose message is made of these parts and names the options.
+template <typename... Parts>
+[[noreturn]] void refuseOptions(const Parts&... parts) {
+  throw Error(ErrorKind::option, "", messageOf(parts...));
+}
+
 /// Throws an `Error` about a mesh with the message "NAME: problem". NAME is the mesh's name, or "mesh" for
 /// a mesh without a name.
 template <typename... Parts>

@@ -9,9 +9,9 @@
 namespace hpsdf::python {
 
 /// Returns the options of a construction from keyword arguments, whose names are those of the settings with underscores
-/// (`buildSettings`). An argument that is None counts as not given. Percentages, such as "0.02%", refer to
-/// `longestSide`, the longest side of the mesh in its units. As in the program, the target error has no default where
-/// another end of the construction is given.
+/// (`buildSettings`), by the rules of `GivenSettings`. An argument that is None counts as not given. Strings are values
+/// as the program takes them; percentages, such as "0.02%", refer to `longestSide`, the longest side of the mesh in its
+/// units.
 ///
 /// Raises `TypeError` for an unknown name or a value of another type, and throws `Error` of the kind `option` for a
 /// value out of range and for settings that exclude each other.

@@ -4,7 +4,9 @@
 // checkpoint file.
 
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -74,6 +76,53 @@ std::string settingText(const BuildSetting& setting, const BuildOptions& options
 
 /// Returns the default value of a setting, as users write it.
 std::string defaultText(const BuildSetting& setting);
+
+/// The values that a user of a binding gives to settings by name, each checked when it is given.
+class GivenSettings {
+ public:
+  /// `separator` stands between the words of a setting's name: '-' as in "max-depth" or, in Python, '_'.
+  explicit GivenSettings(char separator = '-') : separator_(separator) {}
+
+  /// Returns the names of all settings that users can give.
+  std::vector<std::string> names() const;
+
+  /// Gives a setting a value as users write it: "1e-6", "6,6,6", "hp" or "true", as `settingText` returns it, or a
+  /// percentage of the mesh's longest side ("0.02%") where the setting allows it. Throws `Error` of the kind `option`,
+  /// whose subject is the name, if there is no such setting, or if the text is no value of it.
+  void give(std::string_view name, std::string_view text);
+
+  /// Gives a setting that is no choice a value as numbers, as `BuildSetting` describes them. Throws as the other
+  /// function does.
+  void give(std::string_view name, std::span<const double> numbers);
+
+  /// Takes back what was given to a setting, if anything was. Throws `Error` if there is no such setting.
+  void takeBack(std::string_view name);
+
+  /// Returns the options of a construction with these settings. The target error has no default where another end of
+  /// the construction is given. Percentages refer to `longestSide`, the longest side of the mesh in its units, or 0 if
+  /// that is unknown. Throws `Error` of the kind `option` for settings that exclude each other or have no effect, and
+  /// for a percentage without a longest side.
+  BuildOptions options(double longestSide) const;
+
+ private:
+  struct Value {
+    std::vector<double> numbers;
+    bool isShare = false;  ///< the only number is a multiple of the mesh's longest side
+  };
+
+  const BuildSetting& settingOf(std::string_view name) const;
+  std::string spelled(std::string_view name) const;
+  [[noreturn]] void refuse(const BuildSetting& setting, const std::string& problem) const;
+  bool isAnyGiven(std::initializer_list<BuildSetting::Ending> endings) const;
+  void requireInRange(const BuildSetting& setting, double number) const;
+  void requireCompanions(const BuildSetting& setting, const BuildOptions& options) const;
+  double indexOfWord(const BuildSetting& setting, std::string_view word) const;
+  std::vector<double> checked(const BuildSetting& setting, std::span<const double> numbers) const;
+  Value valueFrom(const BuildSetting& setting, std::string_view text) const;
+
+  char separator_;
+  std::map<std::string_view, Value> values_;  // by the names in `buildSettings`
+};
 
 /// Returns a copy of `options` in which every setting that field files do not store has its value from a default
 /// `FieldMetadata`.

@@ -52,8 +52,8 @@ double scaledTarget(double weighted, double referenceLength) {
   if (weighted == 0) return 0;
   const double target = weighted * std::pow(referenceLength / 2, 5);
   if (!(target >= std::numeric_limits<double>::min()) || !std::isfinite(target))
-    refuse("target error ", weighted, " for a surface of size ", referenceLength,
-           " is beyond double precision: scale the mesh, or normalize it");
+    refuseOptions("target error ", weighted, " for a surface of size ", referenceLength,
+                  " is beyond double precision: scale the mesh, or normalize it");
   return target;
 }
 
@@ -68,8 +68,8 @@ void checkRanges(const BuildOptions& options) {
       std::ranges::replace(name, '-', ' ');
       std::ostringstream upper;
       if (std::isfinite(setting.maximum)) upper << ", up to " << setting.maximum;
-      refuse(name, " ", number, ": expected a number ", setting.minimumExcluded ? "above " : "of at least ",
-             setting.minimum, upper.str());
+      refuseOptions(name, " ", number, ": expected a number ", setting.minimumExcluded ? "above " : "of at least ",
+                    setting.minimum, upper.str());
     }
   }
 }
@@ -87,37 +87,39 @@ void checkOutlived(const BuildOptions& options) {
   for (const char* later :
        {options.continuityWeight ? "weak continuity" : nullptr, options.enrich ? "enrich" : nullptr})
     if (later != nullptr)
-      refuse("a ", reached, " does not outlive ", later, ": leave out ", later, " or the ", reached);
+      refuseOptions("a ", reached, " does not outlive ", later, ": leave out ", later, " or the ", reached);
   if (options.tolerance > 0 && options.band > 0)
-    refuse("a tolerance is kept in the whole domain: leave out the band or the tolerance");
+    refuseOptions("a tolerance is kept in the whole domain: leave out the band or the tolerance");
 }
 
 /// Throws `Error` if the settings that determine when the construction ends contradict each other.
 void checkEnds(const BuildOptions& options) {
   const NearFarError byDistance = options.targetError.byDistance();
-  if ((byDistance.near > 0) != (byDistance.far > 0)) refuse("near error and far error belong together: give both");
+  if ((byDistance.near > 0) != (byDistance.far > 0))
+    refuseOptions("near error and far error belong together: give both");
   if (byDistance.near > byDistance.far)
-    refuse("near error ", byDistance.near, " is above far error ", byDistance.far,
-           ": expected a field that is at least as exact near the surface");
+    refuseOptions("near error ", byDistance.near, " is above far error ", byDistance.far,
+                  ": expected a field that is at least as exact near the surface");
   if (!hasEnd(options))
-    refuse(
+    refuseOptions(
         "target error 0: expected a number above 0, or another end: near and far error, maximum error, bytes, steps");
   if (options.tolerance > 0 && (options.maxError > 0 || options.maxBytes || options.targetError.isByDistance()))
-    refuse("a tolerance decides alone: leave out maximum error, bytes, near and far error");
+    refuseOptions("a tolerance decides alone: leave out maximum error, bytes, near and far error");
   checkOutlived(options);
   if (options.certified && options.blend > 0)
-    refuse("blending changes what is certified: leave out blending or the certificate");
+    refuseOptions("blending changes what is certified: leave out blending or the certificate");
   if (options.estimator == Estimator::checked && options.trialSamples == TrialSamples::own)
-    refuse("the checked estimator needs trials by the children's samples: take the estimator embedded or residual");
+    refuseOptions(
+        "the checked estimator needs trials by the children's samples: take the estimator embedded or residual");
   if (options.criterion != Criterion::optimal) return;
   if (options.trialSamples == TrialSamples::own)
-    refuse("the optimal criterion needs trials by the children's samples: leave out the paper's settings");
+    refuseOptions("the optimal criterion needs trials by the children's samples: leave out the paper's settings");
   if (options.maxError > 0)
-    refuse(
+    refuseOptions(
         "the optimal criterion takes refinements back by mean squares, which a maximum error does not allow: take "
         "the paper's criterion");
   if (options.targetError.isNone() && !options.maxBytes)
-    refuse("the optimal criterion needs a target: a target error, near and far error, or bytes");
+    refuseOptions("the optimal criterion needs a target: a target error, near and far error, or bytes");
 }
 
 /// Returns the part of the byte limit that is left for nodes and coefficients. The lookup grid takes the rest:
@@ -164,7 +166,8 @@ static void requireGridMemory(const BuildOptions& options) {
   grid << "base grid " << options.grid[0] << " x " << options.grid[1] << " x " << options.grid[2] << " has " << cells
        << " cells ";
   if (byNumbers < byMemory)
-    refuse(grid.str(), "with more than 2^32 coefficients: take at most ", std::floor(std::cbrt(byNumbers)), " an axis");
+    refuseOptions(grid.str(), "with more than 2^32 coefficients: take at most ", std::floor(std::cbrt(byNumbers)),
+                  " an axis");
   grid << "and would need " << bytesText(cells * bytesPerCell) << ", more than the " << bytesText(allowed)
        << " allowed: ";
   const double least = cells * bytesPerCell;
@@ -266,10 +269,11 @@ void ByteBudget::requireRoomForFirstCells(double bytes, double leastBytes, doubl
   const bool mayLower = options_.criterion == Criterion::optimal;
   const double baseGrid = cells * leafBytes(mayLower ? leastDegree(options_) : startDegree(options_));
   if (exactBytes > 0 && baseGrid <= limit_)
-    refuse("the exact cells near the surface and the cells around them take more than ", *options_.maxBytes,
-           " bytes: allow ", static_cast<std::uint64_t>(double(*options_.maxBytes) * (1 + missing / limit_)) + 1,
-           ", more exact-triangles a cell, or a smaller exact-within");
-  refuse("the base grid alone takes more than ", *options_.maxBytes, " bytes: allow more, or take a coarser grid");
+    refuseOptions("the exact cells near the surface and the cells around them take more than ", *options_.maxBytes,
+                  " bytes: allow ", static_cast<std::uint64_t>(double(*options_.maxBytes) * (1 + missing / limit_)) + 1,
+                  ", more exact-triangles a cell, or a smaller exact-within");
+  refuseOptions("the base grid alone takes more than ", *options_.maxBytes,
+                " bytes: allow more, or take a coarser grid");
 }
 
 CoefficientType ByteBudget::coefficientType() const {
@@ -281,15 +285,15 @@ void checkOptions(const Box& domain, const BuildOptions& options) {
   checkRanges(options);
   checkEnds(options);
   if (std::ranges::find(options.grid, 0u) != options.grid.end())
-    refuse("base grid 0: expected at least 1 cell an axis");
+    refuseOptions("base grid 0: expected at least 1 cell an axis");
   if (domain.isEmpty() || !domain.min().allFinite() || !domain.max().allFinite() || !(domain.sizes().minCoeff() > 0) ||
       !std::isfinite(domain.diagonal().squaredNorm()))
-    refuse("the domain is empty, flat or not finite: expected lower < upper on every axis");
+    refuseOptions("the domain is empty, flat or not finite: expected lower < upper on every axis");
   requireGridMemory(options);
   const double across = double(*std::ranges::max_element(options.grid)) * std::ldexp(1.0, options.maxDepth);
   if (across > 0x1p32)
-    refuse("a grid of ", *std::ranges::max_element(options.grid), " cells halved ", options.maxDepth,
-           " times is finer than 2^32 cells an axis: take a coarser grid or a lower maximum depth");
+    refuseOptions("a grid of ", *std::ranges::max_element(options.grid), " cells halved ", options.maxDepth,
+                  " times is finer than 2^32 cells an axis: take a coarser grid or a lower maximum depth");
 }
 
 }  // namespace hpsdf::detail

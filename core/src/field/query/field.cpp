@@ -268,6 +268,20 @@ void Field::valuesAndGradients(std::span<const Vector3> points, std::span<ValueA
   evaluateBatch(data_, lookupGrid_, points, out);
 }
 
+void Field::valuesAndGradients(std::span<const Vector3> points, std::span<double> values,
+                               std::span<Vector3> gradients) const {
+  assert(points.size() == values.size() && points.size() == gradients.size());
+  std::array<ValueAndGradient, 512> piece;  // two batches or four
+  for (std::size_t first = 0; first < points.size(); first += piece.size()) {
+    const std::size_t count = std::min(piece.size(), points.size() - first);
+    valuesAndGradients(points.subspan(first, count), std::span(piece).first(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      values[first + i] = piece[i].value;
+      gradients[first + i] = piece[i].gradient;
+    }
+  }
+}
+
 Cell Field::cellAt(const Vector3& x) const {
   assertNotMovedFrom(data_);
   const GridFrame& frame = lookupGrid_.frame;
