@@ -22,7 +22,7 @@ namespace include_direction_test {
 namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
-constexpr std::array<std::string_view, 6> kRooms = {"core", "render", "physics", "openvdb", "app", "python"};
+constexpr std::array<std::string_view, 7> kRooms = {"core", "render", "physics", "openvdb", "app", "c", "python"};
 constexpr std::size_t kMostFilesInFolder = 20;
 constexpr std::size_t kMostFilesInAppItself = 4;
 
@@ -31,7 +31,7 @@ bool isRoom(std::string_view name) { return std::find(kRooms.begin(), kRooms.end
 /// Returns true if a file in the top-level folder `from` may include a file in the top-level folder `to`.
 bool mayInclude(std::string_view from, std::string_view to) {
   if (from == "python") return to == from || to == "core" || to == "render" || to == "app";
-  return from == to || to == "core" || (from == "app" && to != "python");
+  return from == to || to == "core" || (from == "app" && to != "c" && to != "python");
 }
 
 struct Include {
@@ -52,10 +52,12 @@ std::vector<std::string> parts(const fs::path& path) {
   return result;
 }
 
-/// Returns the included file's path in the repository: "hpsdf/…" is a public header, "../…" is relative to `file`,
-/// "core/…" and the like start at the root, and any other path is a private header in the top-level folder of `file`.
+/// Returns the included file's path in the repository: "hpsdf/…" is a public header, as is "hpsdf.h" of the room c,
+/// "../…" is relative to `file`, "core/…" and the like start at the root, and any other path is a private header in the
+/// top-level folder of `file`.
 fs::path target(const fs::path& file, const std::string& include) {
   const auto names = parts(include);
+  if (include == "hpsdf.h") return "c/include/hpsdf.h";
   if (names[0] == "hpsdf") {
     const bool isOfAnotherRoom = names.size() > 2 && isRoom(names[1]);
     return fs::path(isOfAnotherRoom ? names[1] : "core") / "include" / include;
@@ -66,6 +68,7 @@ fs::path target(const fs::path& file, const std::string& include) {
 }
 
 bool isStandardOrEigen(const std::string& include) {
+  if (include == "stddef.h" || include == "stdint.h") return true;  // in the header for C
   const auto isInStandardName = [](char c) {
     return std::islower(static_cast<unsigned char>(c)) || std::isdigit(c) || c == '_';
   };
@@ -161,7 +164,7 @@ std::set<std::string> quotedWords(const std::string& cell) {
 /// Reads table rows of the form "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
 Folders parseFolders(const std::string& design) {
   static const std::regex row(
-      R"(^\| `((?:core|render|physics|openvdb|app|python)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
+      R"(^\| `((?:core|render|physics|openvdb|app|c|python)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
   Folders folders;
   std::istringstream stream(design);
   std::string line;
@@ -234,7 +237,7 @@ std::string findCircle(const Graph& graph) {
 }
 
 /// The umbrella header hpsdf.h includes all public headers, and no other file of the library includes it.
-bool isUmbrella(const fs::path& file) { return file.filename() == "hpsdf.h"; }
+bool isUmbrella(const fs::path& file) { return file == "core/include/hpsdf/hpsdf.h"; }
 
 /// Returns the violations of the design's tables: forbidden includes, cycles, and files in no listed folder.
 Lines structureFaults(const Sources& sources, const Folders& folders) {

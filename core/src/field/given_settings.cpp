@@ -76,8 +76,7 @@ BuildOptions GivenSettings::options(double longestSide) const {
     if (isOff && setting.hasOwner != nullptr) continue;  // the flag is off, as it is without its owner
     requireCompanions(setting, options);
     if (found->second.isShare) {
-      if (!(longestSide > 0))
-        refuse(setting, "expected a length, because the longest side of the surface is unknown");
+      if (!(longestSide > 0)) refuse(setting, "expected a length, because the longest side of the surface is unknown");
       numbers[0] *= longestSide;
     }
     setting.set(options, numbers);
@@ -154,8 +153,7 @@ GivenSettings::Value GivenSettings::valueFrom(const BuildSetting& setting, std::
   const std::string_view word = trimmed(text);
   if (setting.type == BuildSetting::Type::choice) return {.numbers = {indexOfWord(setting, word)}};
   if (setting.type == BuildSetting::Type::flag) {
-    if (word != "true" && word != "false")
-      refuse(setting, "expected 'true' or 'false', got '" + shownText(word) + "'");
+    if (word != "true" && word != "false") refuse(setting, "expected 'true' or 'false', got '" + shownText(word) + "'");
     return {.numbers = {word == "true" ? 1.0 : 0.0}};
   }
   const bool isShare = setting.mayBeShare && word.ends_with('%');
