@@ -139,8 +139,9 @@ HPSDF_API void hpsdf_distance_free(hpsdf_distance* distance);
 
 /* ---- Options of constructions ---- */
 
-/* The options of a construction. They are those of the command 'hpsdf build', with the same names, values and defaults:
- * docs/commands.md and 'hpsdf help build' describe them. */
+/* The options of a construction: those of the command 'hpsdf build' under "What you ask for", "What you get" and "How
+ * it is built", except domain, margin and normalize, and "threads". Names, values and defaults are the same, except
+ * that memory-limit is what the machine allows by default. docs/commands.md and 'hpsdf help build' describe them. */
 typedef struct hpsdf_options hpsdf_options;
 
 HPSDF_API hpsdf_status hpsdf_options_new(hpsdf_options** options);

@@ -86,7 +86,7 @@ bool isGraphics(const std::string& include) {
 std::string fault(const fs::path& file, const Include& include) {
   const std::string room = *parts(file).begin();
   const bool isPublic = parts(file).at(1) == "include";
-  if (!include.angled || include.path.starts_with("hpsdf/")) {
+  if (!include.angled || include.path.starts_with("hpsdf")) {
     const auto names = parts(target(file, include.path));
     if (!isRoom(names[0])) return "lies in no room";
     if (!mayInclude(room, names[0])) return room + " must not know " + names[0];
@@ -418,6 +418,8 @@ TEST(IncludeDirection, acceptsIncludesInTheRightDirection) {
       {"physics/src/contacts.cpp", "#include \"hpsdf/physics/contacts.h\"\n#include \"hpsdf/field.h\""},
       {"app/src/main.cpp",
        "#include <CLI/CLI.hpp>\n#include \"hpsdf/render/picture.h\"\n#include \"hpsdf/physics/contacts.h\""},
+      {"c/src/build.cpp", "#include \"hpsdf.h\"\n#include \"hpsdf/build.h\"\n#include \"call.h\""},
+      {"c/include/hpsdf.h", "#include <stdint.h>"},
       {"core/src/mesh/shapes.cpp", "// not an include: \"hpsdf/render/view.h\"\nint include = 0;"},
   };
   for (const Sample& sample : samples)
@@ -433,6 +435,9 @@ TEST(IncludeDirection, refusesIncludesInTheWrongDirection) {
       {"core/src/field/build/build.cpp", "#include \"hpsdf/physics/contacts.h\""},
       {"core/src/field/build/build.cpp", "#include <GL/gl.h>"},
       {"render/src/gl/context.cpp", "#include \"../../../app/src/language/registry.h\""},
+      {"app/src/main.cpp", "#include <hpsdf.h>"},
+      {"core/src/field/build/build.cpp", "#include \"hpsdf.h\""},
+      {"c/src/build.cpp", "#include \"hpsdf/render/view.h\""},
       {"render/src/gl/context.cpp", "#include \"hpsdf/physics/contacts.h\""},
       {"physics/src/contacts.cpp", "#include \"hpsdf/render/view.h\""},
       {"physics/src/contacts.cpp", "#include \"app/src/language/registry.h\""},
