@@ -12,7 +12,6 @@
 #include <memory>
 #include <mutex>
 #include <new>
-#include <regex>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -123,7 +122,7 @@ TEST(CInterface, fieldsOfMeshesAndFilesAreThoseOfCpp) {
   const support::TemporaryDirectory folder;
   const std::string file = folder / "torus.hpsdf", smallFile = folder / "small.hpsdf";
   const MeshHandle mesh = torus();
-  const OptionsHandle options = optionsWith({{"tolerance", "0.5%"}, {"threads", "1"}});
+  const OptionsHandle options = optionsWith({{"tolerance", "2%"}, {"threads", "1"}});
   hpsdf_field *field = nullptr, *loaded = nullptr;
   expectOk(hpsdf_build_mesh(mesh.get(), nullptr, options.get(), nullptr, &field));
   expectOk(hpsdf_field_save(field, file.c_str(), 0));
@@ -133,7 +132,7 @@ TEST(CInterface, fieldsOfMeshesAndFilesAreThoseOfCpp) {
   const TriangleMesh same = loadMesh("builtin:torus");
   const ExactDistance distance(same);
   BuildOptions settings{.targetError = 0};
-  settings.tolerance = 0.5 / 100 * boundingBox(same).sizes().maxCoeff();
+  settings.tolerance = 2.0 / 100 * boundingBox(same).sizes().maxCoeff();
   const Field expected = build(distance, domainAround(same), settings);
   save(expected, folder / "expected.hpsdf");
   EXPECT_EQ(fileText(file), fileText(folder / "expected.hpsdf"));
@@ -277,10 +276,12 @@ TEST(CInterface, exportsTheFunctionsOfItsHeaderUnderItsVersion) {
   const std::string header = fileText(HPSDF_SOURCE_DIR "/c/include/hpsdf.h");
   const std::string version = HPSDF_VERSION;
   const std::string suffix = "@@HPSDF_" + version.substr(0, version.rfind('.'));
-  static const std::regex declaration(R"(HPSDF_API [^;(]*\b(hpsdf_\w+)\()");
+  const std::string begin = "\nHPSDF_API ";  // of the declaration of a function
   std::set<std::string> expected;
-  for (std::sregex_iterator at(header.begin(), header.end(), declaration), end; at != end; ++at)
-    expected.insert((*at)[1].str() + suffix);
+  for (std::size_t at = header.find(begin); at != std::string::npos; at = header.find(begin, at + 1)) {
+    const std::size_t end = header.find('(', at), name = header.rfind("hpsdf_", end);
+    expected.insert(header.substr(name, end - name) + suffix);
+  }
   EXPECT_GT(expected.size(), 20u);
   EXPECT_EQ(exportedSymbols(), expected);
 }
