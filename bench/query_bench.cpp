@@ -32,6 +32,12 @@ void gradients(benchmark::State& state, const Field& field) {
   });
 }
 
+void hessians(benchmark::State& state, const Field& field) {
+  const std::vector<Vector3> points = uniformPoints(kPoints);
+  std::vector<ValueGradientHessian> out(kPoints);
+  timeEach(state, kPoints, [&] { field.valuesGradientsHessians(points, out); });
+}
+
 void batched(benchmark::State& state, const Field& field) {
   const std::vector<Vector3> points = uniformPoints(kPoints);
   std::vector<double> out(kPoints);
@@ -127,16 +133,19 @@ const Field& blendedBunny() {
 
 void bunnyValue(benchmark::State& state) { values(state, bunnyField()); }
 void bunnyGradient(benchmark::State& state) { gradients(state, bunnyField()); }
+void bunnyHessian(benchmark::State& state) { hessians(state, bunnyField()); }
 void bunnyBatched(benchmark::State& state) { batched(state, bunnyField()); }
 void bunnyBatchedGradient(benchmark::State& state) { batchedGradients(state, bunnyField()); }
 void bunnyReads(benchmark::State& state) { reads(state, bunnyField()); }
 void floatValue(benchmark::State& state) { values(state, floatBunnyField()); }
 void floatGradient(benchmark::State& state) { gradients(state, floatBunnyField()); }
+void floatHessian(benchmark::State& state) { hessians(state, floatBunnyField()); }
 void floatBatched(benchmark::State& state) { batched(state, floatBunnyField()); }
 void floatBatchedGradient(benchmark::State& state) { batchedGradients(state, floatBunnyField()); }
 void floatReads(benchmark::State& state) { reads(state, floatBunnyField()); }
 void blendedValue(benchmark::State& state) { values(state, blendedBunny()); }
 void blendedGradient(benchmark::State& state) { gradients(state, blendedBunny()); }
+void blendedHessian(benchmark::State& state) { hessians(state, blendedBunny()); }
 void blendedBatched(benchmark::State& state) { batched(state, blendedBunny()); }
 void blendedBatchedGradient(benchmark::State& state) { batchedGradients(state, blendedBunny()); }
 void armadilloValue(benchmark::State& state) { values(state, armadilloField()); }
@@ -144,16 +153,19 @@ void armadilloGradient(benchmark::State& state) { gradients(state, armadilloFiel
 
 BENCHMARK(bunnyValue)->Name("query/bunny/value");
 BENCHMARK(bunnyGradient)->Name("query/bunny/gradient");
+BENCHMARK(bunnyHessian)->Name("query/bunny/hessian");
 BENCHMARK(bunnyBatched)->Name("query/bunny/batched");
 BENCHMARK(bunnyBatchedGradient)->Name("query/bunny/batched_gradient");
 BENCHMARK(bunnyReads)->Name("query/bunny/reads");
 BENCHMARK(floatValue)->Name("query/float/value");
 BENCHMARK(floatGradient)->Name("query/float/gradient");
+BENCHMARK(floatHessian)->Name("query/float/hessian");
 BENCHMARK(floatBatched)->Name("query/float/batched");
 BENCHMARK(floatBatchedGradient)->Name("query/float/batched_gradient");
 BENCHMARK(floatReads)->Name("query/float/reads");
 BENCHMARK(blendedValue)->Name("query/blended/value");
 BENCHMARK(blendedGradient)->Name("query/blended/gradient");
+BENCHMARK(blendedHessian)->Name("query/blended/hessian");
 BENCHMARK(blendedBatched)->Name("query/blended/batched");
 BENCHMARK(blendedBatchedGradient)->Name("query/blended/batched_gradient");
 BENCHMARK(armadilloValue)->Name("query/armadillo/value");

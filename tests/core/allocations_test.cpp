@@ -31,6 +31,7 @@ TEST(Allocations, queriesMakeNone) {
   for (Vector3& x : points) x = {coordinate(random), coordinate(random), coordinate(random)};
   std::vector<double> values(points.size());
   std::vector<ValueAndGradient> both(points.size());
+  std::vector<ValueGradientHessian> all(points.size());
   const RangeIndex ranges(smooth);
   double sum = 0;
   EXPECT_EQ(allocationsOf([&] {
@@ -42,6 +43,7 @@ TEST(Allocations, queriesMakeNone) {
               for (const Field* f : {&field, &smooth}) {
                 f->values(points, values);
                 f->valuesAndGradients(points, both);
+                f->valuesGradientsHessians(points, all);
               }
               distance(points, values);
             }),

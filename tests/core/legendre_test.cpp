@@ -28,6 +28,19 @@ TEST(Legendre, derivativesMatchCentralDifferencesAndTheEnds) {
   for (int i = 0; i <= 30; ++i) EXPECT_DOUBLE_EQ(derivatives[i], i * (i + 1) / 2.0);  // L_i'(1)
 }
 
+TEST(Legendre, secondDerivativesSatisfyTheDifferentialEquation) {
+  double values[31], derivatives[31], second[31];
+  for (const double t : {-1.0, -0.9, -0.35, 0.0, 0.2, 0.8, 1.0}) {
+    basis::legendreValuesAndDerivatives(t, 30, values, derivatives);
+    basis::legendreSecondDerivatives(30, derivatives, second);
+    for (int i = 0; i <= 30; ++i)  // (1 − t²) L'' = 2t L' − i(i+1) L
+      EXPECT_NEAR((1 - t * t) * second[i], 2 * t * derivatives[i] - i * (i + 1) * values[i], 1e-11 * (1 + i * i)) << i;
+  }
+  for (int i = 0; i <= 30; ++i) EXPECT_DOUBLE_EQ(second[i], (i - 1.0) * i * (i + 1) * (i + 2) / 8);  // L_i''(1)
+  basis::legendreSecondDerivatives(0, derivatives, second);
+  EXPECT_EQ(second[0], 0);
+}
+
 TEST(GaussLegendre, integratesUpToItsDegreeAndNoFurther) {
   for (int n = 1; n <= 121; ++n) {
     const basis::QuadratureRule rule = basis::gaussLegendre(n);

@@ -51,12 +51,34 @@ class Field {
   double value(const Vector3& x) const;
   ValueAndGradient valueAndGradient(const Vector3& x) const;
 
+  /// Returns the value, the gradient and the Hessian at x. Value and gradient equal those of `valueAndGradient` to the
+  /// bit. The Hessian H is the second derivative of the very function that `value` evaluates:
+  /// * In a leaf with a polynomial, H_ab = s_a s_b Σ c_ijk ∂_a ∂_b (L_i L_j L_k), where s_a is 2 divided by the leaf's
+  ///   edge along axis a. A polynomial of degree 1 has the Hessian 0.
+  /// * In an exact leaf, H = P / d with the signed distance d to the nearest feature and the projection P onto the
+  ///   directions in which it curves. With the gradient n, P = 0 if the feature is a face, I − nnᵀ − eeᵀ if it is an
+  ///   edge in the direction e, as on a cylinder, and I − nnᵀ if it is a vertex, as on a sphere. H is unbounded near
+  ///   edges and vertices.
+  /// * In a blended zone, H has the derivatives of the weights too. With W = Σ wₙ and the mean f = Σ wₙ fₙ / W, it is
+  ///   (∇∇(Σ wₙ fₙ) − f ∇∇W − ∇f ∇Wᵀ − ∇W ∇fᵀ) / W.
+  /// * Outside the domain, only those second derivatives of the field at q remain whose two axes are not clamped. The
+  ///   distance r = |x − q| adds (C − nnᵀ) / r with n = (x − q) / r and the projection C onto the clamped axes.
+  ///
+  /// Where second derivatives do not exist, H is that of one side: at faces of leaves without blending, which have the
+  /// derivatives of the leaf that holds x; at the borders of blended zones; at the boundary of the domain, which has
+  /// those of the domain; and where the nearest feature changes. On the surface itself, H is 0 at edges and vertices of
+  /// exact leaves. At infinite points H has NaN.
+  ValueGradientHessian valueGradientHessian(const Vector3& x) const;
+
   /// Evaluates the field at many points. The results are those of single queries, but come several times faster. All
   /// spans must have the same length.
   void values(std::span<const Vector3> points, std::span<double> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<ValueAndGradient> out) const;
   void valuesAndGradients(std::span<const Vector3> points, std::span<double> values,
                           std::span<Vector3> gradients) const;
+
+  /// Evaluates the field with its second derivatives at many points, one by one. Both spans must have the same length.
+  void valuesGradientsHessians(std::span<const Vector3> points, std::span<ValueGradientHessian> out) const;
 
   /// Returns the leaf that holds x. For x outside the domain, returns the leaf that holds the domain's closest
   /// point to x.

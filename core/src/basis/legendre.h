@@ -20,6 +20,11 @@ constexpr auto kLegendreRatio = [] {
 
 #include "basis/legendre-inl.h"
 
+/// Computes second[i] = L_i''(t) for i = 0..degree from the first derivatives, by the derivative of their recurrence.
+inline void legendreSecondDerivatives(int degree, const double* derivatives, double* second) {
+  for (int i = 0; i <= degree; ++i) second[i] = i < 2 ? 0 : second[i - 2] + (2 * i - 1) * derivatives[i - 1];
+}
+
 /// Points and weights of a quadrature rule on [-1, 1].
 struct QuadratureRule {
   std::vector<double> points;

@@ -223,4 +223,12 @@ struct ValueAndGradient {
   Vector3 gradient;
 };
 
+/// A value with its first and second derivatives in world coordinates. The Hessian H_ab = ∂²f/∂x_a∂x_b is symmetric to
+/// the bit.
+struct ValueGradientHessian {
+  double value;
+  Vector3 gradient;
+  Eigen::Matrix3d hessian;
+};
+
 }  // namespace hpsdf

@@ -28,7 +28,8 @@ inline unsigned blendZoneAxes(const FieldData& field, const std::array<double, 3
 /// One of the three factors of a leaf's blending weight, each of which depends on the position along one axis.
 struct Ramp {
   double value;
-  double slope;  ///< derivative of the value with respect to the world coordinate
+  double slope;      ///< derivative of the value with respect to the world coordinate
+  double curvature;  ///< second derivative, which jumps where the ramp begins and ends
 };
 
 /// Evaluates the ramp S(t) = 1/2 + 3t/4 − t³/4, the gentlest step with a continuous slope from 0 at t = −1 to 1
@@ -38,12 +39,13 @@ inline Ramp rampAlong(const FieldData& field, const LookupGrid& lookupGrid, cons
   const GridFrame& frame = lookupGrid.frame;
   const bool upper = leaf.local[axis] > 0;
   const int depth = blend_extent::depth(lookupGrid.blendExtents[leaf.blendExtentsIndex], axis, upper);
-  if (depth == blend_extent::kDomainFace) return {1, 0};
+  if (depth == blend_extent::kDomainFace) return {1, 0, 0};
   // The factor 2^(depth − leaf.depth) / (2 · blend) converts local coordinates to half widths of the blend zone.
   const double scale = std::bit_cast<double>(std::uint64_t(1022 + depth - leaf.depth) << 52) / field.blend;
   const double t = std::clamp((1 - std::abs(leaf.local[axis])) * scale, -1.0, 1.0);
   const double toWorld = 2.0 * (std::uint32_t{1} << leaf.depth) * frame.cells[axis] / frame.size[axis];
-  return {0.5 + t * (0.75 - 0.25 * t * t), (upper ? -0.75 : 0.75) * (1 - t * t) * scale * toWorld};
+  const double curvature = std::abs(t) < 1 ? -1.5 * t * (scale * toWorld) * (scale * toWorld) : 0;
+  return {0.5 + t * (0.75 - 0.25 * t * t), (upper ? -0.75 : 0.75) * (1 - t * t) * scale * toWorld, curvature};
 }
 
 /// Returns the fixed-point coordinate just across the lower or upper face of a cell. If the domain ends at that
@@ -69,6 +71,20 @@ inline ValueAndGradient blendTwo(const ValueAndGradient& a, const Ramp& rampA, c
   const double sum = rampA.value + rampB.value, share = rampB.value / sum, difference = b.value - a.value;
   ValueAndGradient result{a.value + share * difference, a.gradient + share * (b.gradient - a.gradient)};
   result.gradient[axis] += difference * (rampB.slope * rampA.value - rampB.value * rampA.slope) / (sum * sum);
+  return result;
+}
+
+inline ValueGradientHessian blendTwo(const ValueGradientHessian& a, const Ramp& rampA, const ValueGradientHessian& b,
+                                     const Ramp& rampB, int axis) {
+  ValueGradientHessian result;
+  setFirstDerivatives(result, blendTwo(firstDerivatives(a), rampA, firstDerivatives(b), rampB, axis));
+  const double sum = rampA.value + rampB.value, share = rampB.value / sum, difference = b.value - a.value;
+  const double shareSlope = (rampB.slope * rampA.value - rampB.value * rampA.slope) / (sum * sum);
+  const double shareCurvature = (rampB.curvature * rampA.value - rampB.value * rampA.curvature) / (sum * sum) -
+                                2 * shareSlope * (rampA.slope + rampB.slope) / sum;
+  result.hessian = a.hessian + share * (b.hessian - a.hessian) +
+                   symmetricProduct(shareSlope * Vector3::Unit(axis), b.gradient - a.gradient);
+  result.hessian(axis, axis) += difference * shareCurvature;
   return result;
 }
 
@@ -198,7 +214,7 @@ class PartitionOfUnity<ValueAndGradient> {
     if (weights_ == 0) first_ = f;
     const auto& [x, y, z] = ramps;
     const double weight = x.value * y.value * z.value;
-    const Vector3 slope(x.slope * y.value * z.value, x.value * y.slope * z.value, x.value * y.value * z.slope);
+    const Vector3 slope = slopeOf(ramps);
     const double difference = f.value - first_.value;
     weights_ += weight;
     sum_ += weight * difference;
@@ -210,14 +226,60 @@ class PartitionOfUnity<ValueAndGradient> {
     return {first_.value + mean, first_.gradient + (sumGradient_ - mean * weightsGradient_) / weights_};
   }
 
- private:
+ protected:
+  /// Returns the gradient of a weight.
+  static Vector3 slopeOf(const std::array<Ramp, 3>& ramps) {
+    const auto& [x, y, z] = ramps;
+    return {x.slope * y.value * z.value, x.value * y.slope * z.value, x.value * y.value * z.slope};
+  }
+
   ValueAndGradient first_{0, Vector3::Zero()};
   double weights_ = 0, sum_ = 0;
   Vector3 weightsGradient_ = Vector3::Zero(), sumGradient_ = Vector3::Zero();
 };
 
-/// Evaluates one leaf at the point with the grid coordinates `gridCoordinates`, without blending. `Result` is double or
-/// `ValueAndGradient`.
+template <>
+class PartitionOfUnity<ValueGradientHessian> : private PartitionOfUnity<ValueAndGradient> {
+ public:
+  void add(const std::array<Ramp, 3>& ramps, const ValueGradientHessian& f) {
+    if (weights_ == 0) firstHessian_ = f.hessian;
+    PartitionOfUnity<ValueAndGradient>::add(ramps, firstDerivatives(f));
+    const double weight = ramps[0].value * ramps[1].value * ramps[2].value;
+    const Eigen::Matrix3d curvature = curvatureOf(ramps);
+    weightsHessian_ += curvature;
+    sumHessian_ += curvature * (f.value - first_.value) +
+                   symmetricProduct(slopeOf(ramps), f.gradient - first_.gradient) +
+                   weight * (f.hessian - firstHessian_);
+  }
+  ValueGradientHessian result() const {
+    ValueGradientHessian result;
+    setFirstDerivatives(result, PartitionOfUnity<ValueAndGradient>::result());
+    const double mean = sum_ / weights_;
+    const Vector3 meanGradient = (sumGradient_ - mean * weightsGradient_) / weights_;
+    result.hessian =
+        firstHessian_ +
+        (sumHessian_ - mean * weightsHessian_ - symmetricProduct(meanGradient, weightsGradient_)) / weights_;
+    return result;
+  }
+
+ private:
+  /// Returns the Hessian of a weight.
+  static Eigen::Matrix3d curvatureOf(const std::array<Ramp, 3>& ramps) {
+    Eigen::Matrix3d curvature;
+    for (int a = 0; a < 3; ++a) {
+      const Ramp &along = ramps[a], &next = ramps[(a + 1) % 3], &last = ramps[(a + 2) % 3];
+      curvature(a, a) = along.curvature * next.value * last.value;
+      curvature(a, (a + 1) % 3) = curvature((a + 1) % 3, a) = along.slope * next.slope * last.value;
+    }
+    return curvature;
+  }
+
+  Eigen::Matrix3d firstHessian_ = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d weightsHessian_ = Eigen::Matrix3d::Zero(), sumHessian_ = Eigen::Matrix3d::Zero();
+};
+
+/// Evaluates one leaf at the point with the grid coordinates `gridCoordinates`, without blending. `Result` is double,
+/// `ValueAndGradient` or `ValueGradientHessian`, here and below.
 template <typename Result>
 Result evaluateLeaf(const FieldData& field, const GridFrame& frame, const std::array<double, 3>& gridCoordinates,
                     const LeafPoint& leaf) {

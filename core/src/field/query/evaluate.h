@@ -219,8 +219,24 @@ inline void toWorldUnits(const GridFrame& frame, const LeafPoint& leaf, Vector3&
   for (int axis = 0; axis < 3; ++axis) gradient[axis] *= scale * frame.cells[axis] / frame.size[axis];
 }
 
-/// Evaluates the polynomial of a leaf, which is not exact, at a point. The overload for `ValueAndGradient` gives the
-/// gradient in world units. There are more overloads for quantized coefficients (quantized.h).
+/// Scales a Hessian in the same way.
+inline void toWorldUnits(const GridFrame& frame, const LeafPoint& leaf, Eigen::Matrix3d& hessian) {
+  Vector3 scale = Vector3::Ones();
+  toWorldUnits(frame, leaf, scale);
+  hessian.array() *= (scale * scale.transpose()).array();
+}
+
+/// Returns u vᵀ + v uᵀ, which is symmetric to the bit.
+inline Eigen::Matrix3d symmetricProduct(const Vector3& u, const Vector3& v) {
+  return u * v.transpose() + v * u.transpose();
+}
+
+/// Returns the Hessian of a polynomial with respect to the local coordinates.
+template <typename T>
+Eigen::Matrix3d polynomialHessian(const T* coefficients, int degree, const std::array<double, 3>& local);
+
+/// Evaluates the polynomial of a leaf, which is not exact, at a point. The overloads with derivatives give them in
+/// world units. There are more overloads for quantized coefficients (quantized.h).
 template <typename T>
 void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
   value = evaluate(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
@@ -231,6 +247,17 @@ void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame& frame, co
                   ValueAndGradient& result) {
   result = evaluateWithGradient(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
   toWorldUnits(frame, leaf, result.gradient);
+}
+
+template <typename T>
+void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame& frame, const LeafPoint& leaf,
+                  ValueGradientHessian& result) {
+  ValueAndGradient first;
+  evaluateLeaf(coefficients, frame, leaf, first);
+  setFirstDerivatives(result, first);
+  result.hessian =
+      polynomialHessian(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  toWorldUnits(frame, leaf, result.hessian);
 }
 
 /// Returns true if x lies in the domain, and false if x contains NaN. A single combined condition is faster
@@ -265,6 +292,18 @@ inline void continueOutside(const Vector3& offset, ValueAndGradient& result) {
   for (int axis = 0; axis < 3; ++axis)
     if (offset[axis] != 0) result.gradient[axis] = 0;  // the closest point does not depend on a clamped coordinate
   result.gradient += offset / distance;
+}
+
+inline void continueOutside(const Vector3& offset, ValueGradientHessian& result) {
+  ValueAndGradient first = firstDerivatives(result);
+  continueOutside(offset, first);
+  setFirstDerivatives(result, first);
+  const double distance = length(offset);
+  const Vector3 direction = offset / distance;
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b)
+      if (offset[a] != 0 || offset[b] != 0)
+        result.hessian(a, b) = ((a == b ? 1 : 0) - direction[a] * direction[b]) / distance;
 }
 
 /// Makes the lookup grid of a field, an array of the octree nodes of one depth. Chooses the greatest depth at which the

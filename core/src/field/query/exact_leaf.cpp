@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <limits>
 #include <span>
-#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -132,14 +131,8 @@ class OctantTriangles {
   /// Returns the pseudonormal of the nearest feature, not normalized.
   Vector3 pseudonormal(const NearestFeature& feature) const {
     if (feature.corners == 3) return feature.normal;
-    const auto vertex = [&](std::uint32_t index) { return Vector3(vertices_[index].template cast<double>()); };
     Vector3 sum = Vector3::Zero();
-    forEachTriangle(exact_, leaf_, [&](std::uint32_t triangle) {
-      const auto& corners = exact_.triangles[triangle];
-      int at = -1;
-      for (int k = 0; k < 3; ++k)
-        if (corners[k] == feature.vertex[0]) at = k;
-      if (at < 0) return;
+    forEachTriangleAt(feature, [&](const std::array<std::uint32_t, 3>& corners, int at) {
       const Vector3 origin = vertex(corners[at]);
       const Vector3 next = vertex(corners[(at + 1) % 3]) - origin, previous = vertex(corners[(at + 2) % 3]) - origin;
       const Vector3 normal = next.cross(previous);
@@ -147,10 +140,35 @@ class OctantTriangles {
       if (!(length > 0)) return;
       if (feature.corners == 1)
         sum += std::atan2(length, next.dot(previous)) / length * normal;
-      else if (corners[(at + 1) % 3] == feature.vertex[1] || corners[(at + 2) % 3] == feature.vertex[1])
+      else
         sum += normal / length;
     });
     return sum;
+  }
+
+  /// Returns the Hessian of the distance, without a sign, at a point whose nearest feature is given; 0 at the feature.
+  ///
+  /// In general the derivative of the closest point is the projection onto the directions of the triangles at the
+  /// feature that are perpendicular to the difference, and the distance curves in the other directions only. At an edge
+  /// this is the edge's own direction and at a vertex there is none, unless the difference is also perpendicular to a
+  /// triangle or to another edge: an edge between two coplanar triangles, or a vertex within an edge, does not curve.
+  Eigen::Matrix3d hessian(const NearestFeature& feature) const {
+    if (feature.corners == 3 || !(feature.squared > 0)) return Eigen::Matrix3d::Zero();
+    const Vector3 normal = feature.difference.normalized();
+    Eigen::Matrix3d curved = Eigen::Matrix3d::Identity() - normal * normal.transpose();
+    const auto flatten = [&](const Vector3& direction) {
+      const Vector3 rest = curved * direction;
+      if (rest.norm() > kParallel * direction.norm()) curved -= rest * rest.transpose() / rest.squaredNorm();
+    };
+    const Vector3 origin = vertex(feature.vertex[0]);
+    if (feature.corners == 2) flatten(vertex(feature.vertex[1]) - origin);
+    forEachTriangleAt(feature, [&](const std::array<std::uint32_t, 3>& corners, int at) {
+      for (const int other : {1, 2}) {
+        const Vector3 side = vertex(corners[(at + other) % 3]) - origin;
+        if (std::abs(side.dot(normal)) <= kPerpendicular * side.norm()) flatten(side);
+      }
+    });
+    return curved / std::sqrt(feature.squared);
   }
 
   /// Returns 1 if the signed distance grows at a point along the normal of its nearest face, and -1 if it falls. `sign`
@@ -173,7 +191,25 @@ class OctantTriangles {
   double offset() const { return exact_.offset; }
 
  private:
-  static constexpr std::uint32_t kFew = 3;  ///< so few triangles are tried without bounds
+  static constexpr std::uint32_t kFew = 3;        ///< so few triangles are tried without bounds
+  static constexpr double kPerpendicular = 1e-9;  ///< cosine up to which rounding may hide that two directions are
+  static constexpr double kParallel = 1e-5;       ///< sine up to which two directions count as one
+
+  Vector3 vertex(std::uint32_t index) const { return vertices_[index].template cast<double>(); }
+
+  /// Calls f(corners, at) for each triangle of the list that has the given edge or vertex. The feature's first vertex
+  /// is the corner number `at`.
+  template <typename F>
+  void forEachTriangleAt(const NearestFeature& feature, const F& f) const {
+    forEachTriangle(exact_, leaf_, [&](std::uint32_t triangle) {
+      const auto& corners = exact_.triangles[triangle];
+      int at = -1;
+      for (int k = 0; k < 3; ++k)
+        if (corners[k] == feature.vertex[0]) at = k;
+      const auto isCorner = [&](std::uint32_t vertex) { return std::ranges::find(corners, vertex) != corners.end(); };
+      if (at >= 0 && (feature.corners == 1 || isCorner(feature.vertex[1]))) f(corners, at);
+    });
+  }
 
   CornerSource<V> source(const Vector3& origin) const { return {exact_.triangles, vertices_, origin}; }
 
@@ -231,6 +267,23 @@ ValueAndGradient signedDistance(const OctantTriangles<V>& triangles, const Vecto
   return result;
 }
 
+template <typename V>
+void setResult(const OctantTriangles<V>& triangles, const Vector3& x, const NearestFeature& nearest, double& result) {
+  result = signedDistance(triangles, x, nearest, false).value;
+}
+template <typename V>
+void setResult(const OctantTriangles<V>& triangles, const Vector3& x, const NearestFeature& nearest,
+               ValueAndGradient& result) {
+  result = signedDistance(triangles, x, nearest, true);
+}
+template <typename V>
+void setResult(const OctantTriangles<V>& triangles, const Vector3& x, const NearestFeature& nearest,
+               ValueGradientHessian& result) {
+  setFirstDerivatives(result, signedDistance(triangles, x, nearest, true));
+  const bool isNegative = result.gradient.dot(nearest.difference) < 0;
+  result.hessian = (isNegative ? -1 : 1) * triangles.hessian(nearest);
+}
+
 template <typename Result>
 void evaluateAll(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
                  Result* out) {
@@ -238,10 +291,7 @@ void evaluateAll(const ExactTriangles& exact, std::uint64_t leaf, int octant, st
       [&](const auto& vertices) {
         const OctantTriangles triangles(exact, vertices, leaf, octant);
         triangles.forEachNearest(points, [&](std::size_t i, const NearestFeature& nearest) {
-          if constexpr (std::is_same_v<Result, double>)
-            out[i] = signedDistance(triangles, points[i], nearest, false).value;
-          else
-            out[i] = signedDistance(triangles, points[i], nearest, true);
+          setResult(triangles, points[i], nearest, out[i]);
         });
       },
       exact.vertices);
@@ -256,6 +306,11 @@ void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, 
 
 void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
                    ValueAndGradient* out) {
+  evaluateAll(exact, leaf, octant, points, out);
+}
+
+void evaluateExact(const ExactTriangles& exact, std::uint64_t leaf, int octant, std::span<const Vector3> points,
+                   ValueGradientHessian* out) {
   evaluateAll(exact, leaf, octant, points, out);
 }
 

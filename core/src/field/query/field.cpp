@@ -256,6 +256,11 @@ ValueAndGradient Field::valueAndGradient(const Vector3& x) const {
   return evaluateAt<ValueAndGradient>(data_, lookupGrid_, x);
 }
 
+ValueGradientHessian Field::valueGradientHessian(const Vector3& x) const {
+  assertNotMovedFrom(data_);
+  return evaluateAt<ValueGradientHessian>(data_, lookupGrid_, x);
+}
+
 void Field::values(std::span<const Vector3> points, std::span<double> out) const {
   assert(points.size() == out.size());
   assertNotMovedFrom(data_);
@@ -280,6 +285,11 @@ void Field::valuesAndGradients(std::span<const Vector3> points, std::span<double
       gradients[first + i] = piece[i].gradient;
     }
   }
+}
+
+void Field::valuesGradientsHessians(std::span<const Vector3> points, std::span<ValueGradientHessian> out) const {
+  assert(points.size() == out.size());
+  std::ranges::transform(points, out.begin(), [&](const Vector3& x) { return valueGradientHessian(x); });
 }
 
 Cell Field::cellAt(const Vector3& x) const {

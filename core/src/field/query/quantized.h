@@ -63,6 +63,8 @@ void evaluateLeaf(const QuantizedCoefficients& coefficients, const GridFrame& fr
                   double& value);
 void evaluateLeaf(const QuantizedCoefficients& coefficients, const GridFrame& frame, const LeafPoint& leaf,
                   ValueAndGradient& result);
+void evaluateLeaf(const QuantizedCoefficients& coefficients, const GridFrame& frame, const LeafPoint& leaf,
+                  ValueGradientHessian& result);
 
 /// Returns the number of bytes that a leaf takes; 0 if it does not lie within the array, or is not well formed.
 std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::uint64_t leaf);
