@@ -33,7 +33,7 @@ Box domainFrom(const py::object& box, double margin, const Box& surface) {
   const Points corners(box, "box");
   if (corners.shape() != Shape{2})
     throw py::value_error("box: expected two corners of three numbers, got an array of shape " +
-                          shapeText(corners.shape(3)));
+                          shapeText(corners.shape({3})));
   return Box(corners.all()[0], corners.all()[1]);
 }
 

@@ -46,7 +46,7 @@ py::object& closestPointsClass() {
 
 py::object closest(const ExactDistance& distance, const py::object& argument) {
   const Points points(argument);
-  Doubles signedDistance(points.shape()), point(points.shape(3)), barycentric(points.shape(3));
+  Doubles signedDistance(points.shape()), point(points.shape({3})), barycentric(points.shape({3}));
   py::array_t<std::int64_t> face(points.shape());
   auto* const distanceOut = signedDistance.mutable_data();
   auto* const pointOut = reinterpret_cast<Vector3*>(point.mutable_data());

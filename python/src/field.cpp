@@ -3,6 +3,8 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
+#include <array>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -17,7 +19,8 @@ using namespace py::literals;
 namespace hpsdf::python {
 namespace {
 
-constexpr std::size_t kQueries = 1 << 20;  // points between two looks for signals: some tenths of a second
+constexpr std::size_t kValues = 1 << 20;      // points between two looks for signals: some tenths of a second
+constexpr std::size_t kPieceBytes = 4 << 20;  // bytes of the values with derivatives that are held at a time
 
 /// A row of the array that `Field.cells` returns.
 struct CellRow {
@@ -32,35 +35,75 @@ py::object values(const Field& field, const py::object& argument, const py::obje
     if (points.size() == 1)
       numbers[0] = field.value(points[0]);  // handing over the GIL would take longer
     else
-      forEachPiece(points.size(), kQueries, [&](std::size_t first, std::size_t count) {
+      forEachPiece(points.size(), kValues, [&](std::size_t first, std::size_t count) {
         field.values(points.subspan(first, count), numbers.subspan(first, count));
       });
   });
 }
 
-/// Returns the two arrays of `out`, a tuple of values and gradients, or two times None if it is None.
-std::pair<py::object, py::object> twoArrays(const py::object& out) {
-  if (out.is_none()) return {py::none(), py::none()};
-  if (!py::isinstance<py::sequence>(out) || py::isinstance<py::array>(out) || py::len(out) != 2)
-    throw py::type_error("out: expected two arrays, one for the values and one for the gradients");
-  const auto both = py::reinterpret_borrow<py::sequence>(out);
-  return {both[0], both[1]};
+/// The shapes of the parts of a result at one point: the value, its gradient and its Hessian.
+const std::array<Shape, 3> kPartShapes = {Shape{}, Shape{3}, Shape{3, 3}};
+
+void evaluate(const Field& field, std::span<const Vector3> points, std::span<ValueAndGradient> out) {
+  field.valuesAndGradients(points, out);
+}
+void evaluate(const Field& field, std::span<const Vector3> points, std::span<ValueGradientHessian> out) {
+  field.valuesGradientsHessians(points, out);
 }
 
-py::object valuesAndGradients(const Field& field, const py::object& argument, const py::object& out) {
+/// Copies the parts of the result at point i to arrays.
+void copyParts(const ValueAndGradient& result, std::size_t i, std::span<double* const> arrays) {
+  arrays[0][i] = result.value;
+  Eigen::Map<Vector3>(arrays[1] + 3 * i) = result.gradient;
+}
+void copyParts(const ValueGradientHessian& result, std::size_t i, std::span<double* const> arrays) {
+  copyParts(ValueAndGradient{result.value, result.gradient}, i, arrays);
+  Eigen::Map<Eigen::Matrix3d>(arrays[2] + 9 * i) = result.hessian;  // symmetric, so that rows are columns
+}
+
+/// Returns an array for each of the first `parts` parts of results: those of the tuple `out`, or new ones if it is
+/// None. `expected` tells a caller which ones the tuple should have.
+std::vector<Doubles> partArrays(const py::object& out, std::size_t parts, const char* expected, const Points& points) {
+  if (!out.is_none() && (!py::isinstance<py::sequence>(out) || py::isinstance<py::array>(out) || py::len(out) != parts))
+    throw py::type_error(std::string("out: expected ") + expected);
+  std::vector<Doubles> arrays;
+  for (std::size_t part = 0; part < parts; ++part) {
+    const py::object given = out.is_none() ? py::none() : py::object(py::reinterpret_borrow<py::sequence>(out)[part]);
+    arrays.push_back(
+        resultArray(given, points.shape(kPartShapes[part]), ("out[" + std::to_string(part) + "]").c_str()));
+  }
+  return arrays;
+}
+
+/// Evaluates a field with derivatives. Returns a tuple of the arrays that `partArrays` describes.
+template <typename Result>
+py::tuple withDerivatives(const Field& field, const py::object& argument, const py::object& out, std::size_t parts,
+                          const char* expected) {
   Points points(argument);
-  const auto [valueOut, gradientOut] = twoArrays(out);
-  Doubles value = resultArray(valueOut, points.shape(), "out[0]");
-  Doubles gradient = resultArray(gradientOut, points.shape(3), "out[1]");
-  points.keepApartFrom(value);
-  points.keepApartFrom(gradient);
-  const std::span values(value.mutable_data(), points.count());
-  const std::span gradients(reinterpret_cast<Vector3*>(gradient.mutable_data()), points.count());
-  forEachPiece(points.count(), kQueries, [&](std::size_t first, std::size_t count) {
-    field.valuesAndGradients(points.all().subspan(first, count), values.subspan(first, count),
-                             gradients.subspan(first, count));
+  std::vector<Doubles> arrays = partArrays(out, parts, expected, points);
+  for (const Doubles& array : arrays) points.keepApartFrom(array);
+  std::vector<double*> numbers;
+  for (Doubles& array : arrays) numbers.push_back(array.mutable_data());
+  constexpr std::size_t kAtOnce = kPieceBytes / sizeof(Result);
+  std::vector<Result> piece(std::min(kAtOnce, points.count()));
+  forEachPiece(points.count(), kAtOnce, [&](std::size_t first, std::size_t count) {
+    evaluate(field, points.all().subspan(first, count), std::span(piece).first(count));
+    for (std::size_t i = 0; i < count; ++i) copyParts(piece[i], first + i, numbers);
   });
-  return py::make_tuple(valueOut.is_none() ? unwrapped(value) : valueOut, gradient);
+  py::tuple result(parts);
+  for (std::size_t part = 0; part < parts; ++part) result[part] = arrays[part];
+  if (out.is_none()) result[0] = unwrapped(arrays[0]);
+  return result;
+}
+
+py::tuple valuesAndGradients(const Field& field, const py::object& points, const py::object& out) {
+  return withDerivatives<ValueAndGradient>(field, points, out, 2,
+                                           "two arrays, one for the values and one for the gradients");
+}
+
+py::tuple valuesGradientsHessians(const Field& field, const py::object& points, const py::object& out) {
+  return withDerivatives<ValueGradientHessian>(field, points, out, 3,
+                                               "three arrays, one each for the values, the gradients and the Hessians");
 }
 
 py::array cells(const Field& field) {
@@ -132,6 +175,13 @@ FieldClass addField(py::module_& module) {
       .def("value_and_gradient", &valuesAndGradients, "points"_a, "out"_a = py::none(),
            "Returns the values at points, shape (..., 3), and their gradients: two arrays of the shapes (...) and "
            "(..., 3). out: two arrays for them, as of `__call__`.")
+      .def(
+          "value_gradient_hessian", &valuesGradientsHessians, "points"_a, "out"_a = py::none(),
+          "Returns the values at points, shape (..., 3), their gradients and their Hessians, the symmetric matrices of "
+          "second derivatives: three arrays of the shapes (...), (..., 3) and (..., 3, 3). Values and gradients are "
+          "those of value_and_gradient. At faces of cells and wherever else the second derivatives jump, the Hessian "
+          "is "
+          "that of one side. out: three arrays for them, as of `__call__`.")
       .def("save", &saved, "path"_a, py::kw_only(), "compress"_a = false,
            "Writes the field as a .hpsdf file, whole or not at all; with compress=True smaller and more slowly. Raises "
            "FileError (an OSError).")

@@ -20,7 +20,7 @@ using WholeNumbers = py::array_t<std::int64_t, py::array::c_style | py::array::f
 std::vector<Vector3> verticesOf(const py::handle& argument) {
   const Points points(argument, "vertices");
   if (points.shape().size() != 1)
-    throw py::value_error("vertices: expected an array of shape (n, 3), got " + shapeText(points.shape(3)));
+    throw py::value_error("vertices: expected an array of shape (n, 3), got " + shapeText(points.shape({3})));
   for (std::size_t i = 0; i < points.count(); ++i)
     if (!points.all()[i].allFinite())
       throw Error(ErrorKind::mesh, "vertices", "row " + std::to_string(i) + " is not finite");

@@ -16,6 +16,11 @@ def test_any_leading_shape(field, points):
     assert value.shape == (5, 100) and gradient.shape == (5, 100, 3)
     value, gradient = field.value_and_gradient(points[0])
     assert isinstance(value, float) and gradient.shape == (3,)
+    value, gradient, hessian = field.value_gradient_hessian(points.reshape(5, 100, 3))
+    assert value.shape == (5, 100) and gradient.shape == (5, 100, 3) and hessian.shape == (5, 100, 3, 3)
+    value, gradient, hessian = field.value_gradient_hessian(points[0])
+    assert isinstance(value, float) and gradient.shape == (3,) and hessian.shape == (3, 3)
+    assert field.value_gradient_hessian(numpy.empty((4, 0, 3)))[2].shape == (4, 0, 3, 3)
 
 
 def test_other_numbers_are_converted(field, points):
@@ -43,14 +48,14 @@ def test_strides_do_not_matter(field, exact, points):
 
 @pytest.mark.parametrize("shape", [(), (0,), (2,), (3, 2), (3, 4), (3, 1)])
 def test_other_shapes_are_refused(field, exact, shape):
-    for query in (field, field.value_and_gradient, exact, exact.closest):
+    for query in (field, field.value_and_gradient, field.value_gradient_hessian, exact, exact.closest):
         with pytest.raises(ValueError, match=r"points: expected an array of shape \(\.\.\., 3\), got \("):
             query(numpy.zeros(shape))
 
 
 @pytest.mark.parametrize("wrong", ["abc", None, {}, [[1j, 0, 0]], numpy.array([["a", "b", "c"]]), [True, False, True]])
 def test_other_types_are_refused(field, exact, wrong):
-    for query in (field, field.value_and_gradient, exact, exact.closest):
+    for query in (field, field.value_and_gradient, field.value_gradient_hessian, exact, exact.closest):
         with pytest.raises(TypeError, match="points: expected an array of real numbers"):
             query(wrong)
 
@@ -65,6 +70,7 @@ def test_points_that_are_not_finite(field, exact):
     assert not numpy.isfinite(field(wild[:2])).any()
     assert not numpy.isfinite(exact(wild[:2])).any()
     field.value_and_gradient(wild)
+    field.value_gradient_hessian(wild)
     exact.closest(wild)
 
 
@@ -77,6 +83,10 @@ def test_results_in_given_arrays(field, exact, points):
     results = field.value_and_gradient(points, out=(out, gradient))
     assert results[0] is out and results[1] is gradient
     assert numpy.array_equal(out, expected) and numpy.array_equal(gradient, expected_gradient)
+    hessian = numpy.full((500, 3, 3), 7.0)
+    results = field.value_gradient_hessian(points, out=[out, gradient, hessian])
+    assert results[0] is out and results[1] is gradient and results[2] is hessian
+    assert numpy.array_equal(hessian, field.value_gradient_hessian(points)[2])
     rows = numpy.zeros((2, 500))
     field(points, out=rows[1])
     assert numpy.array_equal(rows[1], expected) and not rows[0].any()
@@ -87,6 +97,11 @@ def test_results_may_overwrite_points(field, points):
     both = points.copy()
     field.value_and_gradient(both, out=(numpy.empty(500), both))
     assert numpy.array_equal(both, expected_gradient)
+    both = numpy.zeros((500, 3, 3))
+    both.reshape(-1, 3)[:500] = points
+    expected_hessian = field.value_gradient_hessian(points)[2]
+    field.value_gradient_hessian(both.reshape(-1, 3)[:500], out=(numpy.empty(500), numpy.empty((500, 3)), both))
+    assert numpy.array_equal(both, expected_hessian)
     both = points.copy()
     field(both, out=both.reshape(-1)[:500])
     assert numpy.array_equal(both.reshape(-1)[:500], expected)
@@ -112,6 +127,10 @@ def test_wrong_arrays_for_results_are_refused(field, exact, points):
         field.value_and_gradient(points, out=numpy.empty(500))
     with pytest.raises(ValueError, match=r"out\[1\]: expected .* \(500, 3\), got \(3, 500\)"):
         field.value_and_gradient(points, out=(numpy.empty(500), numpy.empty((3, 500))))
+    with pytest.raises(TypeError, match="out: expected three arrays"):
+        field.value_gradient_hessian(points, out=(numpy.empty(500), numpy.empty((500, 3))))
+    with pytest.raises(ValueError, match=r"out\[2\]: expected .* \(500, 3, 3\), got \(500, 9\)"):
+        field.value_gradient_hessian(points, out=(numpy.empty(500), numpy.empty((500, 3)), numpy.empty((500, 9))))
 
 
 def test_large_queries_equal_small_ones(field, exact):
@@ -121,6 +140,10 @@ def test_large_queries_equal_small_ones(field, exact):
     value, gradient = field.value_and_gradient(many)
     expected = field.value_and_gradient(many[some])
     assert numpy.array_equal(value[some], expected[0]) and numpy.array_equal(gradient[some], expected[1])
+    some = slice(40_000, 41_000)
+    assert numpy.array_equal(
+        field.value_gradient_hessian(many[:100_000])[2][some], field.value_gradient_hessian(many[some])[2]
+    )
     part = many[:150_000]
     assert numpy.array_equal(exact(part)[-40_000:], exact(part[-40_000:]))
     assert numpy.array_equal(exact.closest(part).point[-40_000:], exact.closest(part[-40_000:]).point)

@@ -18,6 +18,20 @@ def test_values_and_gradients_equal_those_of_the_program(field, points, query, t
         assert numpy.array_equal(gradient[:, axis], columns["g" + "xyz"[axis]].astype(float))
 
 
+def test_hessians_are_the_differences_of_gradients(mesh, field, points):
+    blended = hpsdf.build(mesh, target_error=1e-4, continuity="exact")
+    for each in (field, blended):
+        value, gradient, hessian = each.value_gradient_hessian(points)
+        assert numpy.array_equal(value, each(points)) and numpy.array_equal(gradient, each.value_and_gradient(points)[1])
+        assert numpy.array_equal(hessian, hessian.transpose(0, 2, 1))
+        step = 1e-6
+        for axis, move in enumerate(step * numpy.eye(3)):
+            above, below = (each.value_and_gradient(points + m)[1] for m in (move, -move))
+            error = numpy.linalg.norm((above - below) / (2 * step) - hessian[:, :, axis], axis=1)
+            scale = 1 + numpy.linalg.norm(hessian, axis=(1, 2))
+            assert numpy.quantile(error / scale, 0.99) < 1e-6  # a face of a cell may come between
+
+
 def test_files(field, points, tmp_path):
     file = tmp_path / "torus.hpsdf"
     field.save(file)

@@ -55,10 +55,10 @@ Points::Points(const py::handle& argument, const char* name) : numbers_(numbersO
 
 std::span<const Vector3> Points::all() const { return {reinterpret_cast<const Vector3*>(numbers_.data()), count()}; }
 
-Shape Points::shape(py::ssize_t more) const {
+Shape Points::shape(const Shape& each) const {
   Shape shape = shapeOf(numbers_);
   shape.pop_back();
-  if (more > 0) shape.push_back(more);
+  shape.insert(shape.end(), each.begin(), each.end());
   return shape;
 }
 

@@ -36,8 +36,8 @@ class Points {
   std::span<const Vector3> all() const;
   std::size_t count() const { return static_cast<std::size_t>(numbers_.size()) / 3; }
 
-  /// Returns the shape of an array with one number for each point, or with `more` numbers for each.
-  Shape shape(pybind11::ssize_t more = 0) const;
+  /// Returns the shape of an array with one number for each point, or with an array of the shape `each` for each.
+  Shape shape(const Shape& each = {}) const;
 
   /// Copies the points if `out` shares memory with them, because results would overwrite points still to be read.
   void keepApartFrom(const Doubles& out);
