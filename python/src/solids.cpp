@@ -74,7 +74,7 @@ std::shared_ptr<CombinedDistance> combined(const std::string& text, const std::s
       resultOf(progress, [&](const Progress& link) { return CombinedDistance(whole, options, link); }));
 }
 
-py::object distances(const CombinedDistance& distance, const py::object& argument, const py::object& out) {
+py::object combinedDistances(const CombinedDistance& distance, const py::object& argument, const py::object& out) {
   return numberForEach(argument, out, [&](std::span<const Vector3> points, std::span<double> numbers) {
     forEachPiece(points.size(), kPoints, [&](std::size_t first, std::size_t count) {
       distance(points.subspan(first, count), numbers.subspan(first, count));
@@ -101,7 +101,7 @@ void addSolids(py::module_& module) {
       module, "CombinedDistance",
       "The signed distance of an expression of solids, which `combine` makes and of which `build` makes a field.\n\n"
       "Several threads may use one at the same time.")
-      .def("__call__", &distances, "points"_a, "out"_a = py::none(),
+      .def("__call__", &combinedDistances, "points"_a, "out"_a = py::none(),
            "Returns the signed distances of points, shape (..., 3), as an array of shape (...), or as a float for one "
            "point of shape (3,). out: as of ExactDistance.")
       .def_property_readonly(

@@ -70,7 +70,7 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
   }
 }
 
-render::Image drawSlice(Session& session, const Arguments& arguments) {
+render::Image slicedImage(Session& session, const Arguments& arguments) {
   render::SlicePicture picture = slicePicture(arguments);
   render::checkPictureSize(picture.width, picture.height, picture.samples);
   const Backend chosen = backend(arguments);
@@ -97,7 +97,7 @@ void runSlice(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   if (format == SliceFormat::png) {
-    savePng(drawSlice(session, arguments), file);
+    savePng(slicedImage(session, arguments), file);
   } else {
     useField(session, arguments);
     const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
@@ -119,7 +119,7 @@ void runSlice(Session& session, const Arguments& arguments) {
   reportPicture(session, arguments, file, picture.width, picture.height, session.lastRenderer());
 }
 
-render::Image drawSurface(Session& session, const Arguments& arguments) {
+render::Image renderedImage(Session& session, const Arguments& arguments) {
   render::SurfacePicture picture = surfacePicture(arguments);
   const Backend chosen = backend(arguments);
   useField(session, arguments);
@@ -138,7 +138,7 @@ void runRender(Session& session, const Arguments& arguments) {
   const render::SurfacePicture picture = surfacePicture(arguments);
   backend(arguments);  // throws `Error` before any work
   checkWritable(file);
-  savePng(drawSurface(session, arguments), file);
+  savePng(renderedImage(session, arguments), file);
   reportPicture(session, arguments, file, picture.width, picture.height, session.lastRenderer());
 }
 
@@ -260,7 +260,7 @@ cell is the word exact in a .csv and the number 31 in a .pfm.)"),
            kSizeSamplesArrows,
            backendParameters()}),
       .action = runSlice,
-      .draw = drawSlice,
+      .draw = slicedImage,
       .check = checkSlice,
   };
 }
@@ -293,7 +293,7 @@ Command renderCommand() {
            kSizeSamplesArrows,
            backendParameters()}),
       .action = runRender,
-      .draw = drawSurface,
+      .draw = renderedImage,
   };
 }
 
