@@ -85,7 +85,7 @@ Expression loadedOperand(const std::string& name, InsideTest insideTest, const P
   std::istringstream in;
   std::ostringstream out, err;
   ProgressListener listener(progress);
-  const Console console{.in = in, .out = out, .err = err, .listener = &listener};
+  const Console console{.in = in, .out = out, .err = err, .listener = &listener, .writesProgress = false};
   return withLoadedOperands(console, Expression::named(name), insideTest);
 }
 
@@ -93,7 +93,8 @@ struct Interpreter::State {
   std::istringstream in;
   std::ostringstream out, err;
   std::map<std::string, TriangleMesh, std::less<>> meshes;
-  Session session{commandRegistry(), Console{.in = in, .out = out, .err = err, .meshes = &meshes}};
+  Session session{commandRegistry(),
+                  Console{.in = in, .out = out, .err = err, .meshes = &meshes, .writesProgress = false}};
 
   std::string takeOutput() { return std::exchange(out, std::ostringstream{}).str(); }
 };
@@ -110,7 +111,10 @@ const Field* Interpreter::field() const {
 }
 
 void Interpreter::setMesh(const std::string& name, TriangleMesh mesh) {
+  const auto known = state_->meshes.find(name);
+  if (known != state_->meshes.end() && fingerprint(known->second) == fingerprint(mesh)) return;
   state_->meshes.insert_or_assign(name, std::move(mesh));
+  state_->session.forgetSurfaces();
 }
 
 std::string Interpreter::perform(std::string_view name, std::span<const Option> options, const Progress& progress) {

@@ -54,7 +54,7 @@ def mesh_html(mesh):
         ("volume, area", f"{report['volume']:.6g}, {report['area']:.6g}"),
         ("inside test", report["sign"]["by"]),
     ]
-    return _table(f"hpsdf.TriangleMesh {report['name']}".rstrip(), rows)
+    return _table(f"hpsdf.TriangleMesh {getattr(mesh, 'name', '')}".rstrip(), rows)
 
 
 def _picture(session):

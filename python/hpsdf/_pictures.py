@@ -3,8 +3,10 @@
 import json as _json
 import os
 import re
+import shutil
 import sys
 import tempfile
+import weakref
 
 import numpy as np
 
@@ -18,13 +20,19 @@ class Picture(np.ndarray):
     """
 
     def save(self, path):
-        """Writes the picture as a PNG file."""
-        with open(path, "wb") as stream:
-            stream.write(self._repr_png_())
+        """Writes the picture as a PNG file, whole or not at all.
+
+        Raises ValueError for what is no picture any more, such as one channel, and FileError (an OSError).
+        """
+        if not self._is_picture():
+            raise ValueError(f"expected uint8 of shape (height, width, 3), got {self.dtype} of shape {self.shape}")
+        _hpsdf.save_png(self, path)
+
+    def _is_picture(self):
+        return self.dtype == np.uint8 and self.ndim == 3 and self.shape[2] == 3 and self.size > 0
 
     def _repr_png_(self):
-        is_picture = self.dtype == np.uint8 and self.ndim == 3 and self.shape[2] == 3 and self.size > 0
-        return _hpsdf.png_of(self) if is_picture else None
+        return _hpsdf.png_of(self) if self._is_picture() else None
 
 
 class Session:
@@ -38,8 +46,9 @@ class Session:
     object with .vertices and .faces; a field is the name of a file or a Field. `help(hpsdf.render)` lists the options of
     a picture, and `hpsdf help COMMAND` those of every command.
 
-    Several threads may use one session: one at a time works. Ctrl-C cancels within a second. All methods raise
-    OptionError (a ValueError) for options that are not accepted, and take progress= as `hpsdf.build` does.
+    Several threads may use one session: one at a time works. Ctrl-C cancels constructions and measurements within seconds;
+    a picture that is being drawn is finished first. All methods raise OptionError (a ValueError) for options that are not
+    accepted, and take progress= as `hpsdf.build` does.
     """
 
     def __init__(self, field=None):
@@ -81,8 +90,13 @@ class Session:
         return self.perform("pick", pixel=(x, y))
 
     def perform(self, command, *, progress=None, **options):
-        """Runs a command of the program. Returns its report as `hpsdf COMMAND --json` writes it, as dicts and lists."""
-        return _json.loads(self._perform(command, {**options, "json": True}, progress) or "null")
+        """Runs a command of the program. Returns its report as `hpsdf COMMAND --json` writes it, as dicts and lists.
+
+        An option that may be repeated is a list of strings. A command that writes several reports returns a list of
+        them, one that writes none returns None.
+        """
+        reports = _documents(self._perform(command, {**options, "json": True}, progress))
+        return reports[0] if len(reports) == 1 else reports or None
 
     def run(self, script, *, json=False, progress=None, **variables):
         """Runs the commands of a script: a text, or a pathlib.Path of a file. docs/scripts.md describes the language.
@@ -122,7 +136,13 @@ class Session:
 
     def _words(self, options):
         named = ((re.sub("_$", "", name).replace("_", "-"), value) for name, value in options.items())
-        return [(name, self._word(name, value)) for name, value in named if value is not None]
+        words = []
+        for name, value in named:
+            is_repeated = isinstance(value, (list, tuple)) and value and all(isinstance(one, (str, os.PathLike)) for one in value)
+            for one in value if is_repeated else [value]:
+                if one is not None:
+                    words.append((name, self._word(name, one)))
+        return words
 
     def _word(self, name, value):
         """Returns the value of an option as a script would write it."""
@@ -143,18 +163,24 @@ class Session:
     def _file_of(self, name, field):
         """Returns the name of a file that holds the field for as long as the session lives."""
         if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="hpsdf-")
-        file = os.path.join(self._folder.name, name + ".hpsdf")
+            self._folder = tempfile.mkdtemp(prefix="hpsdf-")
+            weakref.finalize(self, _remove, self._folder, os.getpid())
+        file = os.path.join(self._folder, name + ".hpsdf")
         field.save(file)
         return file
 
 
+def _remove(folder, process):
+    """Removes the temporary folder of a session, unless this process was forked from the one that made it."""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def _documents(text):
     """Returns the JSON documents that follow each other in a text."""
-    found, at = [], 0
-    while text[at:].strip():
-        at += len(text[at:]) - len(text[at:].lstrip())
-        document, at = _json.JSONDecoder().raw_decode(text, at)
+    found, decoder = [], _json.JSONDecoder()
+    while start := re.compile(r"\S").search(text, at if found else 0):
+        document, at = decoder.raw_decode(text, start.start())
         found.append(document)
     return found
 

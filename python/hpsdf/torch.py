@@ -28,8 +28,11 @@ def distance(field, points):
     `Field.value_and_gradient`, the second that of `Field.value_gradient_hessian`. Between the cells of a field that is not
     blended, all three jump.
 
-    Raises TypeError for anything but a tensor of these types on the CPU, and ValueError for another shape.
+    Raises TypeError for anything but a Field and a tensor of these types on the CPU, ValueError for another shape, and
+    NotImplementedError for third derivatives.
     """
+    if not isinstance(field, _hpsdf.Field):
+        raise TypeError(f"field: expected a Field, got {type(field).__name__}")
     if not isinstance(points, torch.Tensor):
         raise TypeError(f"points: expected a tensor, got {type(points).__name__}")
     if points.device.type != "cpu":
@@ -69,18 +72,29 @@ class _Gradient(torch.autograd.Function):
     def forward(context, points, upstream, field):
         context.field = field
         _, gradients = field.value_and_gradient(_numbers(points))
-        gradient = torch.from_numpy(gradients).to(points.dtype)
-        context.save_for_backward(points, upstream, gradient)
-        return upstream[..., None] * gradient
+        context.save_for_backward(points, upstream)
+        return upstream[..., None] * torch.from_numpy(gradients).to(points.dtype)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable
     def backward(context, direction):
-        points, upstream, gradient = context.saved_tensors
-        _, _, hessians = context.field.value_gradient_hessian(_numbers(points))
-        hessian = torch.from_numpy(hessians).to(points.dtype)
+        points, upstream = context.saved_tensors
+        hessian = _Hessian.apply(points, context.field)
         to_points = upstream[..., None] * (hessian @ direction[..., None])[..., 0]  # the Hessian is symmetric
+        gradient = _Gradient.apply(points, torch.ones_like(upstream), context.field)
         return to_points, (gradient * direction).sum(-1), None
+
+
+class _Hessian(torch.autograd.Function):
+    """The Hessian H(x), which has no derivative here."""
+
+    @staticmethod
+    def forward(context, points, field):
+        _, _, hessians = field.value_gradient_hessian(_numbers(points))
+        return torch.from_numpy(hessians).to(points.dtype)
+
+    @staticmethod
+    def backward(context, upstream):
+        raise NotImplementedError("hpsdf.torch.distance has no third derivatives")
 
 
 class Samples(torch.utils.data.IterableDataset):
@@ -93,6 +107,11 @@ class Samples(torch.utils.data.IterableDataset):
 
     def __init__(self, mesh, *, batches, seed=0, dtype=torch.float32, **counts):
         super().__init__()
+        unknown = set(counts) - {"surface", "edge", "near", "uniform"}
+        if unknown:
+            raise TypeError(f"Samples() has no option '{unknown.pop()}': it takes surface, edge, near and uniform")
+        if seed < 0:
+            raise ValueError(f"seed: expected a number from 0, got {seed}")
         if batches < 0:
             raise ValueError(f"batches: expected a number from 0, got {batches}")
         self._mesh, self._batches, self._seed, self._dtype = mesh, batches, seed, dtype

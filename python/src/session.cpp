@@ -2,9 +2,11 @@
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -95,17 +97,32 @@ std::string notes(Session& session) {
   return session.alone(py::none(), [](app::Interpreter& program, const Progress&) { return program.takeNotes(); });
 }
 
-/// Returns the bytes of a PNG file with the pixels of an array of shape (height, width, 3).
-py::bytes pngOf(const py::array_t<std::uint8_t, py::array::c_style>& pixels) {
+using Pixels = py::array_t<std::uint8_t, py::array::c_style>;
+
+/// Returns the picture of an array of shape (height, width, 3).
+render::Image imageOf(const Pixels& pixels) {
   if (pixels.ndim() != 3 || pixels.shape(2) != 3)
     throw py::value_error("pixels: expected an array of uint8 of shape (height, width, 3)");
   render::Image image(static_cast<int>(pixels.shape(1)), static_cast<int>(pixels.shape(0)), {});
   if (!image.pixels.empty()) std::copy_n(pixels.data(), pixels.size(), image.pixels.data()->data());
+  return image;
+}
+
+/// Returns the bytes of a PNG file.
+py::bytes pngOf(const Pixels& pixels) {
+  const render::Image image = imageOf(pixels);
   const std::string bytes = [&] {
     const py::gil_scoped_release released;
     return render::pngBytes(image);
   }();
   return {bytes};
+}
+
+/// Writes a PNG file, whole or not at all.
+void savedAsPng(const Pixels& pixels, const std::filesystem::path& path) {
+  const render::Image image = imageOf(pixels);
+  const py::gil_scoped_release released;
+  render::savePng(image, path);
 }
 
 /// Returns (name, accepted values, default, help) for each option of a command.
@@ -129,6 +146,7 @@ void addSession(py::module_& module) {
       .def("draw", &drawn, "command"_a, "options"_a, "progress"_a)
       .def("take_notes", &notes);
   module.def("png_of", &pngOf, "pixels"_a);
+  module.def("save_png", &savedAsPng, "pixels"_a, "path"_a);
   module.def("options_of", &optionsOf, "command"_a);
 }
 

@@ -124,8 +124,8 @@ void addSolids(py::module_& module) {
       "Raises OptionError (a ValueError) with the column of a mistake in the expression, MeshError and FileError.\n\n"
       "The operations:\n" +
       operationsHelp();
-  module.def("combine", &combined, "expression"_a, py::kw_only(), "inside_test"_a = "automatic", "threads"_a = 0,
-             "progress"_a = py::none(), doc.c_str());
+  module.def("combine", &combined, "expression"_a, py::pos_only(), py::kw_only(), "inside_test"_a = "automatic",
+             "threads"_a = 0, "progress"_a = py::none(), doc.c_str());
 }
 
 }  // namespace hpsdf::python

@@ -1,6 +1,7 @@
 """Pictures, figures and scripts: equal to those of the program, with fields and meshes of Python."""
 
 import json
+import multiprocessing
 import pathlib
 import threading
 import time
@@ -76,16 +77,66 @@ def test_frames_and_pixels(session, field):
 
 def test_options_that_are_not_accepted(session, field):
     for wrong, word in (({"color": "deg"}, "degree"), ({"colour": "degree"}, "color"), ({"camera": (1, 2)}, "3 numbers"),
-                        ({"size": (4, 4)}, "16384"), ({"output": "x.png"}, "output"), ({"samples": 0}, "from 1")):
+                        ({"size": (4, 4)}, "16384"), ({"output": "x.png"}, "output"), ({"samples": 0}, "from 1"), ({"camera": ["a", "b", "c"]}, "given 3 times")):
         with pytest.raises(hpsdf.OptionError, match=word):
             session.render(**wrong)
-    for wrong in ({"color": {}}, {"camera": object()}, {"camera": ["a", "b", "c"]}):
+    for wrong in ({"color": {}}, {"camera": object()}):
         with pytest.raises(TypeError):
             session.render(**wrong)
     with pytest.raises(hpsdf.Error, match="no field"):
         hpsdf.Session().render()
     with pytest.raises(TypeError):
         hpsdf.Session("field.hpsdf")
+
+
+def test_another_mesh_takes_the_place_of_the_one_before(field, mesh):
+    session, ball = hpsdf.Session(field), hpsdf.load_mesh("builtin:sphere")
+    first = session.slice(size=SIZE, color="error", mesh=mesh)
+    second = session.slice(size=SIZE, color="error", mesh=ball)
+    assert (first != second).any() and numpy.array_equal(second, hpsdf.slice(field, size=SIZE, color="error", mesh=ball))
+    assert numpy.array_equal(first, session.slice(size=SIZE, color="error", mesh=mesh))
+
+
+def test_files_of_pictures(field, tmp_path):
+    picture, file = hpsdf.render(field, size=SIZE), tmp_path / "picture.png"
+    picture.save(file)
+    before = file.read_bytes()
+    for wrong in (picture[..., 0], picture / 2.0):
+        with pytest.raises(ValueError, match="expected uint8"):
+            wrong.save(file)
+    assert file.read_bytes() == before
+    with pytest.raises(hpsdf.FileError):
+        picture.save(tmp_path / "no folder" / "picture.png")
+
+
+def draw_in_a_fork(field, how, answers):
+    try:
+        answers.put(hpsdf.render(field, size=SIZE, **how).shape)
+    except hpsdf.Error as error:
+        answers.put(str(error))
+
+
+def test_forked_processes_draw_by_the_cpu(field):
+    hpsdf.render(field, size=SIZE)
+    fork = multiprocessing.get_context("fork")
+    answers = fork.Queue()
+    for how, expected in (({"cpu": True}, (200, 320, 3)), ({}, "forked")):
+        child = fork.Process(target=draw_in_a_fork, args=(field, how, answers))
+        child.start()
+        answer = answers.get(timeout=60)
+        child.join(60)
+        assert answer == expected or expected in answer
+
+
+def test_notes_are_no_progress(capfd):
+    hpsdf.run("build builtin:gear target-error=1e-9")
+    assert "%" not in capfd.readouterr().err
+
+
+def test_several_reports(field):
+    session = hpsdf.Session(field)
+    assert len(session.perform("run", execute=["info", "info; info"])) == 3
+    assert session.perform("run", execute="info")["leaves"] == len(field.cells())
 
 
 def test_differences_of_two_fields(mesh, field, file, session):
@@ -126,6 +177,9 @@ def test_scripts(mesh, field, tmp_path, capsys):
         hpsdf.run("buidl builtin:torus")
     with pytest.raises(hpsdf.FileError, match="none.hpsdf"):
         hpsdf.run("load none.hpsdf")
+    for wrong in ("slice output=q.png colour=degree", "build builtin:sphere target-error=-1"):
+        with pytest.raises(hpsdf.OptionError, match="script:1:"):
+            hpsdf.run(wrong)
     with pytest.raises(OSError):
         hpsdf.run(tmp_path / "none.hps")
     session = hpsdf.Session()

@@ -52,6 +52,17 @@ def test_second_derivatives_are_those_of_the_field(blended, points):
         assert numpy.allclose(row.numpy(), hessians[:, axis], rtol=1e-12, atol=1e-12)
 
 
+def test_second_derivatives_depend_on_what_they_are_multiplied_with(blended, points):
+    inputs, weight = tensor(points[:20]), tensor([2.0])
+    values = weight * hpsdf.torch.distance(blended, inputs)
+    (gradients,) = torch.autograd.grad(values.sum(), inputs, create_graph=True)
+    (row,) = torch.autograd.grad(gradients[:, 0].sum(), inputs, create_graph=True)
+    (slope,) = torch.autograd.grad(row.sum(), weight, retain_graph=True)
+    assert slope.item() == pytest.approx(blended.value_gradient_hessian(points[:20])[2][:, 0].sum())
+    with pytest.raises(NotImplementedError):
+        torch.autograd.grad(row.sum(), inputs)
+
+
 def test_gradcheck(blended):
     inside = numpy.random.default_rng(3).uniform(-1, 1, (40, 3))
     radius = numpy.hypot(numpy.hypot(*inside.T[:2]) - 0.7, inside[:, 2])
@@ -88,6 +99,8 @@ def test_wrong_tensors(field):
     for wrong in (numpy.zeros((2, 3)), torch.zeros(2, 3, dtype=torch.int64), torch.zeros(2, 3, device="meta")):
         with pytest.raises(TypeError, match="points: expected a tensor"):
             hpsdf.torch.distance(field, wrong)
+    with pytest.raises(TypeError, match="field: expected a Field"):
+        hpsdf.torch.distance(hpsdf.ExactDistance(hpsdf.load_mesh("builtin:box")), torch.zeros(2, 3))
     for wrong in (torch.zeros(2, 2), torch.zeros(())):
         with pytest.raises(ValueError, match="shape"):
             hpsdf.torch.distance(field, wrong)
@@ -104,8 +117,9 @@ def test_samples_are_the_same_for_any_number_of_workers(mesh, exact):
     assert all(torch.equal(a[0], b[0]) for a, b in zip(sorted(alone, key=key), sorted(shared, key=key)))
     others = list(hpsdf.torch.Samples(mesh, batches=3, near=200, seed=6, dtype=torch.float64))
     assert not any(torch.equal(a[0], b[0]) for a in alone for b in others)
-    with pytest.raises(ValueError):
-        hpsdf.torch.Samples(mesh, batches=-1)
+    for wrong, error in (({"batches": -1}, ValueError), ({"batches": 1, "seed": -1}, ValueError), ({"batches": 1, "nearr": 2}, TypeError)):
+        with pytest.raises(error):
+            hpsdf.torch.Samples(mesh, **wrong)
 
 
 def test_the_package_does_not_import_torch():

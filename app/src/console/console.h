@@ -47,7 +47,8 @@ struct Console {
   std::filesystem::path meshReader = {};
   /// Meshes in memory that take the place of files of their names. It may be null.
   const std::map<std::string, TriangleMesh, std::less<>>* meshes = nullptr;
-  std::string work = {};  ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
+  std::string work = {};       ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
+  bool writesProgress = true;  ///< false if only the listener shows progress
 };
 
 /// Writes one line to the stream `err`, in place of a progress line. Any thread may call it. Control characters in

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <ostream>
 #include <string>
 #include <string_view>
 
@@ -16,7 +17,8 @@ namespace hpsdf::app {
 template <typename Work>
 auto withProgress(const Console& console, const Work& work) {
   const InterruptGuard guard;
-  ProgressLine line(console.err, console.redrawsProgress);
+  std::ostream nowhere(nullptr);
+  ProgressLine line(console.writesProgress ? console.err : nowhere, console.redrawsProgress);
   const ProgressTicker ticker(line);
   WorkListener* const listener = console.listener;
   struct AtEnd {

@@ -71,8 +71,8 @@ class Scanner {
     return read;
   }
 
-  [[noreturn]] void fail(int line, int column, const std::string& message) const {
-    throw Error(fmt::format("{}:{}:{}: {}{}", name_, line, column, message, includedFrom_));
+  [[noreturn]] void fail(int line, int column, const std::string& message, ErrorKind kind = ErrorKind::general) const {
+    throw Error(kind, fmt::format("{}:{}:{}", name_, line, column), message + std::string(includedFrom_));
   }
 
  private:
@@ -228,9 +228,10 @@ class ScriptReader {
       if (command.includesScript) included = readIncluded(arguments.text("script"));
       calls_.push_back({&command, std::move(arguments), open_.back().where, includedFrom, open_.front().line});
     } catch (const ArgumentError& error) {
-      scanner.fail(statement.line, error.word() < rest.size() ? rest[error.word()].column : verb.column, error.what());
+      scanner.fail(statement.line, error.word() < rest.size() ? rest[error.word()].column : verb.column, error.what(),
+                   ErrorKind::option);
     } catch (const Error& error) {
-      scanner.fail(statement.line, verb.column, error.what());
+      scanner.fail(statement.line, verb.column, error.what(), error.kind());
     }
     return included;
   }

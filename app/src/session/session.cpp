@@ -94,6 +94,13 @@ const ReferenceSurface& Session::referenceSurface(const std::string& surface) {
   return *reference_;
 }
 
+void Session::forgetSurfaces() {
+  exactOfArgument_.reset();
+  reference_.reset();
+  defects_.reset();
+  operands_.reset();
+}
+
 const render::Drawn& Session::picture() const {
   if (!picture_) throw Error("there is no picture yet; 'slice' or 'render' comes first");
   return *picture_;

@@ -86,6 +86,8 @@ class Session {
   bool knowsSurface() const;
   /// True if `exact` can be called with an empty `surface`.
   bool knowsExact() const;
+  /// Forgets surfaces that were loaded by name, because a name may stand for another one now.
+  void forgetSurfaces();
   void setExact(std::shared_ptr<const DistanceFunction> exact) { exact_ = std::move(exact); }
 
   /// Returns the last picture of the current field. Throws `Error` if no picture has been drawn.

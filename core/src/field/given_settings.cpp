@@ -87,7 +87,7 @@ BuildOptions GivenSettings::options(double longestSide) const {
 const BuildSetting& GivenSettings::settingOf(std::string_view name) const {
   for (const BuildSetting& setting : buildSettings())
     if (setting.isOffered && spelled(setting.name) == name) return setting;
-  throw Error(ErrorKind::option, std::string(name),
+  throw Error(ErrorKind::option, shownText(name),
               "there is no such option: " +
                   didYouMean(name, names(), "'hpsdf help build' and docs/commands.md list all options"));
 }

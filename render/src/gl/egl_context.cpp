@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstdio>
@@ -137,6 +138,8 @@ struct EglContext::Current::Before {
 EglContext::Current::Current(const EglContext& context)
     : before_(new Before{eglGetCurrentDisplay(), eglGetCurrentContext(), eglGetCurrentSurface(EGL_DRAW),
                          eglGetCurrentSurface(EGL_READ), eglQueryAPI(), context.display_}) {
+  if (context.process_ != getpid())
+    throw Error("this renderer belongs to the process from which this one was forked: make a new one");
   eglBindAPI(EGL_OPENGL_API);
   if (!eglMakeCurrent(context.display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context.context_)) {
     const std::string reason = eglErrorText();
@@ -153,7 +156,10 @@ EglContext::Current::~Current() {
   eglBindAPI(before_->api);
 }
 
-EglContext::EglContext(GlChoice choice) {
+EglContext::EglContext(GlChoice choice) : process_(getpid()) {
+  static const int first = process_;
+  if (process_ != first)
+    throw GlError("OpenGL was used before this process was forked, and would hang: start processes anew (\"spawn\")");
   const std::string missing = missingLibraries();
   if (!missing.empty()) noContext(choice, missing);
   std::string tried;
@@ -182,6 +188,8 @@ void EglContext::open(void* display, GlChoice choice) {
   }
 }
 
-EglContext::~EglContext() { eglDestroyContext(display_, context_); }
+EglContext::~EglContext() {
+  if (process_ == getpid()) eglDestroyContext(display_, context_);
+}
 
 }  // namespace hpsdf::render

@@ -42,6 +42,7 @@ class EglContext {
 
   void* display_ = nullptr;
   void* context_ = nullptr;
+  int process_ = 0;  ///< a forked process cannot use the threads of the driver
   std::string renderer_;
 };
 
