@@ -1,5 +1,6 @@
 #pragma once
-// What every function of the C interface does: no exception leaves it, and its error becomes a status and a message.
+// Every function of the C interface runs in `guarded`: no exception leaves it, and its error becomes a status and a
+// message.
 
 #include <stdexcept>
 #include <string>

@@ -1,5 +1,5 @@
 #pragma once
-// What the opaque objects of the C interface hold.
+// The contents of the opaque objects of the C interface.
 
 #include "hpsdf.h"
 #include "hpsdf/detail/build_settings.h"

@@ -1,4 +1,4 @@
-"""How fields and meshes show themselves in notebooks: as a picture and as tables of figures."""
+"""The pictures and tables of figures by which fields and meshes show themselves in notebooks."""
 
 import base64
 import html
