@@ -70,16 +70,26 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
   }
 }
 
-render::Image slicedImage(Session& session, const Arguments& arguments) {
-  render::SlicePicture picture = slicePicture(arguments);
-  render::checkPictureSize(picture.width, picture.height, picture.samples);
+/// Loads the field of a call, draws the picture whose settings are `settings(arguments, box)`, and makes it the
+/// session's picture. Returns the settings.
+template <typename Settings, typename Draw>
+auto drawForSession(Session& session, const Arguments& arguments, const Settings& settings, const Draw& draw) {
+  const auto asked = settings(arguments, kAnyBox);  // throws `Error` for wrong arguments before the field is loaded
   const Backend chosen = backend(arguments);
   useField(session, arguments);
-  const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
+  const render::ReferenceData reference = referenceDataFor(session, arguments, asked);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  picture = slicePicture(arguments, shownBox(field));
-  session.setPicture(render::drawSlice(renderer, field, picture, reference));
+  const auto picture = settings(arguments, shownBox(field));
+  session.setPicture(draw(renderer, field, picture, reference));
+  return picture;
+}
+
+render::Image slicedImage(Session& session, const Arguments& arguments) {
+  const render::SlicePicture asked = slicePicture(arguments);
+  render::checkPictureSize(asked.width, asked.height, asked.samples);
+  const auto settings = [](const Arguments& given, const Box& box) { return slicePicture(given, box); };
+  drawForSession(session, arguments, settings, render::drawSlice);
   return session.picture().image;
 }
 
@@ -120,15 +130,9 @@ void runSlice(Session& session, const Arguments& arguments) {
 }
 
 render::Image renderedImage(Session& session, const Arguments& arguments) {
-  render::SurfacePicture picture = surfacePicture(arguments);
-  const Backend chosen = backend(arguments);
-  useField(session, arguments);
-  const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
-  render::Renderer& renderer = session.renderer(chosen);
-  const Field& field = session.current().field;
-  picture = surfacePicture(arguments, shownBox(field));
-  session.setPicture(render::drawSurface(renderer, field, picture, reference));
-  noteOddSurface(session.console(), field, picture, session.picture().seen);
+  const auto settings = [](const Arguments& given, const Box& box) { return surfacePicture(given, box); };
+  const render::SurfacePicture picture = drawForSession(session, arguments, settings, render::drawSurface);
+  noteOddSurface(session.console(), session.current().field, picture, session.picture().seen);
   return session.picture().image;
 }
 
