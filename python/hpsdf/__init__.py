@@ -9,6 +9,7 @@ True
 import copyreg as _copyreg
 import os as _os
 import tempfile as _tempfile
+from collections.abc import Callable as _Callable
 
 from ._hpsdf import (
     ClosestPoints,
@@ -33,7 +34,8 @@ from ._hpsdf import (
     sample,
 )
 from . import _notebook
-from ._pictures import Picture, Session, probe, render, run, slice, verify
+from ._pictures import Picture, Session, probe, render, run, verify
+from ._pictures import slice as slice
 
 # `from hpsdf import *` leaves out `slice`, which is a name of Python's own.
 __all__ = [
@@ -77,7 +79,7 @@ for _name in __all__:
 del _name
 
 
-def _field_from_bytes(content):
+def _field_from_bytes(content: bytes) -> Field:
     """Returns the field of a .hpsdf file with this content."""
     with _tempfile.TemporaryDirectory(prefix="hpsdf-") as folder:
         file = _os.path.join(folder, "field.hpsdf")
@@ -86,7 +88,7 @@ def _field_from_bytes(content):
         return load(file)
 
 
-def _reduce_field(field):
+def _reduce_field(field: Field) -> tuple[_Callable[[bytes], Field], tuple[bytes]]:
     """Returns what pickle stores of a field: the bytes of its .hpsdf file."""
     with _tempfile.TemporaryDirectory(prefix="hpsdf-") as folder:
         file = _os.path.join(folder, "field.hpsdf")

@@ -2,35 +2,37 @@
 
 import base64
 import html
+from typing import Any, cast
 
 from . import _hpsdf
-from ._pictures import Session
+from ._pictures import Picture, Session
+from ._types import Mesh
 
 _SIZE = (640, 400)
 
 
-def field_info(field):
+def field_info(field: _hpsdf.Field) -> dict[str, Any]:
     """The figures of the field, as `hpsdf info --json` writes them, in a dict: the mesh and the settings that it was
     made from, its sizes, its measured and estimated errors, and the shares of the volume by degree and depth.
     """
-    return Session(field).perform("info")
+    return cast(dict[str, Any], Session(field).perform("info"))
 
 
-def mesh_report(mesh):
+def mesh_report(mesh: Mesh) -> dict[str, Any]:
     """The report on the mesh, as `hpsdf mesh --json` writes it, in a dict: counts, volume, area, whether it is closed,
     its defects with their places, and how its inside is decided.
     """
-    return Session().perform("mesh", mesh=mesh)
+    return cast(dict[str, Any], Session().perform("mesh", mesh=mesh))
 
 
-def field_png(field):
+def field_png(field: _hpsdf.Field) -> bytes:
     """The picture of the field as the bytes of a PNG file; without OpenGL it is drawn by the CPU."""
-    return _picture(Session(field))._repr_png_()
+    return _hpsdf.png_of(_picture(Session(field)))
 
 
-def field_html(field):
+def field_html(field: _hpsdf.Field) -> str:
     session = Session(field)
-    picture = base64.b64encode(_picture(session)._repr_png_()).decode("ascii")
+    picture = base64.b64encode(_hpsdf.png_of(_picture(session))).decode("ascii")
     info = session.perform("info")
     rows = [
         ("made from", (info["mesh"] or {}).get("name") or "a function"),
@@ -42,7 +44,7 @@ def field_html(field):
     return f"<div>{_table('hpsdf.Field', rows)}{image}</div>"
 
 
-def mesh_html(mesh):
+def mesh_html(mesh: _hpsdf.TriangleMesh) -> str:
     report = mesh_report(mesh)
     verdict = report["verdict"]
     defects = {name.replace("_", " "): found["count"] for name, found in report["defects"].items() if found["count"]}
@@ -57,14 +59,14 @@ def mesh_html(mesh):
     return _table(f"hpsdf.TriangleMesh {getattr(mesh, 'name', '')}".rstrip(), rows)
 
 
-def _picture(session):
+def _picture(session: Session) -> Picture:
     try:
         return session.render(size=_SIZE)
     except _hpsdf.Error:
         return session.render(size=_SIZE, cpu=True)
 
 
-def _error_rows(measured):
+def _error_rows(measured: dict[str, Any] | None) -> list[tuple[str, str]]:
     if not measured:
         return []
     near, domain = measured["near"], measured["domain"]
@@ -74,22 +76,25 @@ def _error_rows(measured):
     ]
 
 
-def _bytes_text(count):
+def _bytes_text(count: int) -> str:
     for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= size:
             return f"{count / size:.2f} {unit}"
     return f"{count} bytes"
 
 
-def _table(title, rows):
-    cells = "".join(f"<tr><th>{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>" for name, value in rows)
+def _table(title: str, rows: list[tuple[str, str]]) -> str:
+    cells = "".join(f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>" for name, value in rows)
     return f"<table><caption>{html.escape(title)}</caption>{cells}</table>"
 
 
-def attach():
+def attach() -> None:
     """Gives the classes of the extension these methods."""
-    _hpsdf.Field.info = field_info
-    _hpsdf.Field._repr_png_ = field_png
-    _hpsdf.Field._repr_html_ = field_html
-    _hpsdf.TriangleMesh.report = mesh_report
-    _hpsdf.TriangleMesh._repr_html_ = mesh_html
+    for kind, name, method in (
+        (_hpsdf.Field, "info", field_info),
+        (_hpsdf.Field, "_repr_png_", field_png),
+        (_hpsdf.Field, "_repr_html_", field_html),
+        (_hpsdf.TriangleMesh, "report", mesh_report),
+        (_hpsdf.TriangleMesh, "_repr_html_", mesh_html),
+    ):
+        setattr(kind, name, method)

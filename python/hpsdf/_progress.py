@@ -6,15 +6,15 @@ import sys
 class Bar:
     """Shows a task and its fraction on standard error: by tqdm where it is installed, else as one line that changes."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         try:
-            from tqdm.auto import tqdm
+            from tqdm.auto import tqdm  # type: ignore[import]
 
             self._tqdm = tqdm(total=100, unit="%", leave=False)
         except ImportError:
             self._tqdm = None
 
-    def __call__(self, task, fraction):
+    def __call__(self, task: str, fraction: float) -> None:
         percent = round(100 * fraction)
         if self._tqdm is None:
             sys.stderr.write(f"\r{task}: {percent} %\x1b[K")
@@ -24,7 +24,7 @@ class Bar:
         self._tqdm.n = percent
         self._tqdm.refresh()
 
-    def close(self):
+    def close(self) -> None:
         if self._tqdm is None:
             sys.stderr.write("\r\x1b[K")
         else:

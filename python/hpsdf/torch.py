@@ -8,9 +8,16 @@
 True
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, cast
+
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _hpsdf
+from ._types import Mesh
 
 try:
     import torch
@@ -20,7 +27,7 @@ except ImportError as error:
 __all__ = ["Samples", "distance"]
 
 
-def distance(field, points):
+def distance(field: _hpsdf.Field, points: torch.Tensor) -> torch.Tensor:
     """Returns the values of a field at points, a tensor of shape (..., 3), as a tensor of shape (...).
 
     points: a tensor of float64 or float32 on the CPU; C-contiguous float64 is read without a copy. The values have its
@@ -41,10 +48,10 @@ def distance(field, points):
         raise TypeError(f"points: expected a tensor of float32 or float64, got {points.dtype}")
     if points.ndim == 0 or points.shape[-1] != 3:
         raise ValueError(f"points: expected a tensor of shape (..., 3), got {tuple(points.shape)}")
-    return _Distance.apply(points, field)
+    return cast(torch.Tensor, _Distance.apply(points, field))
 
 
-def _numbers(tensor):
+def _numbers(tensor: torch.Tensor) -> NDArray[np.float64]:
     """Returns the numbers of a tensor as an array, which shares its memory if it is C-contiguous float64."""
     return np.ascontiguousarray(tensor.detach().numpy(), dtype=np.float64)
 
@@ -53,14 +60,14 @@ class _Distance(torch.autograd.Function):
     """The value f(x). Its derivative is the function below, so that it can be differentiated again."""
 
     @staticmethod
-    def forward(context, points, field):
+    def forward(context: Any, points: torch.Tensor, field: _hpsdf.Field) -> Any:  # type: ignore[override]
         context.field = field
         context.save_for_backward(points)
         values = np.asarray(field(_numbers(points)))  # a float for a single point
         return torch.from_numpy(values).to(points.dtype)
 
     @staticmethod
-    def backward(context, upstream):
+    def backward(context: Any, upstream: torch.Tensor) -> Any:  # type: ignore[override]
         (points,) = context.saved_tensors
         return _Gradient.apply(points, upstream, context.field), None
 
@@ -69,14 +76,14 @@ class _Gradient(torch.autograd.Function):
     """The product of an upstream derivative with the gradient: g ∇f(x). Its derivatives are g H(x) and ∇f(x)."""
 
     @staticmethod
-    def forward(context, points, upstream, field):
+    def forward(context: Any, points: torch.Tensor, upstream: torch.Tensor, field: _hpsdf.Field) -> Any:  # type: ignore[override]
         context.field = field
         _, gradients = field.value_and_gradient(_numbers(points))
         context.save_for_backward(points, upstream)
         return upstream[..., None] * torch.from_numpy(gradients).to(points.dtype)
 
     @staticmethod
-    def backward(context, direction):
+    def backward(context: Any, direction: torch.Tensor) -> Any:  # type: ignore[override]
         points, upstream = context.saved_tensors
         hessian = _Hessian.apply(points, context.field)
         to_points = upstream[..., None] * (hessian @ direction[..., None])[..., 0]  # the Hessian is symmetric
@@ -88,43 +95,60 @@ class _Hessian(torch.autograd.Function):
     """The Hessian H(x), which has no derivative here."""
 
     @staticmethod
-    def forward(context, points, field):
+    def forward(context: Any, points: torch.Tensor, field: _hpsdf.Field) -> Any:  # type: ignore[override]
         _, _, hessians = field.value_gradient_hessian(_numbers(points))
         return torch.from_numpy(hessians).to(points.dtype)
 
     @staticmethod
-    def backward(context, upstream):
+    def backward(context: Any, upstream: torch.Tensor) -> Any:  # type: ignore[override]
         raise NotImplementedError("hpsdf.torch.distance has no third derivatives")
 
 
-class Samples(torch.utils.data.IterableDataset):
+class Samples(torch.utils.data.IterableDataset[tuple[torch.Tensor, torch.Tensor]]):
     """Batches of random points of a mesh with their exact distances, as tensors (points, distances), for a DataLoader.
 
-    mesh, surface, edge, near, uniform: as of `hpsdf.sample`; the numbers are those of one batch. batches: the number of
-    batches. dtype: the type of the tensors. Batch i depends on the seed and on i alone, so that the same batches come
-    from any number of workers of a DataLoader, which takes batch_size=None.
+    mesh, and the options surface, edge, near, uniform (the numbers of points of one batch), widths, sharp_angle and
+    enlargement: as of `hpsdf.sample`. batches: the number of batches. dtype: the type of the tensors, torch.float32 or
+    torch.float64; the distances are those of the rounded points. Batch i depends on the seed and on i alone, so that the
+    same batches come from any number of workers of a DataLoader, which takes batch_size=None.
     """
 
-    def __init__(self, mesh, *, batches, seed=0, dtype=torch.float32, **counts):
+    def __init__(
+        self, mesh: Mesh, *, batches: int, seed: int = 0, dtype: torch.dtype = torch.float32, **options: Any
+    ) -> None:
         super().__init__()
-        unknown = set(counts) - {"surface", "edge", "near", "uniform"}
+        unknown = set(options) - {"surface", "edge", "near", "uniform", "widths", "sharp_angle", "enlargement"}
         if unknown:
-            raise TypeError(f"Samples() has no option '{unknown.pop()}': it takes surface, edge, near and uniform")
+            raise TypeError(f"Samples() has no option '{unknown.pop()}': it takes those of hpsdf.sample")
         if seed < 0:
             raise ValueError(f"seed: expected a number from 0, got {seed}")
         if batches < 0:
             raise ValueError(f"batches: expected a number from 0, got {batches}")
+        if dtype not in (torch.float32, torch.float64):
+            raise TypeError(f"dtype: expected torch.float32 or torch.float64, got {dtype}")
         self._mesh, self._batches, self._seed, self._dtype = mesh, batches, seed, dtype
-        self._counts = {"surface": 0, "edge": 0, "near": 0, "uniform": 0, **counts}
+        self._options: dict[str, Any] = {"surface": 0, "edge": 0, "near": 0, "uniform": 0, **options}
+        self._distance: _hpsdf.ExactDistance | None = None
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self._batches
 
-    def __iter__(self):
-        worker = torch.utils.data.get_worker_info()
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_distance": None}  # each process prepares its own
+
+    def __iter__(self) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+        if self._distance is None:
+            self._distance = _hpsdf.ExactDistance(self._mesh)
+        worker = torch.utils.data.get_worker_info()  # type: ignore[no-untyped-call]
         first, step = (0, 1) if worker is None else (worker.id, worker.num_workers)
         for batch in range(first, self._batches, step):
             # a sum of seed and batch would repeat batches under the next seed
             seed = int(np.random.SeedSequence((self._seed, batch)).generate_state(1, np.uint64)[0])
-            drawn = _hpsdf.sample(self._mesh, seed=seed, **self._counts)
+            drawn = _hpsdf.sample(
+                self._distance,
+                mesh=self._mesh,
+                seed=seed,
+                float_points=self._dtype == torch.float32,
+                **self._options,
+            )
             yield torch.from_numpy(drawn.points).to(self._dtype), torch.from_numpy(drawn.distances).to(self._dtype)

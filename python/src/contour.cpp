@@ -31,14 +31,16 @@ void warnOfMisses(const Contour& made) {
 }
 
 std::shared_ptr<TriangleMesh> contourOf(const Field& field, double offset, double tolerance,
-                                        const std::string& domainCut, bool simplify, int threads,
+                                        const std::string& domainCut, bool simplify, bool keepJumps, int threads,
                                         const py::object& progress) {
   const ContourOptions options = {.offset = offset,
                                   .tolerance = tolerance,
                                   .domainCut = domainCutOf(domainCut),
                                   .simplify = simplify,
                                   .threads = threads};
-  Contour made = resultOf(progress, [&](const Progress& link) { return contour(field, options, link); });
+  Contour made = resultOf(progress, [&](const Progress& link) {
+    return keepJumps ? contour(field, options, link) : blendedContour(field, options, link);
+  });
   warnOfMisses(made);
   return std::make_shared<TriangleMesh>(std::move(made.mesh));
 }
@@ -48,13 +50,14 @@ std::shared_ptr<TriangleMesh> contourOf(const Field& field, double offset, doubl
 void addContour(FieldClass& fields) {
   fields.def(
       "contour", &contourOf, py::kw_only(), "offset"_a = 0.0, "tolerance"_a = 0.0, "domain_cut"_a = "wall",
-      "simplify"_a = false, "threads"_a = 0, "progress"_a = py::none(),
+      "simplify"_a = false, "keep_jumps"_a = false, "threads"_a = 0, "progress"_a = py::none(),
       "Returns the mesh of the surface on which the field has the value `offset`, in units of length: closed and "
       "without crossings, with sharp edges kept.\n\n"
       "tolerance: greatest distance between the mesh and this surface; 0 for a thousandth of the domain's longest "
       "side. domain_cut: 'wall' closes the mesh where the domain cuts the solid, 'open' ends it there. simplify: "
-      "merges vertices as far as the tolerance allows, which takes several times as long. The mesh follows the "
-      "steps by which the field jumps between its cells; a field built with continuity='exact' has none.\n\n"
+      "merges vertices as far as the tolerance allows, which takes several times as long. "
+      "keep_jumps: follow the steps by which a field jumps between its cells. By default, a copy of such a field is "
+      "blended first.\n\n"
       "Issues a RuntimeWarning where the mesh misses the tolerance.\n\n"
       "Raises Error for options out of range and LimitError (a MemoryError).");
 }

@@ -27,24 +27,12 @@ constexpr std::size_t kPoints = 1 << 16;  // points between two looks for signal
 /// The words for places where a distance is exact, in the order of `Exactness`.
 constexpr std::array kExactnessWords = {"everywhere", "outside", "inside", "nowhere"};
 
-/// An exact distance that is shared with Python.
-struct SharedDistance {
-  std::shared_ptr<const ExactDistance> exact;
-
-  void operator()(std::span<const Vector3> points, std::span<double> out) const { (*exact)(points, out); }
-  bool hasGradients() const { return exact->hasGradients(); }
-  void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const {
-    exact->withGradients(points, out, gradients);
-  }
-  std::size_t bytes() const { return exact->bytes(); }
-};
-
 /// Returns an object of Python as an operand of an expression.
 Expression operandFrom(const std::string& name, const py::object& object) {
   if (py::isinstance<Field>(object)) return object.cast<const Field&>();
   if (py::isinstance<ExactDistance>(object)) {
     const auto exact = object.cast<std::shared_ptr<const ExactDistance>>();
-    return DistanceFunction(SharedDistance{exact}, DistanceFunction(*exact).source());
+    return DistanceFunction(exact, exact->source());
   }
   if (py::isinstance<CombinedDistance>(object))
     return DistanceFunction(CombinedDistance(object.cast<const CombinedDistance&>()));

@@ -5,7 +5,7 @@ import sys
 SKIPPED = 77
 
 
-def main():
+def main() -> int:
     try:
         import numpy
         import pytest

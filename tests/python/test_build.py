@@ -1,9 +1,16 @@
 """Constructions: options as of the program, what is refused, and progress."""
 
+import pathlib
+from collections.abc import Callable
+from typing import Any
+
 import numpy
+import numpy.typing
 import pytest
 
 import hpsdf
+
+Array = numpy.typing.NDArray[Any]
 
 
 @pytest.mark.parametrize(
@@ -15,7 +22,7 @@ import hpsdf
         {"tolerance": "0.5%"},
     ],
 )
-def test_fields_equal_those_of_the_program(mesh, points, program, query, tmp_path, options):
+def test_fields_equal_those_of_the_program(mesh: hpsdf.TriangleMesh, points: Array, program: Callable[..., str], query: Callable[..., dict[str, Array]], tmp_path: pathlib.Path, options: dict[str, Any]) -> None:
     built = hpsdf.build(mesh, **options)
     words = []
     for name, value in options.items():
@@ -28,12 +35,12 @@ def test_fields_equal_those_of_the_program(mesh, points, program, query, tmp_pat
     assert numpy.array_equal(built(points), query(points, tmp_path / "torus.hpsdf")["distance"].astype(float))
 
 
-def test_distances_and_threads_give_the_same_field(mesh, exact, field, points):
+def test_distances_and_threads_give_the_same_field(mesh: hpsdf.TriangleMesh, exact: hpsdf.ExactDistance, field: hpsdf.Field, points: Array) -> None:
     assert numpy.array_equal(hpsdf.build(exact, target_error=1e-5)(points), field(points))
     assert numpy.array_equal(hpsdf.build(mesh, target_error=1e-5, threads=1, blend_width=None)(points), field(points))
 
 
-def test_domains(mesh):
+def test_domains(mesh: hpsdf.TriangleMesh) -> None:
     cube = hpsdf.build(mesh, target_error=1e-2, margin=0.5).domain
     box = hpsdf.build(mesh, target_error=1e-2, box="box").domain
     assert numpy.ptp(cube[1] - cube[0]) < 1e-12 and cube[1, 0] > 1.4
@@ -69,12 +76,12 @@ def test_domains(mesh):
         ({"progress": 3}, TypeError, "progress: expected a callable"),
     ],
 )
-def test_wrong_options_are_refused(mesh, options, error, text):
+def test_wrong_options_are_refused(mesh: hpsdf.TriangleMesh, options: dict[str, Any], error: Any, text: str) -> None:
     with pytest.raises(error, match=text):
         hpsdf.build(mesh, **options)
 
 
-def test_classes_of_errors():
+def test_classes_of_errors() -> None:
     assert issubclass(hpsdf.OptionError, (hpsdf.Error, ValueError)) and issubclass(hpsdf.OptionError, hpsdf.Error)
     for special, common in [
         (hpsdf.FileError, OSError),
@@ -87,30 +94,31 @@ def test_classes_of_errors():
     assert issubclass(hpsdf.Error, Exception) and not issubclass(hpsdf.Error, ValueError)
 
 
-def test_progress_is_reported(mesh):
+def test_progress_is_reported(mesh: hpsdf.TriangleMesh) -> None:
     calls = []
     hpsdf.build(mesh, target_error=1e-8, progress=lambda task, fraction: calls.append((task, fraction)))
     assert calls and all(isinstance(task, str) and 0 <= fraction <= 1 for task, fraction in calls)
 
 
-def test_a_bar_shows_progress(mesh, capsys):
+def test_a_bar_shows_progress(mesh: hpsdf.TriangleMesh, capsys: pytest.CaptureFixture[str]) -> None:
     hpsdf.build(mesh, target_error=1e-8, progress=True)
     assert "%" in capsys.readouterr().err
     hpsdf.build(mesh, target_error=1e-3, progress=False)
     assert capsys.readouterr().err == ""
 
 
-def test_exceptions_of_progress_cancel(mesh):
+def test_exceptions_of_progress_cancel(mesh: hpsdf.TriangleMesh) -> None:
     class Enough(Exception):
         pass
 
-    def stop(task, fraction):
+    def stop(task: str, fraction: float) -> None:
         raise Enough(task)
 
     with pytest.raises(Enough):
         hpsdf.build(mesh, target_error=1e-9, progress=stop)
 
 
-def test_all_options_are_described():
+def test_all_options_are_described() -> None:
     for word in ("target_error: float, in ", "strategy: 'hp' | 'h1' | 'h2' | 'hpx' | 'auto'; default auto", "threads: int"):
-        assert word in hpsdf.build.__doc__
+        assert word in str(hpsdf.build.__doc__)
+    assert "--" not in str(hpsdf.build.__doc__) and "max-error" not in str(hpsdf.build.__doc__)

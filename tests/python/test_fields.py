@@ -1,14 +1,20 @@
 """Fields: equal to those of C++, files, cells and pickling."""
 
+import pathlib
 import pickle
+from collections.abc import Callable
+from typing import Any
 
 import numpy
+import numpy.typing
 import pytest
 
 import hpsdf
 
+Array = numpy.typing.NDArray[Any]
 
-def test_values_and_gradients_equal_those_of_the_program(field, points, query, tmp_path):
+
+def test_values_and_gradients_equal_those_of_the_program(field: hpsdf.Field, points: Array, query: Callable[..., dict[str, Array]], tmp_path: pathlib.Path) -> None:
     field.save(tmp_path / "torus.hpsdf")
     columns = query(points, tmp_path / "torus.hpsdf")
     value, gradient = field.value_and_gradient(points)
@@ -18,7 +24,7 @@ def test_values_and_gradients_equal_those_of_the_program(field, points, query, t
         assert numpy.array_equal(gradient[:, axis], columns["g" + "xyz"[axis]].astype(float))
 
 
-def test_hessians_are_the_differences_of_gradients(mesh, field, points):
+def test_hessians_are_the_differences_of_gradients(mesh: hpsdf.TriangleMesh, field: hpsdf.Field, points: Array) -> None:
     blended = hpsdf.build(mesh, target_error=1e-4, continuity="exact")
     for each in (field, blended):
         value, gradient, hessian = each.value_gradient_hessian(points)
@@ -32,7 +38,7 @@ def test_hessians_are_the_differences_of_gradients(mesh, field, points):
             assert numpy.quantile(error / scale, 0.99) < 1e-6  # a face of a cell may come between
 
 
-def test_files(field, points, tmp_path):
+def test_files(field: hpsdf.Field, points: Array, tmp_path: pathlib.Path) -> None:
     file = tmp_path / "torus.hpsdf"
     field.save(file)
     again = hpsdf.load(str(file))
@@ -43,7 +49,7 @@ def test_files(field, points, tmp_path):
     assert numpy.array_equal(again(points), field(points)) and numpy.array_equal(small(points), field(points))
 
 
-def test_files_that_cannot_be_read(field, tmp_path):
+def test_files_that_cannot_be_read(field: hpsdf.Field, tmp_path: pathlib.Path) -> None:
     (tmp_path / "wrong.hpsdf").write_bytes(b"no field")
     for wrong in (tmp_path / "none.hpsdf", tmp_path / "wrong.hpsdf", tmp_path):
         with pytest.raises(OSError) as caught:
@@ -52,10 +58,10 @@ def test_files_that_cannot_be_read(field, tmp_path):
     with pytest.raises(hpsdf.FileError):
         field.save(tmp_path / "no folder" / "torus.hpsdf")
     with pytest.raises(TypeError):
-        hpsdf.load(3)
+        hpsdf.load(3)  # type: ignore[arg-type]
 
 
-def test_cells_fill_the_domain(field):
+def test_cells_fill_the_domain(field: hpsdf.Field) -> None:
     cells = field.cells()
     assert cells.dtype.names == ("box", "degree", "depth", "error")
     assert cells["box"].shape == (len(cells), 2, 3) and repr(field).startswith(f"<hpsdf.Field: {len(cells)} cells, ")
@@ -67,7 +73,7 @@ def test_cells_fill_the_domain(field):
     assert field.nbytes > 0
 
 
-def test_jumps(mesh, field):
+def test_jumps(mesh: hpsdf.TriangleMesh, field: hpsdf.Field) -> None:
     jumps = hpsdf.jumps(field)
     assert jumps.shape[0] > len(field.cells()) and (jumps["max"] >= jumps["rms"] / 1.001).all() and jumps["max"].any()
     for face in jumps[:50]:
@@ -77,34 +83,40 @@ def test_jumps(mesh, field):
     blended = hpsdf.build(mesh, target_error=1e-4, continuity="exact")
     assert hpsdf.jumps(blended, threads=1)["max"].max() < 1e-12
     with pytest.raises(TypeError):
-        hpsdf.jumps(mesh)
+        hpsdf.jumps(mesh)  # type: ignore[arg-type]
 
 
-def test_contours_equal_those_of_the_program(field, program, tmp_path):
-    contour = field.contour(tolerance=0.01)
+def test_contours_equal_those_of_the_program(field: hpsdf.Field, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
     field.save(tmp_path / "torus.hpsdf")
-    program("contour", tmp_path / "torus.hpsdf", "-o", tmp_path / "torus.ply", "--tolerance", 0.01, "--keep-jumps")
-    theirs = hpsdf.load_mesh(tmp_path / "torus.ply")
-    assert numpy.array_equal(contour.vertices, theirs.vertices)
-    assert numpy.array_equal(contour.triangles, theirs.triangles)
+
+    def compare(contour: hpsdf.TriangleMesh, *words: str) -> None:
+        program("contour", tmp_path / "torus.hpsdf", "-o", tmp_path / "torus.ply", "--tolerance", 0.01, *words)
+        theirs = hpsdf.load_mesh(tmp_path / "torus.ply")
+        assert numpy.array_equal(contour.vertices, theirs.vertices)
+        assert numpy.array_equal(contour.triangles, theirs.triangles)
+
+    contour, with_jumps = field.contour(tolerance=0.01), field.contour(tolerance=0.01, keep_jumps=True)
+    compare(contour)
+    compare(with_jumps, "--keep-jumps")
+    assert not numpy.array_equal(contour.vertices, with_jumps.vertices)
     assert abs(field(contour.vertices)).max() < 0.01
     rough = hpsdf.build(hpsdf.load_mesh("builtin:gear"), target_error=1e-2, strategy="hp", continuity="none")
     with pytest.warns(RuntimeWarning, match="misses the tolerance in [0-9]+ places"):
-        rough.contour(tolerance=0.05)
+        rough.contour(tolerance=0.05, keep_jumps=True)
     simple = field.contour(tolerance=0.01, offset=0.05, simplify=True)
     assert 0 < len(simple.faces) < len(contour.faces)
     with pytest.raises(hpsdf.OptionError, match="domain_cut: expected 'wall' or 'open', got 'walls'"):
-        field.contour(domain_cut="walls")
+        field.contour(domain_cut="walls")  # type: ignore[arg-type]
     with pytest.raises(hpsdf.Error):
         field.contour(tolerance=-1)
 
 
-def test_pickling(field, points):
+def test_pickling(field: hpsdf.Field, points: Array) -> None:
     again = pickle.loads(pickle.dumps(field))
     assert numpy.array_equal(again(points), field(points))
     assert numpy.array_equal(again.cells(), field.cells())
 
 
-def test_no_field_without_build_or_load():
+def test_no_field_without_build_or_load() -> None:
     with pytest.raises(TypeError):
         hpsdf.Field()

@@ -6,6 +6,8 @@ import pathlib
 import threading
 import time
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy
 import pytest
@@ -16,15 +18,15 @@ SIZE = (320, 200)
 
 
 @pytest.fixture(scope="module")
-def session(field):
+def session(field: hpsdf.Field) -> hpsdf.Session:
     return hpsdf.Session(field)
 
 
 @pytest.fixture
-def named(tmp_path, program):
+def named(tmp_path: pathlib.Path, program: Callable[..., str]) -> Callable[..., None]:
     """Returns a function that compares a picture with the one that the program draws with these words."""
 
-    def compare(picture, *words):
+    def compare(picture: hpsdf.Picture, *words: object) -> None:
         file = tmp_path / "program.png"
         program(*words, "-o", file)
         assert picture._repr_png_() == file.read_bytes()
@@ -33,14 +35,14 @@ def named(tmp_path, program):
 
 
 @pytest.fixture(scope="module")
-def file(field, tmp_path_factory):
+def file(field: hpsdf.Field, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     made = tmp_path_factory.mktemp("fields") / "torus.hpsdf"
     field.save(made)
     return made
 
 
-def test_pictures_equal_those_of_the_program(file, mesh, named):
-    hidden = {"surface": False, "cells": "lines"}
+def test_pictures_equal_those_of_the_program(file: pathlib.Path, mesh: hpsdf.TriangleMesh, named: Callable[..., None]) -> None:
+    hidden: dict[str, Any] = {"surface": False, "cells": "lines"}
     loaded = hpsdf.Session()
     loaded.run("load $file", file=file)  # captions name the file
     words = ("--size", "320x200")
@@ -53,18 +55,19 @@ def test_pictures_equal_those_of_the_program(file, mesh, named):
     assert (error != loaded.slice(size=SIZE, color="degree")).any(), "the comparison would not notice another picture"
 
 
-def test_pictures_are_arrays(field, session, tmp_path):
+def test_pictures_are_arrays(field: hpsdf.Field, session: hpsdf.Session, tmp_path: pathlib.Path) -> None:
     picture = hpsdf.render(field, size=SIZE)
     assert isinstance(picture, numpy.ndarray) and picture.shape == (200, 320, 3) and picture.dtype == numpy.uint8
     assert numpy.array_equal(picture, session.render(size=SIZE))
     assert picture[:, :, 0].std() > 10, "the picture shows something"
     picture.save(tmp_path / "picture.png")
     assert (tmp_path / "picture.png").read_bytes() == picture._repr_png_()
-    assert picture[0, 0]._repr_png_() is None and (picture / 2.0)._repr_png_() is None
+    assert picture[0, 0]._repr_png_() is None
+    assert (picture / 2.0).view(hpsdf.Picture)._repr_png_() is None
     assert hpsdf.slice(field, size=SIZE).shape == hpsdf.probe(field, (-1, 0, 0), (1, 0, 0), size=SIZE).shape
 
 
-def test_frames_and_pixels(session, field):
+def test_frames_and_pixels(session: hpsdf.Session, field: hpsdf.Field) -> None:
     session.run("show slice; plane axis=x offset=0.1")
     frame = session.frame()
     assert frame.shape == (720, 1280, 3)
@@ -75,21 +78,30 @@ def test_frames_and_pixels(session, field):
         hpsdf.Session(field).pick(1, 1)
 
 
-def test_options_that_are_not_accepted(session, field):
-    for wrong, word in (({"color": "deg"}, "degree"), ({"colour": "degree"}, "color"), ({"camera": (1, 2)}, "3 numbers"),
-                        ({"size": (4, 4)}, "16384"), ({"output": "x.png"}, "output"), ({"samples": 0}, "from 1"), ({"camera": ["a", "b", "c"]}, "given 3 times")):
+def test_options_that_are_not_accepted(session: hpsdf.Session, field: hpsdf.Field) -> None:
+    mistakes: list[tuple[dict[str, Any], str]] = [
+        ({"color": "deg"}, "degree"),
+        ({"colour": "degree"}, "color"),
+        ({"camera": (1, 2)}, "3 numbers"),
+        ({"size": (4, 4)}, "16384"),
+        ({"output": "x.png"}, "output"),
+        ({"samples": 0}, "from 1"),
+        ({"camera": ["a", "b", "c"]}, "given 3 times"),
+    ]
+    for wrong, word in mistakes:
         with pytest.raises(hpsdf.OptionError, match=word):
             session.render(**wrong)
-    for wrong in ({"color": {}}, {"camera": object()}):
+    others: list[dict[str, Any]] = [{"color": {}}, {"camera": object()}]
+    for wrong in others:
         with pytest.raises(TypeError):
             session.render(**wrong)
     with pytest.raises(hpsdf.Error, match="no field"):
         hpsdf.Session().render()
     with pytest.raises(TypeError):
-        hpsdf.Session("field.hpsdf")
+        hpsdf.Session("field.hpsdf")  # type: ignore[arg-type]
 
 
-def test_another_mesh_takes_the_place_of_the_one_before(field, mesh):
+def test_another_mesh_takes_the_place_of_the_one_before(field: hpsdf.Field, mesh: hpsdf.TriangleMesh) -> None:
     session, ball = hpsdf.Session(field), hpsdf.load_mesh("builtin:sphere")
     first = session.slice(size=SIZE, color="error", mesh=mesh)
     second = session.slice(size=SIZE, color="error", mesh=ball)
@@ -97,11 +109,11 @@ def test_another_mesh_takes_the_place_of_the_one_before(field, mesh):
     assert numpy.array_equal(first, session.slice(size=SIZE, color="error", mesh=mesh))
 
 
-def test_files_of_pictures(field, tmp_path):
+def test_files_of_pictures(field: hpsdf.Field, tmp_path: pathlib.Path) -> None:
     picture, file = hpsdf.render(field, size=SIZE), tmp_path / "picture.png"
     picture.save(file)
     before = file.read_bytes()
-    for wrong in (picture[..., 0], picture / 2.0):
+    for wrong in (picture[..., 0].view(hpsdf.Picture), (picture / 2.0).view(hpsdf.Picture)):
         with pytest.raises(ValueError, match="expected uint8"):
             wrong.save(file)
     assert file.read_bytes() == before
@@ -109,14 +121,14 @@ def test_files_of_pictures(field, tmp_path):
         picture.save(tmp_path / "no folder" / "picture.png")
 
 
-def draw_in_a_fork(field, how, answers):
+def draw_in_a_fork(field: hpsdf.Field, how: Any, answers: Any) -> None:
     try:
         answers.put(hpsdf.render(field, size=SIZE, **how).shape)
     except hpsdf.Error as error:
         answers.put(str(error))
 
 
-def test_forked_processes_draw_by_the_cpu(field):
+def test_forked_processes_draw_by_the_cpu(field: hpsdf.Field) -> None:
     hpsdf.render(field, size=SIZE)
     fork = multiprocessing.get_context("fork")
     answers = fork.Queue()
@@ -128,18 +140,18 @@ def test_forked_processes_draw_by_the_cpu(field):
         assert answer == expected or expected in answer
 
 
-def test_notes_are_no_progress(capfd):
+def test_notes_are_no_progress(capfd: pytest.CaptureFixture[str]) -> None:
     hpsdf.run("build builtin:gear target-error=1e-9")
     assert "%" not in capfd.readouterr().err
 
 
-def test_several_reports(field):
+def test_several_reports(field: hpsdf.Field) -> None:
     session = hpsdf.Session(field)
     assert len(session.perform("run", execute=["info", "info; info"])) == 3
     assert session.perform("run", execute="info")["leaves"] == len(field.cells())
 
 
-def test_differences_of_two_fields(mesh, field, file, session):
+def test_differences_of_two_fields(mesh: hpsdf.TriangleMesh, field: hpsdf.Field, file: pathlib.Path, session: hpsdf.Session) -> None:
     other = hpsdf.build(mesh, target_error=1e-3)
     picture = session.slice(size=SIZE, color="difference", other=other)
     assert (picture != session.slice(size=SIZE, color="difference", other=field)).any()
@@ -147,7 +159,7 @@ def test_differences_of_two_fields(mesh, field, file, session):
         session.slice(color="difference", other=pathlib.Path("none.hpsdf"))
 
 
-def test_figures_equal_those_of_the_program(mesh, field, file, program):
+def test_figures_equal_those_of_the_program(mesh: hpsdf.TriangleMesh, field: hpsdf.Field, file: pathlib.Path, program: Callable[..., str]) -> None:
     figures = hpsdf.verify(field, mesh, points=2000)
     expected = json.loads(program("verify", file, "builtin:torus", "--points", 2000, "--json"))
     for part in ("uniform", "near_surface", "jumps", "steps", "worst"):
@@ -162,7 +174,7 @@ def test_figures_equal_those_of_the_program(mesh, field, file, program):
     assert mesh.report() == {**json.loads(program("mesh", "builtin:torus", "--json")), "name": "mesh"}
 
 
-def test_scripts(mesh, field, tmp_path, capsys):
+def test_scripts(mesh: hpsdf.TriangleMesh, field: hpsdf.Field, tmp_path: pathlib.Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = hpsdf.run("build $shape target-error=1e-4; expect stats.leaves > 10", shape="builtin:torus")
     assert "leaves" in text
     reports = hpsdf.run("build $shape target-error=1e-5; info", shape=mesh, json=True)
@@ -187,8 +199,8 @@ def test_scripts(mesh, field, tmp_path, capsys):
     assert isinstance(session.field, hpsdf.Field) and hpsdf.Session().field is None
 
 
-def test_scripts_are_cancelled_by_their_progress():
-    def stop(task, fraction):
+def test_scripts_are_cancelled_by_their_progress() -> None:
+    def stop(task: str, fraction: float) -> None:
         raise InterruptedError
 
     session = hpsdf.Session()
@@ -199,11 +211,11 @@ def test_scripts_are_cancelled_by_their_progress():
     assert "torus" in session.run("build builtin:torus target-error=1e-4"), "the session goes on"
 
 
-def test_one_session_in_several_threads(field, session):
+def test_one_session_in_several_threads(field: hpsdf.Field, session: hpsdf.Session) -> None:
     expected = [session.slice(size=SIZE, offset=0.05 * n) for n in range(4)]
-    found = [None] * 4
+    found: list[hpsdf.Picture | None] = [None] * 4
 
-    def draw(n):
+    def draw(n: int) -> None:
         found[n] = session.slice(size=SIZE, offset=0.05 * n)
 
     threads = [threading.Thread(target=draw, args=(n,)) for n in range(4)]
@@ -211,10 +223,10 @@ def test_one_session_in_several_threads(field, session):
         thread.start()
     for thread in threads:
         thread.join()
-    assert all(numpy.array_equal(one, other) for one, other in zip(found, expected))
+    assert all(one is not None and numpy.array_equal(one, other) for one, other in zip(found, expected))
 
 
-def test_notebooks_show_fields_and_meshes(mesh, field):
+def test_notebooks_show_fields_and_meshes(mesh: hpsdf.TriangleMesh, field: hpsdf.Field) -> None:
     png = field._repr_png_()
     assert png.startswith(b"\x89PNG") and len(png) > 5000
     shown = field._repr_html_()
@@ -227,7 +239,7 @@ def test_notebooks_show_fields_and_meshes(mesh, field):
     assert "a function" in function._repr_html_()
 
 
-def test_help_lists_the_options():
-    assert "camera: " in hpsdf.render.__doc__ and "max_rms: " in hpsdf.verify.__doc__
+def test_help_lists_the_options() -> None:
+    assert "camera: " in str(hpsdf.render.__doc__) and "max_rms: " in str(hpsdf.verify.__doc__)
     for function in (hpsdf.render, hpsdf.slice, hpsdf.probe, hpsdf.verify):
-        assert "\noutput: " not in function.__doc__ and "    field: " not in function.__doc__
+        assert "\noutput: " not in str(function.__doc__) and "    field: " not in str(function.__doc__)

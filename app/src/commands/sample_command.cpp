@@ -14,7 +14,6 @@
 #include "construction/file_kind.h"
 #include "construction/reference_surface.h"
 #include "construction/surface.h"
-#include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/output/contour.h"
@@ -115,7 +114,7 @@ TriangleMesh surfaceOfField(const Console& console, const Field& field, const Ar
   }
   return withProgress(console, [&](const Progress& progress) {
     const ContourOptions options{.threads = arguments.whole("threads")};
-    TriangleMesh mesh = contour(field.data().blend == 0 ? blended(field) : field, options, progress).mesh;
+    TriangleMesh mesh = blendedContour(field, options, progress).mesh;
     if (mesh.triangles.empty()) throw Error("the field is positive everywhere, so that there is no surface to sample");
     return mesh;
   });

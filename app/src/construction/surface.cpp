@@ -64,18 +64,6 @@ ImportedMesh readFile(const Console& console, const std::string& file) {
   });
 }
 
-struct SharedDistance {
-  std::shared_ptr<const ExactDistance> exact;
-
-  void operator()(std::span<const Vector3> points, std::span<double> out) const { (*exact)(points, out); }
-  bool hasGradients() const { return exact->hasGradients(); }
-  void withGradients(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) const {
-    exact->withGradients(points, out, gradients);
-  }
-  std::size_t bytes() const { return exact->bytes(); }
-  const TriangleSearch& triangleSearch() const { return exact->triangleSearch(); }
-};
-
 /// Returns a surface that has no mesh, an analytic shape or a grid. Returns std::nullopt for other surfaces.
 std::optional<PreparedSurface> surfaceWithoutMesh(const Console& console, const std::string& surface,
                                                   const GridPlacement& placement) {
@@ -184,7 +172,7 @@ std::shared_ptr<const DistanceFunction> withNormalization(const std::shared_ptr<
                                                           const Normalization& normalization) {
   Source source = exact->source();
   source.normalization = normalization;
-  return std::make_shared<const DistanceFunction>(SharedDistance{exact}, std::move(source));
+  return std::make_shared<const DistanceFunction>(exact, std::move(source));
 }
 
 std::shared_ptr<const ExactDistance> distanceToMesh(const Console& console, const std::string& surface,

@@ -80,19 +80,16 @@ class DistanceFunction {
       : DistanceFunction(std::forward<F>(f), sourceOf(f)) {}
 
   template <typename F>
-  DistanceFunction(F&& f, Source source) : source_(std::move(source)), bytes_(bytesOf(f)) {
-    using Callable = std::remove_cvref_t<F>;
-    if constexpr (std::is_lvalue_reference_v<F>) {
-      evaluate_ = adapt<Callable>([&f]() -> const Callable& { return f; });
-      gradients_ = gradientsOf<Callable>([&f]() -> const Callable& { return f; });
-      triangleSearch_ = triangleSearchOf(f);
-    } else {
-      auto owned = std::make_shared<const Callable>(std::forward<F>(f));
-      triangleSearch_ = triangleSearchOf(*owned);
-      gradients_ = gradientsOf<Callable>([owned]() -> const Callable& { return *owned; });
-      evaluate_ = adapt<Callable>([owned = std::move(owned)]() -> const Callable& { return *owned; });
-    }
-  }
+  DistanceFunction(F&& f, Source source) : DistanceFunction(pointerTo(std::forward<F>(f)), std::move(source)) {}
+
+  /// Shares a callable with its other owners.
+  template <typename Callable>
+  DistanceFunction(std::shared_ptr<const Callable> callable, Source source)
+      : evaluate_(adapt(callable)),
+        gradients_(gradientsOf(callable)),
+        source_(std::move(source)),
+        bytes_(bytesOf(*callable)),
+        triangleSearch_(triangleSearchOf(*callable)) {}
 
   /// Evaluates out[i] = Φ(points[i]) for all i. Both spans must have the same length.
   void operator()(std::span<const Vector3> points, std::span<double> out) const {
@@ -121,6 +118,16 @@ class DistanceFunction {
   const TriangleSearch* triangleSearch() const { return triangleSearch_; }
 
  private:
+  /// Returns a pointer to a callable: one that does not own it, if it is an lvalue, else one that owns it.
+  template <typename F>
+  static auto pointerTo(F&& f) {
+    using Callable = std::remove_cvref_t<F>;
+    if constexpr (std::is_lvalue_reference_v<F> && !std::is_function_v<Callable>)
+      return std::shared_ptr<const Callable>(std::shared_ptr<const void>(), &f);
+    else
+      return std::make_shared<const std::decay_t<F>>(std::forward<F>(f));
+  }
+
   template <typename F>
   static std::size_t bytesOf(const F& f) {
     if constexpr (requires {
@@ -155,30 +162,30 @@ class DistanceFunction {
 
   using GradientBatch = std::function<void(std::span<const Vector3>, std::span<double>, std::span<Vector3>)>;
 
-  template <typename Callable, typename Get>
-  static GradientBatch gradientsOf(Get get) {
+  template <typename Callable>
+  static GradientBatch gradientsOf(const std::shared_ptr<const Callable>& callable) {
     if constexpr (requires(const Callable& f, std::span<const Vector3> points, std::span<double> out,
                            std::span<Vector3> gradients) {
                     { f.hasGradients() } -> std::convertible_to<bool>;
                     f.withGradients(points, out, gradients);
                   }) {
-      if (get().hasGradients())
-        return [get](std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) {
-          get().withGradients(points, out, gradients);
+      if (callable->hasGradients())
+        return [callable](std::span<const Vector3> points, std::span<double> out, std::span<Vector3> gradients) {
+          callable->withGradients(points, out, gradients);
         };
     }
     return nullptr;
   }
 
-  template <typename Callable, typename Get>
-  static Batch adapt(Get get) {
+  template <typename Callable>
+  static Batch adapt(const std::shared_ptr<const Callable>& callable) {
     if constexpr (std::invocable<const Callable&, std::span<const Vector3>, std::span<double>>) {
-      return [get](std::span<const Vector3> points, std::span<double> out) { get()(points, out); };
+      return [callable](std::span<const Vector3> points, std::span<double> out) { (*callable)(points, out); };
     } else {
       static_assert(std::is_invocable_r_v<double, const Callable&, const Vector3&>,
                     "a distance maps one point to a double, or takes a span of points and a span of results");
-      return [get](std::span<const Vector3> points, std::span<double> out) {
-        for (std::size_t i = 0; i < points.size(); ++i) out[i] = get()(points[i]);
+      return [callable](std::span<const Vector3> points, std::span<double> out) {
+        for (std::size_t i = 0; i < points.size(); ++i) out[i] = (*callable)(points[i]);
       };
     }
   }

@@ -20,6 +20,7 @@
 #include "contour/edits/surface_points.h"
 #include "contour/open_mesh.h"
 #include "contour/surface_mesh.h"
+#include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
 #include "util/chunks.h"
@@ -420,6 +421,10 @@ Contour contour(const Field& field, const ContourOptions& options, const Progres
     throw Error(ErrorKind::option, "tolerance", "is too small for vertices in single precision");
   return withThreads(options.threads,
                      [&] { return contouring::Contouring(field, options, tolerance, progress).make(); });
+}
+
+Contour blendedContour(const Field& field, const ContourOptions& options, const Progress& progress) {
+  return field.data().blend == 0 ? contour(blended(field), options, progress) : contour(field, options, progress);
 }
 
 }  // namespace hpsdf

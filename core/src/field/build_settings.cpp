@@ -169,8 +169,9 @@ const std::vector<Row> kRows = {
          .suitsTolerance()
          .stored(17),
      positive<&BuildOptions::tolerance>,
-     "Greatest error of the distance near the surface: 0.01, or 0.02% of the mesh's longest side. It holds within "
-     "--within of the surface; beyond it, 1 % of the further distance is allowed in addition, so that the sign is "
+     "Greatest error of the distance near the surface: 0.01, or 0.02% of the mesh's longest side. It holds up to "
+     "the distance 'within' from the surface; beyond it, 1 % of the further distance is allowed in addition, so that "
+     "the sign is "
      "right wherever the distance exceeds the tolerance. Polynomials, exact cells and precision follow: the "
      "construction seeks those that take the fewest bytes. The error is checked in every cell and measured at the "
      "end."},
@@ -183,12 +184,12 @@ const std::vector<Row> kRows = {
          .suitsTolerance()
          .stored(18),
      positive<&BuildOptions::within>,
-     "Distance from the surface up to which --tolerance holds. When left out, 5 % of the mesh's longest side."},
+     "Distance from the surface up to which the tolerance holds. When left out, 5 % of the mesh's longest side."},
     {"certified", kAsked, flag().of("tolerance", isTolerant).suitsTolerance().stored(19),
      member<&BuildOptions::certified>,
      "Takes only polynomials whose errors are proven to be within the tolerance at every point, not only at those that "
      "are checked. It takes longer and gives a larger field. It needs a mesh without holes, and excludes "
-     "--sign pseudonormal: auto takes it where it is certain."},
+     "the inside test pseudonormal, but for where the automatic choice takes it."},
     {"target-error", kAsked, number().above(0).in("units^5 at that scale").ends(Ending::target).stored(1),
      kWeightedError,
      "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, where L is "

@@ -20,6 +20,17 @@ std::string pythonName(const BuildSetting& setting) {
   return name;
 }
 
+/// Returns a text of the table with the names of settings as Python writes them.
+std::string inPython(std::string text) {
+  for (const BuildSetting& setting : buildSettings()) {
+    const std::string name = pythonName(setting);
+    for (std::size_t at = text.find(setting.name); name != setting.name && at != std::string::npos;
+         at = text.find(setting.name, at + name.size()))
+      text.replace(at, name.size(), name);
+  }
+  return text;
+}
+
 void requireKnownNames(const py::kwargs& arguments, const std::vector<std::string>& known) {
   for (const auto& [key, value] : arguments) {
     const auto name = key.cast<std::string>();
@@ -87,7 +98,7 @@ std::string settingsHelp() {
     text += "\n" + pythonName(setting) + ": " + typeText(setting);
     if (!setting.unit.empty()) text += ", in " + std::string(setting.unit);
     if (!fallback.empty()) text += "; default " + fallback;
-    text += "\n    " + std::string(setting.help) + "\n";
+    text += "\n    " + inPython(std::string(setting.help)) + "\n";
   }
   return text;
 }

@@ -76,4 +76,8 @@ double leastSinglePrecisionTolerance(const Field& field);
 /// `progress` says so.
 Contour contour(const Field& field, const ContourOptions& options = {}, const Progress& progress = {});
 
+/// Does the same for a field that jumps between its leaves after blending a copy of it (`blended`), so that the mesh
+/// has no steps.
+Contour blendedContour(const Field& field, const ContourOptions& options = {}, const Progress& progress = {});
+
 }  // namespace hpsdf
