@@ -31,8 +31,18 @@ def field_png(field: _hpsdf.Field) -> bytes:
 
 
 def field_html(field: _hpsdf.Field) -> str:
+    """The figures of the field and its picture as HTML."""
+    return _html_of(Session(field), field_png(field))
+
+
+def field_bundle(field: _hpsdf.Field, include: Any = None, exclude: Any = None) -> dict[str, Any]:
+    """What a notebook shows of the field, by kind, so that it draws one picture and not one for each kind."""
     session = Session(field)
-    picture = base64.b64encode(_hpsdf.png_of(_picture(session))).decode("ascii")
+    png = _hpsdf.png_of(_picture(session))
+    return {"image/png": png, "text/html": _html_of(session, png), "text/plain": repr(field)}
+
+
+def _html_of(session: Session, png: bytes) -> str:
     info = session.perform("info")
     rows = [
         ("made from", (info["mesh"] or {}).get("name") or "a function"),
@@ -40,12 +50,18 @@ def field_html(field: _hpsdf.Field) -> str:
         ("memory", _bytes_text(info["bytes"])),
         *_error_rows(info["measured"]),
     ]
-    image = f'<img alt="the surface of the field" src="data:image/png;base64,{picture}" width="{_SIZE[0]}"/>'
+    data = base64.b64encode(png).decode("ascii")
+    image = f'<img alt="the surface of the field" src="data:image/png;base64,{data}" width="{_SIZE[0]}"/>'
     return f"<div>{_table('hpsdf.Field', rows)}{image}</div>"
 
 
 def mesh_html(mesh: _hpsdf.TriangleMesh) -> str:
-    report = mesh_report(mesh)
+    """The report on the mesh as HTML, or why there is none."""
+    title = f"hpsdf.TriangleMesh {mesh.name}".rstrip()
+    try:
+        report = mesh_report(mesh)
+    except _hpsdf.Error as error:
+        return _table(title, [("vertices, triangles", f"{len(mesh.vertices):,}, {len(mesh.faces):,}"), ("report", str(error))])
     verdict = report["verdict"]
     defects = {name.replace("_", " "): found["count"] for name, found in report["defects"].items() if found["count"]}
     rows = [
@@ -56,7 +72,7 @@ def mesh_html(mesh: _hpsdf.TriangleMesh) -> str:
         ("volume, area", f"{report['volume']:.6g}, {report['area']:.6g}"),
         ("inside test", report["sign"]["by"]),
     ]
-    return _table(f"hpsdf.TriangleMesh {getattr(mesh, 'name', '')}".rstrip(), rows)
+    return _table(title, rows)
 
 
 def _picture(session: Session) -> Picture:
@@ -94,6 +110,7 @@ def attach() -> None:
         (_hpsdf.Field, "info", field_info),
         (_hpsdf.Field, "_repr_png_", field_png),
         (_hpsdf.Field, "_repr_html_", field_html),
+        (_hpsdf.Field, "_repr_mimebundle_", field_bundle),
         (_hpsdf.TriangleMesh, "report", mesh_report),
         (_hpsdf.TriangleMesh, "_repr_html_", mesh_html),
     ):

@@ -237,6 +237,10 @@ def test_notebooks_show_fields_and_meshes(mesh: hpsdf.TriangleMesh, field: hpsdf
     assert "not closed" in open_mesh._repr_html_() and "<script>" not in open_mesh._repr_html_()
     function = hpsdf.build(lambda p: numpy.linalg.norm(p, axis=1) - 0.5, box=((-1,) * 3, (1,) * 3), target_error=1e-3)
     assert "a function" in function._repr_html_()
+    bundle = field._repr_mimebundle_()
+    assert bundle == {"image/png": png, "text/html": shown, "text/plain": repr(field)}
+    empty = hpsdf.TriangleMesh(numpy.zeros((3, 3)), numpy.zeros((0, 3), dtype=int), name="nothing")
+    assert "nothing" in empty._repr_html_() and "<td>3, 0</td>" in empty._repr_html_()
 
 
 def test_help_lists_the_options() -> None:
