@@ -61,6 +61,8 @@ class Session:
         self._session = _hpsdf.Session()
         self._folder: str | None = None
         if field is not None:
+            if not isinstance(field, _hpsdf.Field):
+                raise TypeError(f"field: expected a Field, got {type(field).__name__}; hpsdf.build makes one")
             self._session.set_field(field, "field")
 
     @property
@@ -252,6 +254,11 @@ def run(script: Path, *, json: bool = False, progress: Progress = None, **variab
     return Session().run(script, json=json, progress=progress, **variables)
 
 
+def _in_python(text: str) -> str:
+    """Returns a text of the program with options as Python writes them."""
+    return re.sub(r"--([a-z][a-z-]*)", lambda option: str(option.group(1)).replace("-", "_"), text)
+
+
 def _add_options(function: Callable[..., Any], command: str, left: Iterable[str] = ()) -> None:
     """Appends the options of the program's command to the docstring of a function."""
     lines = ["", "Options:", ""]
@@ -259,7 +266,7 @@ def _add_options(function: Callable[..., Any], command: str, left: Iterable[str]
         if name in ("field", *left):
             continue
         lines.append(f"{name.replace('-', '_')}: {values}" + (f"; default {default}" if default else ""))
-        lines.append(f"    {text}\n")
+        lines.append(f"    {_in_python(text)}\n")
     indented = "\n".join("    " + line if line else "" for line in "\n".join(lines).split("\n"))
     function.__doc__ = f"{function.__doc__}{indented}\n"
 

@@ -10,7 +10,7 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -105,50 +105,68 @@ class _Hessian(torch.autograd.Function):
 
 
 class Samples(torch.utils.data.IterableDataset[tuple[torch.Tensor, torch.Tensor]]):
-    """Batches of random points of a mesh with their exact distances, as tensors (points, distances), for a DataLoader.
+    """Batches of random points with their distances, as tensors (points, distances), for a DataLoader.
 
-    mesh, and the options surface, edge, near, uniform (the numbers of points of one batch), widths, sharp_angle and
-    enlargement: as of `hpsdf.sample`. batches: the number of batches. dtype: the type of the tensors, torch.float32 or
-    torch.float64; the distances are those of the rounded points. Batch i depends on the seed and on i alone, so that the
-    same batches come from any number of workers of a DataLoader, which takes batch_size=None.
+    source, mesh, widths, sharp_angle and enlargement: as of `hpsdf.sample`; the exact distance of a mesh is prepared once in
+    each process. surface, edge, near, uniform: the numbers of points of one batch. batches: the number of batches; each pass
+    over the data set gives the same ones. dtype: the type of the tensors, torch.float32 or torch.float64; distances are those
+    of the rounded points. Batch i depends on the seed and on i alone, so that the same batches come from any number of
+    workers of a DataLoader, which takes batch_size=None.
     """
 
     def __init__(
-        self, mesh: Mesh, *, batches: int, seed: int = 0, dtype: torch.dtype = torch.float32, **options: Any
+        self,
+        source: Mesh | _hpsdf.ExactDistance | _hpsdf.Field,
+        *,
+        batches: int,
+        mesh: Mesh | None = None,
+        surface: int = 0,
+        edge: int = 0,
+        near: int = 0,
+        uniform: int = 0,
+        widths: Sequence[float] | None = None,
+        sharp_angle: float = 30.0,
+        enlargement: float = 0.1,
+        seed: int = 0,
+        dtype: torch.dtype = torch.float32,
     ) -> None:
         super().__init__()
-        unknown = set(options) - {"surface", "edge", "near", "uniform", "widths", "sharp_angle", "enlargement"}
-        if unknown:
-            raise TypeError(f"Samples() has no option '{unknown.pop()}': it takes those of hpsdf.sample")
-        if seed < 0:
-            raise ValueError(f"seed: expected a number from 0, got {seed}")
-        if batches < 0:
-            raise ValueError(f"batches: expected a number from 0, got {batches}")
+        counts = {"surface": surface, "edge": edge, "near": near, "uniform": uniform}
+        for name, number in {"batches": batches, "seed": seed, **counts}.items():
+            if not isinstance(number, (int, np.integer)):
+                raise TypeError(f"{name}: expected a whole number, got {number!r}")
+            if number < 0:
+                raise ValueError(f"{name}: expected a number from 0, got {number}")
+        if not any(counts.values()):
+            raise ValueError("no points are asked for: give the number of one kind, surface, edge, near or uniform")
         if dtype not in (torch.float32, torch.float64):
             raise TypeError(f"dtype: expected torch.float32 or torch.float64, got {dtype}")
-        self._mesh, self._batches, self._seed, self._dtype = mesh, batches, seed, dtype
-        self._options: dict[str, Any] = {"surface": 0, "edge": 0, "near": 0, "uniform": 0, **options}
-        self._distance: _hpsdf.ExactDistance | None = None
+        self._source, self._mesh, self._batches, self._seed, self._dtype = source, mesh, batches, seed, dtype
+        self._options: dict[str, Any] = {**counts, "sharp_angle": sharp_angle, "enlargement": enlargement}
+        if widths is not None:
+            self._options["widths"] = widths
+        self._prepared: _hpsdf.ExactDistance | None = None
 
     def __len__(self) -> int:
         return self._batches
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_distance": None}  # each process prepares its own
+        return {**self.__dict__, "_prepared": None}  # each process prepares its own
 
     def __iter__(self) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
-        if self._distance is None:
-            self._distance = _hpsdf.ExactDistance(self._mesh)
+        source: _hpsdf.ExactDistance | _hpsdf.Field
+        mesh = self._mesh
+        if isinstance(self._source, (_hpsdf.ExactDistance, _hpsdf.Field)):
+            source = self._source
+        else:
+            source = self._prepared = self._prepared or _hpsdf.ExactDistance(self._source)
+            mesh = self._source
         worker = torch.utils.data.get_worker_info()  # type: ignore[no-untyped-call]
         first, step = (0, 1) if worker is None else (worker.id, worker.num_workers)
         for batch in range(first, self._batches, step):
             # a sum of seed and batch would repeat batches under the next seed
             seed = int(np.random.SeedSequence((self._seed, batch)).generate_state(1, np.uint64)[0])
             drawn = _hpsdf.sample(
-                self._distance,
-                mesh=self._mesh,
-                seed=seed,
-                float_points=self._dtype == torch.float32,
-                **self._options,
+                source, mesh=mesh, seed=seed, float_points=self._dtype == torch.float32, **self._options
             )
             yield torch.from_numpy(drawn.points).to(self._dtype), torch.from_numpy(drawn.distances).to(self._dtype)

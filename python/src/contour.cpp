@@ -52,12 +52,12 @@ void addContour(FieldClass& fields) {
       "contour", &contourOf, py::kw_only(), "offset"_a = 0.0, "tolerance"_a = 0.0, "domain_cut"_a = "wall",
       "simplify"_a = false, "keep_jumps"_a = false, "threads"_a = 0, "progress"_a = py::none(),
       "Returns the mesh of the surface on which the field has the value `offset`, in units of length: closed and "
-      "without crossings, with sharp edges kept.\n\n"
+      "without crossings, with sharp edges kept. Where the surface has steps between cells, it is that of a blended "
+      "copy of the field, from which the field differs by as much as it jumps.\n\n"
       "tolerance: greatest distance between the mesh and this surface; 0 for a thousandth of the domain's longest "
       "side. domain_cut: 'wall' closes the mesh where the domain cuts the solid, 'open' ends it there. simplify: "
       "merges vertices as far as the tolerance allows, which takes several times as long. "
-      "keep_jumps: follow the steps by which a field jumps between its cells. By default, a copy of such a field is "
-      "blended first.\n\n"
+      "keep_jumps: follows the steps instead, which takes longer and may need much memory.\n\n"
       "Issues a RuntimeWarning where the mesh misses the tolerance.\n\n"
       "Raises Error for options out of range and LimitError (a MemoryError).");
 }

@@ -9,7 +9,6 @@
 
 #include "convert/arrays.h"
 #include "convert/waiting.h"
-#include "hpsdf/output/contour.h"
 #include "hpsdf/output/sample_points.h"
 #include "mesh.h"
 
@@ -50,33 +49,38 @@ SamplePoints samplesFrom(const py::object& source, const py::object& mesh, const
   if (py::isinstance<Field>(source)) {
     const auto& field = source.cast<const Field&>();
     if (hasMesh) return onMesh(field);
-    return resultOf(progress, [&](const Progress& link) {
-      const TriangleMesh surface = blendedContour(field, {.threads = options.threads}, link).mesh;
-      if (surface.triangles.empty())
-        throw Error(ErrorKind::field, "sample",
-                    "the field is positive everywhere, so that there is no surface to sample");
-      return samplePoints(surface, field, options, link);
-    });
+    return resultOf(progress, [&](const Progress& link) { return samplePoints(field, options, link); });
   }
   if (py::isinstance<ExactDistance>(source)) {
     if (!hasMesh) throw py::type_error("mesh: give the mesh from which the exact distance was made");
     return onMesh(source.cast<const ExactDistance&>());
   }
-  if (hasMesh) throw py::type_error("mesh: expected none, because the source is a mesh");
+  if (!isMesh(source))
+    throw py::type_error(
+        "source: expected a TriangleMesh, an object with .vertices and .faces, an ExactDistance or a Field, got '" +
+        std::string(py::str(py::type::of(source).attr("__name__"))) + "'");
+  if (hasMesh) throw py::type_error("mesh: expected none, because the source is a mesh itself");
   const auto surface = meshOf(source);
   return resultOf(progress, [&](const Progress& link) {
     return samplePoints(*surface, ExactDistance(*surface, {.threads = options.threads}, link), options, link);
   });
 }
 
-py::object sample(const py::object& source, const py::object& mesh, std::size_t onSurface, std::size_t onEdges,
-                  std::size_t near, std::size_t uniform, const std::array<double, 2>& widths, double sharpAngle,
+/// Returns a number of points. Raises `OptionError` for one below 0.
+std::size_t countFrom(std::int64_t count, const char* kind) {
+  if (count < 0) throw Error(ErrorKind::option, kind, "expected a number of points from 0");
+  return static_cast<std::size_t>(count);
+}
+
+py::object sample(const py::object& source, const py::object& mesh, std::int64_t onSurface, std::int64_t onEdges,
+                  std::int64_t near, std::int64_t uniform, const std::array<double, 2>& widths, double sharpAngle,
                   double enlargement, bool floatPoints, std::uint64_t seed, int threads, const py::object& progress) {
+  if (threads < 0) throw Error(ErrorKind::option, "threads", "expected 0, for all, or more");
   const SamplePoints samples = samplesFrom(source, mesh,
-                                           {.surface = onSurface,
-                                            .edge = onEdges,
-                                            .near = near,
-                                            .uniform = uniform,
+                                           {.surface = countFrom(onSurface, "surface"),
+                                            .edge = countFrom(onEdges, "edge"),
+                                            .near = countFrom(near, "near"),
+                                            .uniform = countFrom(uniform, "uniform"),
                                             .widths = widths,
                                             .sharpAngleDegrees = sharpAngle,
                                             .enlargement = enlargement,
@@ -104,8 +108,7 @@ void addSamples(py::module_& module) {
       "as the named tuple Samples of arrays with a row for each point.\n\n"
       "source: a mesh, whose exact distances are computed; an ExactDistance, with the mesh from which it was made as "
       "`mesh`, which saves preparing it for each call; or a Field, whose points are drawn on `mesh` or, without one, "
-      "on "
-      "its contour.\n"
+      "on its contour, which ends where the domain does.\n"
       "surface, edge, near, uniform: the numbers of points on the surface, on its sharp edges, near it and in its "
       "enlarged box. The points depend on the seed, not on the number of threads.\n"
       "widths: the two standard deviations of near points, as shares of the surface's radius. sharp_angle: the least "
@@ -114,7 +117,8 @@ void addSamples(py::module_& module) {
       "points, shape (n, 3), in mesh units; distances, negative inside; gradients of the distance, unit vectors, or 0 "
       "beside a hole; kinds: 0 surface, 1 edge, 2 near, 3 uniform; closest: the closest points of the mesh; faces: the "
       "indices of their triangles; normals of these. Samples of a field have its own gradients, of any length, and no "
-      "rows of closest, faces and normals.\n\n"
+      "rows of closest, faces and normals. Of a "
+      "shell, points are drawn on its middle surface, where distances are minus half of the thickness.\n\n"
       "Raises Error for options out of range, MeshError (a ValueError) and LimitError (a MemoryError).");
 }
 

@@ -32,7 +32,7 @@ Expression operandFrom(const std::string& name, const py::object& object) {
   if (py::isinstance<Field>(object)) return object.cast<const Field&>();
   if (py::isinstance<ExactDistance>(object)) {
     const auto exact = object.cast<std::shared_ptr<const ExactDistance>>();
-    return DistanceFunction(exact, exact->source());
+    return DistanceFunction(exact);
   }
   if (py::isinstance<CombinedDistance>(object))
     return DistanceFunction(CombinedDistance(object.cast<const CombinedDistance&>()));

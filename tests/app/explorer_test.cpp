@@ -422,15 +422,15 @@ TEST(Explorer, theFieldIsBlendedOnceForAllContours) {
   Bench bench;
   bench.run(kTorus);
   bench.run("triangles shown=true tolerance=2%");
-  const Field* const blended = &bench.session.continuousField();
+  const Field* const blended = &bench.session.fieldOfContour(0);
   ASSERT_NE(blended, &bench.session.current().field);
   const auto* const nodes = blended->data().nodes.data();
   EXPECT_GT(blended->data().blend, 0);
   bench.run("surface offset=0.05");
   bench.run("triangles tolerance=3%");
-  EXPECT_EQ(bench.session.continuousField().data().nodes.data(), nodes) << "it is the same copy";
+  EXPECT_EQ(bench.session.fieldOfContour(0).data().nodes.data(), nodes) << "it is the same copy";
   bench.run("blend width=0.1");
-  EXPECT_EQ(&bench.session.continuousField(), &bench.session.current().field) << "it is continuous already";
+  EXPECT_EQ(&bench.session.fieldOfContour(0), &bench.session.current().field) << "it is continuous already";
 }
 
 TEST(Explorer, slicesOutlineOperands) {

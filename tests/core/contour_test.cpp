@@ -127,6 +127,17 @@ TEST(Contour, ofBlendedExactLeavesTakesAboutAsMuchWorkAsOfOthers) {
   EXPECT_LT(double(smooth.cells), 4 * double(plain.cells));
 }
 
+TEST(Contour, isBlendedFirstWhereItMayHaveSteps) {
+  const Field gear = exactField("gear");
+  EXPECT_FALSE(mayHaveSteps(gear, 0)) << "the surface passes exact leaves only";
+  EXPECT_TRUE(mayHaveSteps(gear, 0.2)) << "this offset passes polynomials";
+  EXPECT_TRUE(mayHaveSteps(torusField(), 0));
+  EXPECT_FALSE(mayHaveSteps(blended(torusField()), 0));
+  EXPECT_EQ(blendedContour(gear, {.tolerance = 0.01}).mesh.vertices, contour(gear, {.tolerance = 0.01}).mesh.vertices);
+  EXPECT_EQ(blendedContour(torusField(), {.tolerance = 0.01}).mesh.vertices,
+            contour(blended(torusField()), {.tolerance = 0.01}).mesh.vertices);
+}
+
 /// Random leaves disagree, so that the surface jumps from leaf to leaf, and has parts of all sizes.
 class ContourOfARandomField : public testing::TestWithParam<unsigned> {};
 

@@ -269,6 +269,17 @@ TEST(SamplePoints, ofAFieldAreItsValues) {
   }
 }
 
+TEST(SamplePoints, ofAFieldAreDrawnOnItsContourWithinTheDomain) {
+  const Box domain(Vector3::Constant(-1), Vector3::Constant(1));
+  const Field plane = build([](const Vector3& x) { return x.z() - 0.1; }, domain, {.targetError = 1e-6});
+  const SamplePoints samples = samplePoints(plane, only(PointKind::surface, 1000));
+  for (const Vector3& point : samples.points) EXPECT_NEAR(point.z(), 0.1, 1e-3) << "not on a wall of the domain";
+  for (const double level : {-5.0, 5.0}) {
+    const Field everywhere = build([&](const Vector3& x) { return x.z() - level; }, domain, {.targetError = 1e-6});
+    EXPECT_THROW(samplePoints(everywhere, only(PointKind::surface, 10)), Error);
+  }
+}
+
 TEST(SamplePoints, refuseOptionsOutOfRange) {
   const TriangleMesh mesh = support::boxOfTwo();
   const ExactDistance distance(mesh);
@@ -291,7 +302,8 @@ TEST(SamplePoints, refuseOptionsOutOfRange) {
   EXPECT_THAT(refusal({.surface = std::numeric_limits<std::size_t>::max()}),
               testing::HasSubstr("ask for fewer points"));
   EXPECT_THAT(refusal({.widths = {1e101, 1e308}}), testing::HasSubstr("exceed 1e100"));
-  EXPECT_THAT(refusal({.widths = {1e38, 1e38}, .floatPoints = true}), testing::HasSubstr("exceed the range of floats"));
+  EXPECT_THAT(refusal({.widths = {1e38, 1e38}, .floatPoints = true}),
+              testing::HasSubstr("exceed the range of single precision"));
   EXPECT_THROW(samplePoints(shapes::mesh("gear"), distance), Error) << "another mesh";
   EXPECT_THROW(samplePoints(mesh, distance, {}, {.cancelled = [] { return true; }}), Cancelled);
 }

@@ -85,8 +85,10 @@ def test_samples_of_fields(field: hpsdf.Field, mesh: hpsdf.TriangleMesh, program
 
 
 def test_samples_of_what_cannot_be_sampled(mesh: hpsdf.TriangleMesh, exact: hpsdf.ExactDistance) -> None:
-    with pytest.raises(TypeError):
+    with pytest.raises(hpsdf.OptionError, match="near: expected a number of points from 0"):
         hpsdf.sample(mesh, near=-1)
+    with pytest.raises(TypeError, match="source: expected a TriangleMesh.* got 'str'"):
+        hpsdf.sample("builtin:torus")  # type: ignore[arg-type]
     with pytest.raises(hpsdf.OptionError, match="widths"):
         hpsdf.sample(mesh, widths=(0.1, 0.0))
     with pytest.raises(TypeError, match="mesh: give the mesh"):
@@ -98,6 +100,12 @@ def test_samples_of_what_cannot_be_sampled(mesh: hpsdf.TriangleMesh, exact: hpsd
     outside = hpsdf.build(lambda points: numpy.full(len(points), 1.0), box=((-1,) * 3, (1,) * 3), target_error=1e-3)
     with pytest.raises(hpsdf.FieldError, match="no surface to sample"):
         hpsdf.sample(outside)
+
+
+def test_samples_of_a_field_that_its_domain_cuts() -> None:
+    half_space = hpsdf.build(lambda points: points[:, 2], box=((-1,) * 3, (1,) * 3), target_error=1e-6)
+    samples = hpsdf.sample(half_space, surface=1000, near=0, uniform=0)
+    assert abs(samples.points[:, 2]).max() < 1e-3, "the walls of the domain are no surface"
 
 
 def test_inside_tests(mesh: hpsdf.TriangleMesh) -> None:

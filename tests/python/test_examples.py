@@ -115,17 +115,17 @@ def test_pictures_of_the_manual(made_by_the_manual: pathlib.Path) -> None:
     kept = {name: pixels_of(ROOT / "docs" / "python" / name) for name in names}
     for name in names:
         # what a network learns depends on the processor
-        allowed = 0.5 if name == "learnt.png" else 0.005
+        allowed = 0.3 if name == "learnt.png" else 0.005
         made = made_by_the_manual / name
         difference = share_of_other_pixels(pixels_of(made), kept[name])
         assert difference < allowed, f"{made} differs from docs/python/{name}: if it is right, copy it there"
-    for one, other in zip(names, names[1:]):
-        assert share_of_other_pixels(kept[one], kept[other]) > 0.01, "the comparison would not notice another picture"
+        blank = numpy.full_like(kept[name], 250)
+        assert share_of_other_pixels(blank, kept[name]) > allowed, "the comparison would not notice an empty picture"
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: str(notebook.stem))
 def test_notebooks(notebook: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs a notebook as nbconvert does. No cell may fail or warn, and the last one of each kind of output shows something."""
+    """Runs a notebook as nbconvert does. No cell may fail or warn, and there are pictures, which are not empty, and text."""
     package("ipykernel")
     processors, clients, nbformat = package("nbconvert.preprocessors"), package("jupyter_client"), package("nbformat")
     if "torch" in notebook.read_text(encoding="utf-8"):
@@ -133,6 +133,8 @@ def test_notebooks(notebook: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.delenv("PYTEST_CURRENT_TEST", raising=False)
     book = nbformat.read(notebook, as_version=4)
     assert all(not cell.get("outputs") for cell in book.cells), "notebooks are kept without their outputs"
+    words = [len(cell.source.split()) for cell in book.cells if cell.cell_type == "markdown"]
+    assert len(words) > 3 and min(words) > 8, "each step is explained"
     kernel = clients.AsyncKernelManager(kernel_name="python3")
     kernel.kernel_cmd = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
     processors.ExecutePreprocessor(timeout=300).preprocess(book, {"metadata": {"path": str(ROOT)}}, km=kernel)

@@ -1,5 +1,6 @@
 """Expressions of solids: meshes, fields, distances, callables and files as operands."""
 
+import gc
 import pathlib
 from collections.abc import Callable
 from typing import Any
@@ -36,6 +37,15 @@ def test_fields_of_expressions_equal_those_of_the_program(mesh: hpsdf.TriangleMe
     field = hpsdf.build(hpsdf.combine(expression), target_error=1e-4)
     field.save(tmp_path / "python.hpsdf")
     assert (tmp_path / "python.hpsdf").read_bytes() == (tmp_path / "program.hpsdf").read_bytes()
+
+
+def test_operands_live_as_long_as_the_distance(mesh: hpsdf.TriangleMesh, points: Array) -> None:
+    operand = hpsdf.ExactDistance(mesh)
+    expected = operand(points)
+    combined = hpsdf.combine("offset(a, 0.1)", a=operand)
+    del operand
+    gc.collect()
+    assert numpy.array_equal(combined(points), expected - 0.1)
 
 
 def test_files_as_operands(field: hpsdf.Field, tmp_path: pathlib.Path, points: Array) -> None:

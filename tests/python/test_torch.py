@@ -117,13 +117,18 @@ def test_samples_are_the_same_for_any_number_of_workers(mesh: hpsdf.TriangleMesh
     shared = list(torch.utils.data.DataLoader(data, batch_size=None, num_workers=2, multiprocessing_context="spawn"))
     key = lambda batch: batch[0][0, 0].item()
     assert all(torch.equal(a[0], b[0]) for a, b in zip(sorted(alone, key=key), sorted(shared, key=key)))
+    prepared = list(hpsdf.torch.Samples(exact, mesh=mesh, batches=3, near=200, seed=5, dtype=torch.float64))
+    assert all(torch.equal(a[0], b[0]) and torch.equal(a[1], b[1]) for a, b in zip(alone, prepared))
     others = list(hpsdf.torch.Samples(mesh, batches=3, near=200, seed=6, dtype=torch.float64))
     assert not any(torch.equal(a[0], b[0]) for a in alone for b in others)
     mistakes: list[tuple[dict[str, Any], type[Exception]]] = [
         ({"batches": -1}, ValueError),
         ({"batches": 1, "seed": -1}, ValueError),
         ({"batches": 1, "nearr": 2}, TypeError),
-        ({"batches": 1, "dtype": torch.float16}, TypeError),
+        ({"batches": 1, "near": 2, "dtype": torch.float16}, TypeError),
+        ({"batches": 2.5, "near": 2}, TypeError),
+        ({"batches": 1, "near": -2}, ValueError),
+        ({"batches": 1}, ValueError),
     ]
     for wrong, error in mistakes:
         with pytest.raises(error):

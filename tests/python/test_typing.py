@@ -83,6 +83,12 @@ def parameters_of_extension(docstring: str) -> dict[str, str | None]:
     return parameters_of(signature)
 
 
+def settings_of(text: str) -> dict[str, tuple[list[str], str]]:
+    """Returns the words and the default of each setting from the help of `build`."""
+    lines = re.findall(r"^(\w+): (.*)$", text, flags=re.MULTILINE)
+    return {name: (re.findall(r"'(\w+)'", line) if "|" in line else [], line.partition("; default ")[2]) for name, line in lines}
+
+
 def functions_of_the_stub() -> list[tuple[str, ast.FunctionDef]]:
     """Returns the public functions and methods of the stub that are not properties, by their names."""
     found = []
@@ -105,8 +111,12 @@ def test_signatures_equal_those_of_the_extension(name: str, function: ast.Functi
         return
     ours, theirs = parameters_of(function), parameters_of_extension(str(made.__doc__))
     if name == "build":
-        settings = re.findall(r"^(\w+): ", str(made.__doc__).split("The options of the construction:")[1], flags=re.MULTILINE)
-        assert [key for key in ours if key not in theirs] == settings
+        settings = settings_of(str(made.__doc__).split("The options of the construction:")[1])
+        assert [key for key in ours if key not in theirs] == list(settings)
+        for key, (words, default) in settings.items():
+            assert ours[key] == "None" or str(ours[key]).strip("'").lower() == default, key
+            declared = next(ast.unparse(argument) for argument in function.args.kwonlyargs if argument.arg == key)
+            assert not words or re.findall(r"'(\w+)'", declared) == words, key
         ours = {key: value for key, value in ours.items() if key not in settings}
     same = [key for key, value in ours.items() if value not in (None, "...")]
     assert list(ours) == list(theirs) and {key: ours[key] for key in same} == {key: theirs[key] for key in same}

@@ -143,11 +143,11 @@ std::vector<WrittenContour> writeContours(Session& session, const Arguments& arg
   const int threads = arguments.whole("threads");
   const double tolerance = toleranceOf(arguments, current);
   const render::ReferenceData colorData = vertexColorData(session, arguments);
-  const Field* followed = &current;
-  if (!arguments.flag("keep-jumps")) followed = withThreads(threads, [&] { return &session.continuousField(); });
   std::vector<WrittenContour> all;
   for (const double offset : arguments.numbers("offset")) {
     const std::string file = fileOf(arguments.text("output"), offset);
+    const Field* followed = &current;
+    if (!arguments.flag("keep-jumps")) followed = withThreads(threads, [&] { return &session.fieldOfContour(offset); });
     const ContourOptions options{.offset = offset,
                                  .tolerance = tolerance,
                                  .domainCut = arguments.text("cut") == "open" ? DomainCut::open : DomainCut::wall,

@@ -16,7 +16,6 @@
 #include "construction/surface.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
-#include "hpsdf/output/contour.h"
 #include "hpsdf/output/sample_file.h"
 #include "hpsdf/output/sample_points.h"
 #include "session/field_argument.h"
@@ -101,22 +100,19 @@ MadeSamples samplesOfMesh(const Console& console, const std::string& surface, co
   });
 }
 
-/// Returns the surface on which points of a field are drawn: the given mesh or, without one, the field's contour.
-TriangleMesh surfaceOfField(const Console& console, const Field& field, const Arguments& arguments) {
-  if (arguments.has("mesh")) {
-    const std::string surface = arguments.text("mesh");
-    const bool normalizes = !field.metadata().source.normalization.isIdentity();
-    return namingSurface(surface, [&] {
-      requireMesh(surface);
-      PreparedSurface prepared = prepareSurface(console, surface, normalizes);
-      return std::move(prepared.mesh);
-    });
-  }
-  return withProgress(console, [&](const Progress& progress) {
-    const ContourOptions options{.threads = arguments.whole("threads")};
-    TriangleMesh mesh = blendedContour(field, options, progress).mesh;
-    if (mesh.triangles.empty()) throw Error("the field is positive everywhere, so that there is no surface to sample");
-    return mesh;
+/// Returns the samples of a field on the given mesh or, without one, on the field's contour.
+SamplePoints drawnFromField(const Console& console, const Field& field, const Arguments& arguments) {
+  const SamplePointsOptions options = sampleOptions(arguments);
+  const auto draw = [&](const auto&... surface) {
+    return withProgress(console,
+                        [&](const Progress& progress) { return samplePoints(surface..., field, options, progress); });
+  };
+  if (!arguments.has("mesh")) return draw();
+  const std::string surface = arguments.text("mesh");
+  const bool normalizes = !field.metadata().source.normalization.isIdentity();
+  return namingSurface(surface, [&] {
+    requireMesh(surface);
+    return draw(prepareSurface(console, surface, normalizes).mesh);
   });
 }
 
@@ -124,11 +120,7 @@ MadeSamples samplesOfField(const Session& session, const Arguments& arguments) {
   for (const char* option : {"sign", "hull", "thickness", "unit-sphere"})
     if (arguments.given(option))
       throw Error(fmt::format("{}: applies to meshes only: leave it out for a field", option));
-  const Field& field = session.current().field;
-  const TriangleMesh surface = surfaceOfField(session.console(), field, arguments);
-  return {.samples = withProgress(session.console(), [&](const Progress& progress) {
-            return samplePoints(surface, field, sampleOptions(arguments), progress);
-          })};
+  return {.samples = drawnFromField(session.console(), session.current().field, arguments)};
 }
 
 MadeSamples makeSamples(Session& session, const Arguments& arguments) {

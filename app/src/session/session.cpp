@@ -135,16 +135,16 @@ const std::vector<render::OutlinedSolid>& Session::operands(const std::string& e
   return *operands_;
 }
 
-const Field& Session::continuousField() {
+const Field& Session::fieldOfContour(double offset) {
   const Field& field = current().field;
-  if (field.data().blend != 0) return field;
+  if (!mayHaveSteps(field, offset)) return field;
   if (!blended_) blended_ = blended(field);
   return *blended_;
 }
 
 const Contour& Session::contour(const ContourChoice& choice) {
   if (!knowsContour(choice)) {
-    const Field& field = continuousField();
+    const Field& field = fieldOfContour(choice.offset);
     contour_ = withProgress(console_, [&](const Progress& progress) {
       const ContourOptions options{.offset = choice.offset, .tolerance = choice.tolerance, .simplify = choice.simplify};
       return hpsdf::contour(field, options, progress);

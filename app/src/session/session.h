@@ -145,11 +145,11 @@ class Session {
   /// expression for the word "own". They are kept for later calls. Throws as `loadedOperands` does.
   const std::vector<render::OutlinedSolid>& operands(const std::string& expression);
 
-  /// Returns the field whose contours the command `contour` writes unless it keeps jumps: the current field, or a
-  /// blended copy if the current field jumps between cells. The copy is kept until the field changes.
-  const Field& continuousField();
+  /// Returns the field whose contour at this offset the command `contour` writes unless it keeps jumps: the current
+  /// field, or a blended copy if the contour may have steps between cells. The copy is kept until the field changes.
+  const Field& fieldOfContour(double offset);
 
-  /// Returns the contour that the command `contour` would write: of `continuousField`.
+  /// Returns the contour that the command `contour` would write: of `fieldOfContour`.
   /// The last one is kept. Throws as `hpsdf::contour` does.
   const Contour& contour(const ContourChoice& choice);
   /// True if `contour` would return the contour that is kept.

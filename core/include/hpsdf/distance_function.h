@@ -84,6 +84,10 @@ class DistanceFunction {
 
   /// Shares a callable with its other owners.
   template <typename Callable>
+  explicit DistanceFunction(std::shared_ptr<const Callable> callable)
+      : DistanceFunction(callable, sourceOf(*callable)) {}
+
+  template <typename Callable>
   DistanceFunction(std::shared_ptr<const Callable> callable, Source source)
       : evaluate_(adapt(callable)),
         gradients_(gradientsOf(callable)),

@@ -23,6 +23,7 @@
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
+#include "hpsdf/range.h"
 #include "util/chunks.h"
 
 namespace hpsdf {
@@ -423,8 +424,42 @@ Contour contour(const Field& field, const ContourOptions& options, const Progres
                      [&] { return contouring::Contouring(field, options, tolerance, progress).make(); });
 }
 
+namespace {
+
+/// Returns true if the field may have a value in a box, which is halved along each axis up to so many times.
+bool takes(const RangeIndex& index, double value, const Box& box, int halvings) {
+  const Interval range = index.range(box).value;
+  if (value < range.min || value > range.max) return false;
+  if (halvings == 0) return true;
+  const Vector3 half = box.sizes() / 2;
+  for (int child = 0; child < 8; ++child) {
+    const Vector3 low = box.min() + half.cwiseProduct(Vector3(child & 1, child >> 1 & 1, child >> 2));
+    if (takes(index, value, Box(low, low + half), halvings - 1)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool mayHaveSteps(const Field& field, double offset) {
+  constexpr int kHalvings = 6;  // of a cell, to bound the field's values in its parts
+  const FieldData& data = field.data();
+  if (data.blend != 0) return false;
+  if (data.exact.empty()) return true;
+  const int stepless = offset == -data.exact.offset ? 1 : -1;  // degree up to which polynomials continue exact leaves
+  const RangeIndex index(field, 0, Interval{offset, offset});
+  bool found = false;
+  field.forEachCell([&](const Cell& cell) {
+    if (found || cell.degree == kExactDegree || cell.degree <= stepless) return;
+    const Vector3 inset = 1e-9 * cell.box.sizes();  // values on the faces are those of neighbours too
+    found = takes(index, offset, Box(cell.box.min() + inset, cell.box.max() - inset), kHalvings);
+  });
+  return found;
+}
+
 Contour blendedContour(const Field& field, const ContourOptions& options, const Progress& progress) {
-  return field.data().blend == 0 ? contour(blended(field), options, progress) : contour(field, options, progress);
+  return mayHaveSteps(field, options.offset) ? contour(blended(field), options, progress)
+                                             : contour(field, options, progress);
 }
 
 }  // namespace hpsdf

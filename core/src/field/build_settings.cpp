@@ -188,8 +188,8 @@ const std::vector<Row> kRows = {
     {"certified", kAsked, flag().of("tolerance", isTolerant).suitsTolerance().stored(19),
      member<&BuildOptions::certified>,
      "Takes only polynomials whose errors are proven to be within the tolerance at every point, not only at those that "
-     "are checked. It takes longer and gives a larger field. It needs a mesh without holes, and excludes "
-     "the inside test pseudonormal, but for where the automatic choice takes it."},
+     "are checked. It takes longer and gives a larger field. It needs a mesh without holes, and the "
+     "automatic inside test or the one by winding numbers."},
     {"target-error", kAsked, number().above(0).in("units^5 at that scale").ends(Ending::target).stored(1),
      kWeightedError,
      "τ, the weighted squared error to reach, for a mesh whose longest side is 2; internally τ·(L/2)^5, where L is "

@@ -1,7 +1,5 @@
 #include "samples/draw_points.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "hpsdf/detail/random_points.h"
 #include "mesh/area_points.h"
 #include "mesh/connectivity.h"
+#include "util/chunks.h"
 #include "util/number_text.h"
 #include "util/single_precision.h"
 
@@ -84,7 +83,8 @@ class SharpEdges {
 /// Draws the points of all kinds, kind after kind.
 class KindByKind {
  public:
-  KindByKind(const TriangleMesh& surface, const SamplePointsOptions& options) : surface_(surface), options_(options) {
+  KindByKind(const TriangleMesh& surface, const SamplePointsOptions& options, const Progress& progress)
+      : surface_(surface), options_(options), progress_(progress) {
     const std::size_t all = options.surface + options.edge + options.near + options.uniform;
     drawn_.points.resize(all);
     drawn_.kinds.reserve(all);
@@ -119,15 +119,20 @@ class KindByKind {
     const std::uint64_t seed = Random(options_.seed, static_cast<std::uint64_t>(kind)).next();
     const std::size_t first = drawn_.kinds.size();
     drawn_.kinds.insert(drawn_.kinds.end(), count, kind);
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      Random random(seed, i);
-      const Vector3 point = draw(random, i);
-      drawn_.points[first + i] = options_.floatPoints ? detail::inSinglePrecision(point) : point;
-    });
+    constexpr std::size_t kChunk = 4096;
+    detail::forEachChunk(count, kChunk, progress_, "drawing points",
+                         [&](std::size_t, std::size_t begin, std::size_t n) {
+                           for (std::size_t i = begin; i < begin + n; ++i) {
+                             Random random(seed, i);
+                             const Vector3 point = draw(random, i);
+                             drawn_.points[first + i] = options_.floatPoints ? detail::inSinglePrecision(point) : point;
+                           }
+                         });
   }
 
   const TriangleMesh& surface_;
   const SamplePointsOptions& options_;
+  const Progress& progress_;
   DrawnPoints drawn_;
 };
 
@@ -146,14 +151,15 @@ Box uniformBox(const TriangleMesh& surface, double enlargement) {
   return {box.min() - margin, box.max() + margin};
 }
 
-DrawnPoints drawPoints(const TriangleMesh& surface, const SamplePointsOptions& options) {
-  DrawnPoints drawn = KindByKind(surface, options).draw();
+DrawnPoints drawPoints(const TriangleMesh& surface, const SamplePointsOptions& options, const Progress& progress) {
+  DrawnPoints drawn = KindByKind(surface, options, progress).draw();
   const auto isInRange = [](const Vector3& x) { return x.cwiseAbs().maxCoeff() <= kLargestCoordinate; };
   if (!std::ranges::all_of(drawn.points, isInRange))
-    throw Error(ErrorKind::option, "samples",
-                options.floatPoints
-                    ? "coordinates of points exceed the range of floats; write doubles, or scale the mesh"
-                    : "coordinates of points exceed 1e100; give a smaller width or box");
+    throw Error(
+        ErrorKind::option, "samples",
+        options.floatPoints
+            ? "coordinates of points exceed the range of single precision; take double precision, or scale the mesh"
+            : "coordinates of points exceed 1e100; give a smaller width or box");
   return drawn;
 }
 

@@ -15,8 +15,8 @@ struct DrawnPoints {
 
 /// Draws the points that the options ask for from a surface. Each point has random numbers of its own, so that it
 /// depends only on the seed, its kind and its number within the kind. Throws `Error` if a coordinate exceeds
-/// `kLargestCoordinate` or, rounded to float, the range of floats.
-DrawnPoints drawPoints(const TriangleMesh& surface, const SamplePointsOptions& options);
+/// `kLargestCoordinate` or, rounded to float, the range of floats, and `Cancelled` when `progress` says so.
+DrawnPoints drawPoints(const TriangleMesh& surface, const SamplePointsOptions& options, const Progress& progress);
 
 /// Returns the unit normal of a triangle, or 0 for a triangle without area.
 Vector3 normalOf(const TriangleMesh& mesh, std::size_t triangle);

@@ -8,6 +8,7 @@
 
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/threads.h"
+#include "hpsdf/output/contour.h"
 #include "hpsdf/output/sample_points.h"
 #include "samples/draw_points.h"
 #include "util/chunks.h"
@@ -74,7 +75,7 @@ Vector3 gradientAt(const Vector3& x, const ClosestPoint& closest, const Vector3&
 
 SamplePoints exactSamples(const TriangleMesh& mesh, const TriangleMesh& surface, const ExactDistance& distance,
                           const SamplePointsOptions& options, const Progress& progress) {
-  samples::DrawnPoints drawn = samples::drawPoints(surface, options);
+  samples::DrawnPoints drawn = samples::drawPoints(surface, options, progress);
   const std::size_t count = drawn.points.size();
   SamplePoints result;
   result.distances.resize(count);
@@ -121,7 +122,7 @@ SamplePoints samplePoints(const TriangleMesh& mesh, const Field& field, const Sa
   requireSampleOptions(options);
   requireValidIndices(mesh);
   return withThreads(options.threads, [&] {
-    samples::DrawnPoints drawn = samples::drawPoints(mesh, options);
+    samples::DrawnPoints drawn = samples::drawPoints(mesh, options, progress);
     SamplePoints result;
     result.distances.resize(drawn.points.size());
     result.gradients.resize(drawn.points.size());
@@ -137,6 +138,16 @@ SamplePoints samplePoints(const TriangleMesh& mesh, const Field& field, const Sa
     result.kinds = std::move(drawn.kinds);
     return result;
   });
+}
+
+SamplePoints samplePoints(const Field& field, const SamplePointsOptions& options, const Progress& progress) {
+  requireSampleOptions(options);
+  const ContourOptions open{.domainCut = DomainCut::open, .threads = options.threads};
+  const TriangleMesh surface = blendedContour(field, open, progress).mesh;
+  if (surface.triangles.empty())
+    throw Error(ErrorKind::field, "samples",
+                "the field has the same sign everywhere, so that there is no surface to sample");
+  return samplePoints(surface, field, options, progress);
 }
 
 }  // namespace hpsdf

@@ -53,8 +53,9 @@ double numberOf(const std::string& name, const py::handle& value) {
 std::vector<double> valueOf(const BuildSetting& setting, const std::string& name, const py::handle& value) {
   if (setting.type == Type::choice) throw py::type_error(name + ": expected a string");
   if (setting.type == Type::flag) {
-    if (!py::isinstance<py::bool_>(value)) throw py::type_error(name + ": expected True or False");
-    return {value.cast<bool>() ? 1.0 : 0.0};
+    py::detail::make_caster<bool> flag;  // takes NumPy's bool too
+    if (!flag.load(value, false)) throw py::type_error(name + ": expected True or False");
+    return {static_cast<bool>(flag) ? 1.0 : 0.0};
   }
   if (setting.type != Type::wholeNumbers || !py::isinstance<py::sequence>(value)) return {numberOf(name, value)};
   std::vector<double> numbers;

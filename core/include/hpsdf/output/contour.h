@@ -76,8 +76,13 @@ double leastSinglePrecisionTolerance(const Field& field);
 /// `progress` says so.
 Contour contour(const Field& field, const ContourOptions& options = {}, const Progress& progress = {});
 
-/// Does the same for a field that jumps between its leaves after blending a copy of it (`blended`), so that the mesh
-/// has no steps.
+/// Returns true if the surface on which the field has the value `offset` may have steps between leaves. It has none in
+/// a blended field, and none where it passes only through exact leaves and the linear polynomials in place of plane
+/// triangles.
+bool mayHaveSteps(const Field& field, double offset);
+
+/// Makes the contour of the field or, if that may have steps (`mayHaveSteps`), of a blended copy (`blended`), from
+/// which the field differs by no more than it jumps. The tolerance is then that to the surface of the copy.
 Contour blendedContour(const Field& field, const ContourOptions& options = {}, const Progress& progress = {});
 
 }  // namespace hpsdf

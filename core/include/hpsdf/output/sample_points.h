@@ -82,9 +82,13 @@ SamplePoints samplePoints(const TriangleMesh& mesh, const ExactDistance& distanc
                           const SamplePointsOptions& options = {}, const Progress& progress = {});
 
 /// Draws random points in the same way and evaluates a field at them. `mesh` is the surface from which they are drawn:
-/// the mesh from which the field was made, or the contour of the field. Gradients are those of the field, of any
-/// length. Throws as the function above.
+/// the mesh from which the field was made, or another surface. Gradients are those of the field, of any length. Throws
+/// as the function above.
 SamplePoints samplePoints(const TriangleMesh& mesh, const Field& field, const SamplePointsOptions& options = {},
                           const Progress& progress = {});
+
+/// Does the same with the points drawn from the field's own contour (`blendedContour`), which ends where the domain
+/// does. Throws `Error` besides if the field has the same sign everywhere.
+SamplePoints samplePoints(const Field& field, const SamplePointsOptions& options = {}, const Progress& progress = {});
 
 }  // namespace hpsdf
