@@ -39,7 +39,7 @@ void candidateCells(ivec3 cellIndex, int depth, vec3 fraction, int level, float 
 // at this face, or kWall if the face lies on the domain's boundary.
 ivec3 smallestNeighbour(uint extents, vec3 local) {
   uvec3 shift = uvec3(0u, 10u, 20u) + 5u * uvec3(greaterThan(local, vec3(0.0)));
-  return ivec3(uvec3(extents) >> shift & kWall);
+  return ivec3(uvec3(extents) >> shift & uint(kWall));
 }
 
 // Returns, for each axis, the distance of a point from the leaf's nearer face, positive inside the leaf. The

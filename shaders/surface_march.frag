@@ -293,10 +293,10 @@ void crossIntersectingTriangles(MarchRay ray, LeafPoint leaf, inout March march)
     Crossings found = crossingsOf(leaf.at.node, start, ray.world, from, toExit + ray.nudge);
     bool outer = march.side > 0.0;
     float entry = outer ? found.fromOutside : found.fromInside;
-    bool isBehind = i == 0 && entry > clear && signFromWinding(leaf.at.node, start + clear * ray.world) == -march.side;
+    bool isBehind = i == 0 && entry > clear && float(signFromWinding(leaf.at.node, start + clear * ray.world)) == -march.side;
     if (isBehind) march.kind = kOnFace;
     if (isBehind || entry == kNever) break;
-    if (signFromWinding(leaf.at.node, start + (entry + clear) * ray.world) == -march.side) {
+    if (float(signFromWinding(leaf.at.node, start + (entry + clear) * ray.world)) == -march.side) {
       march.kind = kOnTriangle;
       march.lastLeaf = outer ? found.outer : found.inner;
       march.bracket.x = entry;

@@ -22,7 +22,8 @@ namespace include_direction_test {
 namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
-constexpr std::array<std::string_view, 7> kRooms = {"core", "render", "physics", "openvdb", "app", "c", "python"};
+constexpr std::array<std::string_view, 8> kRooms = {"core", "render", "physics", "openvdb",
+                                                    "web",  "app",    "c",       "python"};
 constexpr std::size_t kMostFilesInFolder = 20;
 constexpr std::size_t kMostFilesInAppItself = 4;
 
@@ -30,6 +31,7 @@ bool isRoom(std::string_view name) { return std::find(kRooms.begin(), kRooms.end
 
 /// Returns true if a file in the top-level folder `from` may include a file in the top-level folder `to`.
 bool mayInclude(std::string_view from, std::string_view to) {
+  if (from == "web") return to == from;
   if (from == "python") return to == from || to == "core" || to == "render" || to == "app";
   return from == to || to == "core" || (from == "app" && to != "c" && to != "python");
 }
@@ -164,7 +166,7 @@ std::set<std::string> quotedWords(const std::string& cell) {
 /// Reads table rows of the form "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
 Folders parseFolders(const std::string& design) {
   static const std::regex row(
-      R"(^\| `((?:core|render|physics|openvdb|app|c|python)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
+      R"(^\| `((?:core|render|physics|openvdb|web|app|c|python)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
   Folders folders;
   std::istringstream stream(design);
   std::string line;

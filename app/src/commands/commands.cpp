@@ -30,6 +30,7 @@ Registry makeRegistry() {
   addUiCommand(registry);
   addWindowCommand(registry);
   addReportCommand(registry);
+  addPageCommand(registry);
   addStudyCommand(registry);
   addSimulateCommand(registry);
   addCheckCommands(registry);

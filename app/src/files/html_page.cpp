@@ -124,9 +124,10 @@ std::string pictureSlider(const std::vector<std::string>& names) {
       side(0), side(1));
 }
 
-std::string htmlPng(std::string_view bytes) {
+std::string base64(std::string_view bytes) {
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text = "data:image/png;base64,";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
   for (std::size_t n = 0; n < bytes.size(); n += 3) {
     std::uint32_t group = 0;
     for (std::size_t k = 0; k < 3; ++k)
@@ -135,6 +136,8 @@ std::string htmlPng(std::string_view bytes) {
   }
   return text;
 }
+
+std::string htmlPng(std::string_view bytes) { return "data:image/png;base64," + base64(bytes); }
 
 std::string htmlEscaped(const std::string& text) {
   std::string result;

@@ -15,6 +15,7 @@ void addMotionCommands(Registry& registry);
 void addFigureCommands(Registry& registry);
 
 /// Adds the command `report`, which writes a page about one field.
+void addPageCommand(Registry& registry);
 void addReportCommand(Registry& registry);
 
 }  // namespace hpsdf::app

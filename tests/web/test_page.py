@@ -1,0 +1,206 @@
+"""The page of a field, in a browser: its values against the program's, its controls by real events, and what is said of damage."""
+
+import csv
+import io
+import pathlib
+import subprocess
+from collections.abc import Callable
+from typing import Any
+
+import numpy
+import pytest
+
+from conftest import package, started
+
+ROOT = pathlib.Path(__file__).parents[2]
+SIZE = (400, 300)
+
+
+def opened(browser: Any, page: pathlib.Path) -> Any:
+    """Opens a page and waits until its first sharp picture is drawn, or until it tells why it draws none."""
+    browser.get(page.as_uri())
+    rested(browser)
+    return browser
+
+
+def rested(browser: Any) -> str:
+    """Waits for the sharp picture of the view, and returns the page's state."""
+    wait = package("selenium.webdriver.support.ui").WebDriverWait(browser, 120)
+    return str(wait.until(lambda page: page.execute_script("return ['sharp', 'failed'].find(s => s === document.body.dataset.state)")))
+
+
+def asked(browser: Any, script: str, *arguments: Any) -> Any:
+    """Runs a script with the page's functions."""
+    return browser.execute_script("const {page, field, query, firstView, planeOf, raysOf, scriptOf, degreeOf, add, scaled} = hpsdf;" + script, *arguments)
+
+
+def complaints(browser: Any) -> list[str]:
+    """What the browser logged, but for remarks on its software renderer."""
+    remarks = ("software WebGL", "GPU stall due to ReadPixels")
+    return [entry["message"] for entry in browser.get_log("browser") if not any(remark in entry["message"] for remark in remarks)]
+
+
+def columns(text: str) -> dict[str, Any]:
+    rows = list(csv.DictReader(io.StringIO(text)))
+    return {name: numpy.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def points_in(browser: Any, count: int) -> Any:
+    lower, upper = asked(browser, "return [field.lower, field.upper]")
+    return numpy.random.default_rng(1).uniform(lower, upper, (count, 3))
+
+
+def queried(program: Callable[..., str], field: pathlib.Path, points: Any, folder: pathlib.Path) -> dict[str, Any]:
+    file = folder / "points.txt"
+    file.write_text("\n".join(" ".join(repr(float(x)) for x in point) for point in points))
+    return columns(program("query", field, file))
+
+
+def test_values_and_gradients_equal_those_of_the_program(
+    browser: Any, field: pathlib.Path, program: Callable[..., str], tmp_path: pathlib.Path
+) -> None:
+    opened(browser, field.with_suffix(".html"))
+    points = points_in(browser, 500)
+    ours = asked(browser, "return arguments[0].map(p => { const q = query(field, p); return [q.value, ...q.gradient]; })", points.tolist())
+    theirs = queried(program, field, points, tmp_path)
+    expected = numpy.stack([theirs[name] for name in ("distance", "gx", "gy", "gz")], axis=1)
+    assert abs(numpy.array(ours) - expected).max() < 1e-5
+    assert abs(numpy.array(ours)[:, 0] - numpy.roll(expected[:, 0], 1)).max() > 0.1, "the comparison would notice other values"
+
+
+def pixels(browser: Any, view: str) -> tuple[Any, Any]:
+    """Returns the buffers of a view: integers of the shape (height, width, 4), and their bits as floats."""
+    script = f"""
+        const [width, height] = [{SIZE[0]}, {SIZE[1]}];
+        return Array.from(page.painter.renderer.{view}.read());
+    """
+    integers = numpy.array(asked(browser, script), dtype=numpy.uint32).reshape(SIZE[1], SIZE[0], 4)
+    return integers, integers.view(numpy.float32)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_slices_show_the_cells_of_the_field(browser: Any, field: pathlib.Path, axis: int) -> None:
+    opened(browser, field.with_suffix(".html"))
+    view = f"slice(planeOf({{...firstView(field), axis: {axis}, zoom: 1.3}}, field, width, height), width, height)"
+    integers, floats = pixels(browser, view)
+    script = f"""
+        const plane = planeOf({{...firstView(field), axis: {axis}, zoom: 1.3}}, field, {SIZE[0]}, {SIZE[1]});
+        const found = [];
+        for (let y = 0; y < {SIZE[1]}; y += 3) for (let x = 0; x < {SIZE[0]}; x += 3) {{
+          const u = (2 * x + 1 - {SIZE[0]}) / {SIZE[0]}, v = ({SIZE[1]} - 2 * y - 1) / {SIZE[1]};
+          const q = query(field, add(plane.origin, add(scaled(plane.right, u), scaled(plane.up, v))));
+          found.push(q ? [q.leaf.node, degreeOf(field, q.leaf.node), q.leaf.depth, q.value] : [4294967295, 0, 0, 0]);
+        }}
+        return found;
+    """
+    expected = numpy.array(asked(browser, script)).reshape(SIZE[1] // 3, -1, 4)
+    ours, values = integers[::3, ::3], floats[::3, ::3, 3]
+    same = (ours[..., :3] == expected[..., :3]).all(axis=2)
+    assert same.mean() > 0.999, "all but pixels on a face, whose positions round otherwise"
+    assert abs(values - expected[..., 3])[same].max() < 1e-5
+    assert not (ours[..., :3] == numpy.roll(expected[..., :3], 5, axis=0)).all(axis=2).mean() > 0.999
+
+
+def test_surfaces_lie_where_the_field_has_the_offset(browser: Any, field: pathlib.Path) -> None:
+    opened(browser, field.with_suffix(".html"))
+    for offset in (0, 0.1):
+        view = f"surface(raysOf(firstView(field).orbit, field, width / height), width, height, {offset})"
+        integers, floats = pixels(browser, view)
+        hits = integers[..., 0] != 0xFFFFFFFF
+        assert 0.02 < hits.mean() < 0.9
+        cracks = integers[..., 1] >> 16 & 1 == 1
+        values = floats[..., 2]
+        assert abs(values[hits & ~cracks] - offset).max() < 1e-4
+        assert cracks[hits].mean() < 0.05
+
+
+def test_the_pointer_reads_out_the_field(browser: Any, field: pathlib.Path, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
+    opened(browser, field.with_suffix(".html"))
+    actions = package("selenium.webdriver.common.action_chains").ActionChains
+    canvas = browser.find_element("id", "canvas")
+    package("selenium.webdriver.support.ui").Select(browser.find_element("id", "kind")).select_by_value("slice")
+    rested(browser)
+    actions(browser).move_to_element_with_offset(canvas, 60, 40).perform()
+    rows = asked(browser, "return Object.fromEntries([...document.querySelectorAll('#readout dt')].map(t => [t.textContent, t.nextSibling.textContent]))")
+    position = [float(x.replace("−", "-")) for x in rows["position"].split(", ")]
+    theirs = queried(program, field, [position], tmp_path)
+    assert float(rows["value"].replace("−", "-")) == pytest.approx(theirs["distance"][0], abs=1e-3)
+    assert complaints(browser) == []
+
+
+def test_the_view_follows_mouse_wheel_and_keys(browser: Any, field: pathlib.Path) -> None:
+    if field.stem != "torus":
+        pytest.skip("one field suffices")
+    opened(browser, field.with_suffix(".html"))
+    actions = package("selenium.webdriver.common.action_chains").ActionChains
+    canvas = browser.find_element("id", "canvas")
+    orbit = lambda: asked(browser, "return page.view.orbit")
+    before = orbit()
+    actions(browser).move_to_element(canvas).click_and_hold().move_by_offset(50, 25).release().perform()
+    turned = orbit()
+    assert turned["azimuth"] == pytest.approx(before["azimuth"] - 20) and turned["elevation"] == pytest.approx(before["elevation"] + 10)
+    canvas.send_keys("+")
+    assert orbit()["distance"] == pytest.approx(0.8 * before["distance"])
+    rested(browser)
+    script = asked(browser, "return scriptOf(page.view, field)")
+    assert "show surface" in script and "camera 10,30,0.88" in script
+    assert complaints(browser) == []
+
+
+def test_the_copied_view_is_a_script_of_the_program(browser: Any, field: pathlib.Path, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
+    opened(browser, field.with_suffix(".html"))
+    for kind in ("surface", "slice"):
+        lines = asked(browser, f"return scriptOf({{...page.view, kind: '{kind}'}}, field)")
+        script = tmp_path / f"{kind}.hps"
+        script.write_text(f"load {field}\n{lines}\nshot output={tmp_path}/{kind}.png\n")
+        program("run", script)
+        assert (tmp_path / f"{kind}.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "empty"])
+def test_damaged_pages_say_so(browser: Any, field: pathlib.Path, tmp_path: pathlib.Path, damage: str) -> None:
+    if field.stem != "torus":
+        pytest.skip("one field suffices")
+    text = field.with_suffix(".html").read_text(encoding="utf-8")
+    begin = text.index('id="field">') + len('id="field">')
+    end = text.index("<", begin)
+    data = text[begin:end]
+    half = len(data) // 2
+    wrong = {"cut": data[: half - half % 4], "changed": data[:half] + ("AAAA" if data[half : half + 4] != "AAAA" else "BBBB") + data[half + 4 :], "empty": ""}
+    page = tmp_path / "damaged.html"
+    page.write_text(text[:begin] + wrong[damage] + text[end:], encoding="utf-8")
+    browser.get(page.as_uri())
+    assert rested(browser) == "failed"
+    assert "The field cannot be shown: " in browser.find_element("id", "message").text
+
+
+def test_without_webgl_the_page_says_so(field: pathlib.Path) -> None:
+    if field.stem != "torus":
+        pytest.skip("one field suffices")
+    browser = started("--disable-3d-apis")
+    try:
+        opened(browser, field.with_suffix(".html"))
+        assert "WebGL 2" in browser.find_element("id", "message").text
+    finally:
+        browser.quit()
+
+
+def test_the_page_loads_nothing(field: pathlib.Path) -> None:
+    text = field.with_suffix(".html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in text and "http://" not in text and "https://" not in text
+
+
+def test_the_page_is_small(field: pathlib.Path) -> None:
+    text = field.with_suffix(".html").read_text(encoding="utf-8")
+    begin = text.index('id="field">')
+    assert len(text) - (text.index("<", begin + 12) - begin) < 150_000
+
+
+def test_types_of_the_modules() -> None:
+    files = sorted(map(str, (ROOT / "web" / "page").glob("*.js")))
+    words = "--noEmit --allowJs --checkJs --strict --target es2022 --module es2022 --moduleResolution node --lib dom,dom.iterable,es2022"
+    try:
+        made = subprocess.run(["tsc", *words.split(), *files], capture_output=True, text=True)
+    except FileNotFoundError:
+        pytest.skip("node-typescript is not installed")
+    assert made.stdout == ""

@@ -1,0 +1,351 @@
+// Reads the bytes of a .hpsdf file without compressed arrays (docs/file-format.md).
+
+/** @typedef {[number, number, number]} Vector */
+
+/**
+ * The triangles of exact leaves.
+ * @typedef {object} ExactTriangles
+ * @property {Float32Array | Float64Array} vertices  coordinates of the vertices, three each, in the field's units
+ * @property {Uint32Array} triangles  indices of vertices, three for each triangle
+ * @property {Uint32Array} lists  the lists of triangles
+ * @property {number} offset  the length that is subtracted from distances
+ */
+
+/**
+ * A field as its file holds it, with coefficients that are no longer quantized.
+ * @typedef {object} Field
+ * @property {string} name  the source's name
+ * @property {Vector} grid  base cells along each axis
+ * @property {Vector} lower  the domain's lower corner, in the field's units
+ * @property {Vector} upper
+ * @property {Vector} size
+ * @property {number} targetError
+ * @property {number} tolerance
+ * @property {number} blend  width of the blended zones as a part of a cell's edges; 0: none
+ * @property {{near: number, nearRms: number, nearMax: number, rms: number, max: number} | null} measured
+ * @property {Uint32Array} low  the low halves of the nodes
+ * @property {Uint32Array} high  the high halves of the nodes
+ * @property {Uint32Array} first  for each leaf with a polynomial, the index of its first coefficient
+ * @property {Float32Array | Float64Array} coefficients
+ * @property {ExactTriangles} exact
+ * @property {number} bytes  the size of the file
+ */
+
+/** An error that the reader of the page can understand. */
+export class FieldError extends Error {}
+
+const MAGIC = [0x68, 0x70, 0x73, 0x64, 0x66, 0x0d, 0x0a, 0x1a];
+const OLDEST_VERSION = 10;
+const NEWEST_VERSION = 11;
+const MOST_DEGREES = 30;
+const MOST_LEVELS = 20;
+export const EXACT_DEGREE = 31;
+
+/**
+ * @param {number} degree
+ */
+export function coefficientCount(degree) {
+  return ((degree + 1) * (degree + 2) * (degree + 3)) / 6;
+}
+
+/**
+ * @param {Field} field
+ * @param {number} node
+ */
+export function isLeaf(field, node) {
+  return field.high[node] >>> 31 === 1;
+}
+
+/**
+ * @param {Field} field
+ * @param {number} leaf
+ */
+export function degreeOf(field, leaf) {
+  return field.high[leaf] & 0xff;
+}
+
+/**
+ * @param {Field} field
+ * @param {number} leaf
+ */
+export function isExact(field, leaf) {
+  return degreeOf(field, leaf) === EXACT_DEGREE;
+}
+
+/** Reads numbers one after the other, and says so where the bytes end too early. */
+class Cursor {
+  /**
+   * @param {Uint8Array} bytes
+   */
+  constructor(bytes) {
+    this.bytes = bytes;
+    this.view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    this.at = 0;
+  }
+
+  /**
+   * @param {number} count
+   */
+  skip(count) {
+    if (!(count <= this.bytes.length - this.at)) throw new FieldError("the field is damaged: it ends too early");
+    this.at += count;
+    return this.at - count;
+  }
+
+  u8() {
+    return this.view.getUint8(this.skip(1));
+  }
+  u32() {
+    return this.view.getUint32(this.skip(4), true);
+  }
+  f64() {
+    return this.view.getFloat64(this.skip(8), true);
+  }
+  u64() {
+    const value = this.view.getBigUint64(this.skip(8), true);
+    return Number(value);
+  }
+  /**
+   * @returns {Vector}
+   */
+  vector() {
+    return [this.f64(), this.f64(), this.f64()];
+  }
+
+  /**
+   * Reads the bytes of an array.
+   * @param {number} size
+   * @returns {ArrayBuffer}
+   */
+  block(size) {
+    const from = this.skip(size);
+    return this.bytes.slice(from, from + size).buffer;
+  }
+
+  /**
+   * Reads floats of 4 or of 8 bytes.
+   * @param {number} count
+   * @param {number} size  bytes of one
+   */
+  floats(count, size) {
+    return size === 8 ? new Float64Array(this.block(8 * count)) : new Float32Array(this.block(4 * count));
+  }
+
+  /**
+   * @param {number} count
+   */
+  words(count) {
+    return new Uint32Array(this.block(4 * count));
+  }
+}
+
+/**
+ * @param {Uint8Array} bytes
+ * @returns {Field}
+ */
+export function readField(bytes) {
+  const cursor = new Cursor(bytes);
+  const header = readHeader(cursor);
+  const nodes = cursor.words(2 * header.nodes);
+  const low = nodes.filter((_, n) => n % 2 === 0);
+  const high = nodes.filter((_, n) => n % 2 === 1);
+  const isQuantized = header.coefficientBytes === 1;
+  const quantized = new Uint8Array(cursor.block(isQuantized ? header.coefficients : 0));
+  const plain = cursor.floats(isQuantized ? 0 : header.coefficients, header.coefficientBytes);
+  cursor.skip(header.bounds * 8);
+  const exact = {
+    vertices: cursor.floats(3 * header.vertices, header.vertexBytes),
+    triangles: cursor.words(3 * header.triangles),
+    lists: cursor.words(header.lists),
+    offset: header.offset,
+  };
+  const first = new Uint32Array(low.length);
+  const { name, grid, lower, upper, targetError, tolerance, blend, measured } = header;
+  const size = /** @type {Vector} */ (upper.map((x, axis) => x - lower[axis]));
+  /** @type {Field} */
+  const field = {
+    name, grid, lower, upper, size, targetError, tolerance, blend, measured, low, high, first,
+    coefficients: new Float32Array(0), exact, bytes: bytes.length,
+  };
+  if (blend > 0) throw new FieldError("it is blended, which this page cannot draw");
+  checkTree(field);
+  field.coefficients = isQuantized ? dequantized(field, quantized, header.step, header.meanBits) : placed(field, plain);
+  return field;
+}
+
+/**
+ * @param {Cursor} cursor
+ */
+function readHeader(cursor) {
+  if (MAGIC.some((byte) => cursor.u8() !== byte)) throw new FieldError("this is no field");
+  const version = cursor.u32();
+  if (version < OLDEST_VERSION || version > NEWEST_VERSION) throw new FieldError(`the field has the unknown version ${version}`);
+  const coefficientBytes = cursor.u32();
+  const nodes = cursor.u64();
+  const coefficients = cursor.u64();
+  const grid = /** @type {Vector} */ ([cursor.u32(), cursor.u32(), cursor.u32()]);
+  const lower = cursor.vector();
+  const upper = cursor.vector();
+  const nameLength = cursor.u32();
+  const nameAt = cursor.skip(nameLength);
+  const name = new TextDecoder().decode(cursor.bytes.subarray(nameAt, nameAt + nameLength));
+  cursor.skip(3 * 8 + 6 * 8 + 4 * 8); // fingerprint, vertices, faces; the surface's box; the normalization
+  const targetError = cursor.f64();
+  cursor.skip(3 * 8 + 3 * 4 + 1 + 4 * 8 + 3 + 2 * 8 + 1 + 8);
+  const blend = cursor.f64();
+  const bounds = cursor.u64();
+  cursor.skip(1 + 2 * 8 + 4 + 8); // inside test, thickness, exact leaves
+  const tolerance = cursor.f64();
+  cursor.skip(8 + 3 + 8); // within, certified, cubature, trial samples, limit of bytes
+  const vertexBytes = cursor.u32();
+  const vertices = cursor.u64();
+  const triangles = cursor.u64();
+  const lists = cursor.u64();
+  const offset = cursor.f64();
+  const points = cursor.u64();
+  let measured = null;
+  if (points > 0) {
+    const near = cursor.f64();
+    const [nearRms, nearMax, rms, max] = [cursor.f64(), cursor.f64(), cursor.f64(), cursor.f64()];
+    measured = { near, nearRms, nearMax, rms, max };
+    cursor.skip(8 + 2 * 8 + 3 * 8 + 8 + 8);
+  }
+  if (version > 10) cursor.skip(1);
+  const isQuantized = coefficientBytes === 1;
+  const step = isQuantized ? cursor.f64() : 0;
+  const meanBits = isQuantized ? cursor.u32() : 0;
+  return {
+    coefficientBytes, nodes, coefficients, grid, lower, upper, name, targetError, tolerance, blend, bounds, vertexBytes, vertices,
+    triangles, lists, offset, measured, step, meanBits,
+  };
+}
+
+/**
+ * Checks that the nodes form trees, so that no walk through them fails or goes on for ever.
+ * @param {Field} field
+ */
+function checkTree(field) {
+  const { grid, low, high, exact } = field;
+  const count = low.length;
+  const depth = new Uint8Array(count);
+  const bases = grid[0] * grid[1] * grid[2];
+  if (!(bases > 0 && bases <= count)) throw new FieldError("the field is damaged: base cells are missing");
+  for (let n = 0; n < count; ++n) {
+    if (isLeaf(field, n)) {
+      const degree = high[n] & 0xff;
+      if (degree > MOST_DEGREES && degree !== EXACT_DEGREE) throw new FieldError("the field is damaged: a degree is too high");
+      if (degree === EXACT_DEGREE && low[n] >= exact.lists.length) throw new FieldError("the field is damaged: a list is missing");
+    } else {
+      if (low[n] <= n || low[n] + 8 > count || depth[n] >= MOST_LEVELS) throw new FieldError("the field is damaged: its cells form no octree");
+      depth.fill(depth[n] + 1, low[n], low[n] + 8);
+    }
+  }
+}
+
+/**
+ * Returns coefficients that are not quantized, and sets where those of each leaf begin.
+ * @template {Float32Array | Float64Array} T
+ * @param {Field} field
+ * @param {T} stored
+ * @returns {T}
+ */
+function placed(field, stored) {
+  const { low, first } = field;
+  for (let n = 0; n < low.length; ++n) {
+    if (!isLeaf(field, n) || isExact(field, n)) continue;
+    if (low[n] + coefficientCount(degreeOf(field, n)) > stored.length) throw new FieldError("the field is damaged: a leaf lacks coefficients");
+    first[n] = low[n];
+  }
+  return stored;
+}
+
+/**
+ * Reads numbers of a few bits each, the lowest bit of a byte first.
+ */
+class BitReader {
+  /**
+   * @param {Uint8Array} bytes
+   * @param {number} at  the index of the first byte
+   */
+  constructor(bytes, at) {
+    this.bytes = bytes;
+    this.bit = 8 * at;
+  }
+
+  /**
+   * @param {number} count  at most 32
+   */
+  read(count) {
+    let value = 0;
+    for (let have = 0; have < count; ) {
+      const inByte = this.bit & 7;
+      const take = Math.min(8 - inByte, count - have);
+      const bits = (this.bytes[this.bit >> 3] >> inByte) & ((1 << take) - 1);
+      value += bits * 2 ** have;
+      have += take;
+      this.bit += take;
+    }
+    return value;
+  }
+}
+
+/**
+ * Returns the coefficients of all leaves from their integers, and sets where those of each leaf begin.
+ * @param {Field} field
+ * @param {Uint8Array} stored
+ * @param {number} step
+ * @param {number} meanBits
+ */
+function dequantized(field, stored, step, meanBits) {
+  const { low, high, first } = field;
+  let total = 0;
+  for (let n = 0; n < low.length; ++n) {
+    if (!isLeaf(field, n) || isExact(field, n)) continue;
+    if (low[n] >= stored.length) throw new FieldError("the field is damaged: a leaf lacks coefficients");
+    first[n] = total;
+    total += coefficientCount(degreeOf(field, n));
+  }
+  const coefficients = new Float32Array(total);
+  for (let n = 0; n < low.length; ++n) {
+    if (!isLeaf(field, n) || isExact(field, n)) continue;
+    const isWide = (high[n] >>> 21) & 1;
+    const leafStep = step * 2 ** -((high[n] >>> 16) & 31);
+    dequantizeLeaf(new BitReader(stored, low[n]), degreeOf(field, n), leafStep, isWide ? 32 : meanBits, coefficients.subarray(first[n]));
+  }
+  return coefficients;
+}
+
+/**
+ * @param {BitReader} reader
+ * @param {number} degree
+ * @param {number} step
+ * @param {number} meanBits
+ * @param {Float32Array} out
+ */
+function dequantizeLeaf(reader, degree, step, meanBits, out) {
+  const widths = [meanBits];
+  for (let d = 1; d <= degree; ++d) widths.push(reader.read(5));
+  for (let d = 0; d <= degree; ++d) {
+    const width = widths[d];
+    // The integers of one total degree follow each other; their places in `out` do not.
+    for (let i = 0; i <= d; ++i)
+      for (let j = 0; j <= d - i; ++j) {
+        const k = d - i - j;
+        const q = width === 0 ? 0 : reader.read(width) - 2 ** (width - 1);
+        out[coefficientIndex(degree, i, j, k)] = q * step * Math.sqrt((2 * i + 1) * (2 * j + 1) * (2 * k + 1));
+      }
+  }
+}
+
+/**
+ * Returns the place of c_ijk among the coefficients of a leaf, which are in lexicographic order of (i, j, k).
+ * @param {number} degree
+ * @param {number} i
+ * @param {number} j
+ * @param {number} k
+ */
+export function coefficientIndex(degree, i, j, k) {
+  const rest = degree - i;
+  const before = coefficientCount(degree) - coefficientCount(rest); // those with a smaller i
+  return before + j * (rest + 1) - (j * (j - 1)) / 2 + k;
+}

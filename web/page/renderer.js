@@ -1,0 +1,456 @@
+// Draws fields into buffers by WebGL 2, with the program's own shaders.
+
+import { degreeOf, isExact, isLeaf, coefficientCount, coefficientIndex } from "./field_file.js";
+import { boundsOf } from "./bounds.js";
+import { surfaceBlocks } from "./blocks.js";
+import { gridPoint } from "./query.js";
+import { diagonalOf } from "./camera.js";
+import { cornersOf, signRule } from "./exact_leaf.js";
+import { cross, normalized, subtract } from "./vector.js";
+import { ROW, webShader } from "./shaders.js";
+
+/** @typedef {import("./field_file.js").Field} Field */
+/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("./camera.js").Rays} Rays */
+/** @typedef {import("./camera.js").Plane} Plane */
+/** @typedef {import("./bounds.js").Bounds} Bounds */
+
+const LOW_DEGREE = 4; // as kLowDegree in field.glsl
+const OFFSET_BITS = 27;
+const MOST_STEPS = 4096;
+const MOST_REFINEMENTS = 24;
+
+/** An error of the graphics card, in words for the reader of the page. */
+export class GraphicsError extends Error {}
+
+/**
+ * @param {Field} field
+ * @param {number} leaf
+ */
+function uploadedCount(field, leaf) {
+  if (isExact(field, leaf)) return 0;
+  return 4 * Math.ceil(coefficientCount(Math.max(degreeOf(field, leaf), LOW_DEGREE - 1)) / 4);
+}
+
+/**
+ * @param {number} low
+ * @param {number} high  packs two numbers into the upper halves of their bits, rounded away from each other
+ */
+function packOutwards(low, high) {
+  const bits = new Uint32Array(new Float32Array([low, high]).buffer);
+  /**
+   * @param {number} x
+   * @param {boolean} away
+   */
+  const half = (x, away) => (x >>> 16) + (away && (x & 0xffff) !== 0 ? 1 : 0);
+  return ((half(bits[1], high > 0) << 16) | half(bits[0], low < 0)) >>> 0;
+}
+
+/**
+ * The texels of the nodes and of the coefficients, as the shaders read them (render/src/gl/field_upload.h).
+ * @param {Field} field
+ * @param {Bounds} bounds
+ */
+function uploadOf(field, bounds) {
+  const count = field.low.length;
+  const nodes = new Uint32Array(4 * count);
+  const bitsOf = (/** @type {Float32Array} */ numbers) => new Uint32Array(numbers.buffer);
+  const value = bitsOf(bounds.value), gradient = bitsOf(bounds.gradient), second = bitsOf(bounds.second);
+  let total = 0;
+  for (let n = 0; n < count; ++n) if (isLeaf(field, n)) total += uploadedCount(field, n);
+  const coefficients = new Float32Array(total);
+  let next = 0;
+  for (let n = 0; n < count; ++n) {
+    nodes[4 * n + 2] = gradient[n];
+    nodes[4 * n + 3] = second[n];
+    if (!isLeaf(field, n)) {
+      nodes[4 * n] = field.low[n];
+      nodes[4 * n + 1] = packOutwards(bounds.low[n], bounds.high[n]);
+      continue;
+    }
+    nodes[4 * n + 1] = value[n];
+    const degree = degreeOf(field, n);
+    if (isExact(field, n)) {
+      const triangles = field.exact.lists[field.low[n]] & 0x7fffffff;
+      nodes[4 * n] = ((degree << OFFSET_BITS) | (field.low[n] + 1 + ((triangles + 3) >> 2))) >>> 0;
+      nodes[4 * n + 3] = (second[n] & ~3) | signRule(field, n);
+      continue;
+    }
+    nodes[4 * n] = ((degree << OFFSET_BITS) | next) >>> 0;
+    copyLeaf(field, n, coefficients, next);
+    next += uploadedCount(field, n);
+  }
+  return { nodes, coefficients };
+}
+
+/**
+ * Copies the coefficients of a leaf; terms of degree LOW_DEGREE come last.
+ * @param {Field} field
+ * @param {number} leaf
+ * @param {Float32Array} out
+ * @param {number} to
+ */
+function copyLeaf(field, leaf, out, to) {
+  const degree = degreeOf(field, leaf);
+  const from = field.first[leaf];
+  const all = Math.max(degree, LOW_DEGREE - 1);
+  let lower = to;
+  let last = to + coefficientCount(LOW_DEGREE - 1);
+  for (let i = 0; i <= all; ++i)
+    for (let j = 0; j <= all - i; ++j)
+      for (let k = 0; k <= all - i - j; ++k) {
+        const total = i + j + k;
+        const at = degree === LOW_DEGREE && total === LOW_DEGREE ? last++ : lower++;
+        if (total <= degree) out[at] = field.coefficients[from + coefficientIndex(degree, i, j, k)];
+      }
+}
+
+/**
+ * Three texels for each triangle: its corners from the domain's lower corner, and its normal.
+ * @param {Field} field
+ */
+function cornerTexels(field) {
+  const count = field.exact.triangles.length / 3;
+  const texels = new Float32Array(12 * count);
+  for (let t = 0; t < count; ++t) {
+    const corners = cornersOf(field.exact, t);
+    const normal = normalized(cross(subtract(corners[1], corners[0]), subtract(corners[2], corners[0])));
+    for (let k = 0; k < 3; ++k) texels.set([...subtract(corners[k], field.lower), normal[k]], 12 * t + 4 * k);
+  }
+  return texels;
+}
+
+/** A field on the graphics card, and the programs that draw it. */
+export class FieldRenderer {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {Field} field
+   * @param {Record<string, string>} sources  the program's shaders by the names of their files
+   */
+  constructor(gl, field, sources) {
+    this.gl = gl;
+    this.field = field;
+    if (!gl.getExtension("EXT_color_buffer_float")) throw new GraphicsError("this graphics card cannot draw into textures of floats");
+    this.bounds = boundsOf(field);
+    const { nodes, coefficients } = uploadOf(field, this.bounds);
+    const hasExact = field.exact.triangles.length > 0;
+    this.textures = {
+      nodes: this.texture(gl.RGBA32UI, nodes, 4),
+      coefficients: this.texture(gl.R32F, coefficients, 1),
+      coefficientQuads: this.texture(gl.RGBA32F, coefficients, 4),
+      linearParts: this.texture(gl.RGBA32F, this.bounds.linear, 4),
+      exactLists: this.texture(gl.R32UI, hasExact ? field.exact.lists : new Uint32Array(1), 1),
+      exactCorners: this.texture(gl.RGBA32F, hasExact ? cornerTexels(field) : new Float32Array(4), 4),
+    };
+    const leaves = hasExact ? "leaves_exact.glsl" : "leaves_polynomial.glsl";
+    const of = (/** @type {string[]} */ ...names) => webShader(names.map((name) => sources[name]));
+    this.slicing = this.program(of("full_screen.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "slice.frag"));
+    this.marching = this.program(of("surface.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "surface_march.frag"));
+    this.hitting = this.program(of("surface.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "surface_hit.frag"));
+    this.empty = gl.createVertexArray();
+    this.blocks = gl.createVertexArray();
+    this.blockBuffer = gl.createBuffer();
+    gl.bindVertexArray(this.blocks);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.blockBuffer);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+    /** @type {Target | null} */
+    this.state = null;
+    /** @type {Target | null} */
+    this.hits = null;
+  }
+
+  /**
+   * Makes a texture whose texels stand in rows of ROW.
+   * @param {number} format
+   * @param {Float32Array | Uint32Array} numbers
+   * @param {number} components
+   */
+  texture(format, numbers, components) {
+    const { gl } = this;
+    const rows = Math.max(Math.ceil(numbers.length / components / ROW), 1);
+    if (rows > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new GraphicsError("the field is too large for this graphics card");
+    const isFloat = numbers instanceof Float32Array;
+    const padded = isFloat ? new Float32Array(rows * ROW * components) : new Uint32Array(rows * ROW * components);
+    padded.set(numbers);
+    const layout = components === 4 ? (isFloat ? gl.RGBA : gl.RGBA_INTEGER) : isFloat ? gl.RED : gl.RED_INTEGER;
+    return this.plainTexture(format, ROW, rows, layout, isFloat ? gl.FLOAT : gl.UNSIGNED_INT, padded);
+  }
+
+  /**
+   * @param {number} format
+   * @param {number} width
+   * @param {number} height
+   * @param {number} layout
+   * @param {number} type
+   * @param {ArrayBufferView | null} data
+   */
+  plainTexture(format, width, height, layout, type, data) {
+    const { gl } = this;
+    const texture = gl.createTexture();
+    if (!texture) throw new GraphicsError("the graphics card was lost");
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, format, width, height, 0, layout, type, data);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    return texture;
+  }
+
+  /**
+   * @param {string} vertex
+   * @param {string} fragment
+   */
+  program(vertex, fragment) {
+    const { gl } = this;
+    const program = gl.createProgram();
+    if (!program) throw new GraphicsError("the graphics card was lost");
+    for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(/** @type {number} */ (type));
+      if (!shader) throw new GraphicsError("the graphics card was lost");
+      gl.shaderSource(shader, /** @type {string} */ (source));
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    return program;
+  }
+
+  /**
+   * Uses a program with the field's textures.
+   * @param {WebGLProgram} program
+   */
+  use(program) {
+    const { gl, field } = this;
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
+      const logs = (gl.getAttachedShaders(program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
+      throw new GraphicsError(`the graphics card refuses a shader: ${logs.join(" ")} ${gl.getProgramInfoLog(program)}`);
+    }
+    gl.useProgram(program);
+    Object.entries(this.textures).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(this.at(program, name), unit);
+    });
+    gl.uniform3ui(this.at(program, "grid"), ...field.grid);
+    gl.uniform3f(this.at(program, "baseCell"), ...this.cellSize());
+    gl.uniform1f(this.at(program, "exactOffset"), field.exact.offset);
+  }
+
+  /**
+   * @returns {Vector}
+   */
+  cellSize() {
+    return /** @type {Vector} */ (this.field.size.map((x, a) => x / this.field.grid[a]));
+  }
+
+  /**
+   * @param {WebGLProgram} program
+   * @param {string} name
+   */
+  at(program, name) {
+    return this.gl.getUniformLocation(program, name);
+  }
+
+  /**
+   * Binds a texture to a unit after those of the field.
+   * @param {WebGLProgram} program
+   * @param {string} name
+   * @param {number} number
+   * @param {WebGLTexture} texture
+   */
+  bind(program, name, number, texture) {
+    const { gl } = this;
+    const unit = Object.keys(this.textures).length + number;
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.uniform1i(this.at(program, name), unit);
+  }
+
+  /**
+   * Returns a target of this size, the one before if it fits.
+   * @param {Target | null} before
+   * @param {number} width
+   * @param {number} height
+   */
+  target(before, width, height) {
+    if (before && before.width === width && before.height === height) return before;
+    before?.remove();
+    return new Target(this, width, height);
+  }
+
+  /**
+   * Samples a plane into the first texture of the returned target: cell, degree, depth and the bits of the value.
+   * @param {Plane} plane
+   * @param {number} width
+   * @param {number} height
+   */
+  slice(plane, width, height) {
+    const { gl } = this;
+    const { wholes, fractions } = this.positions(plane, width, height);
+    this.hits = this.target(this.hits, width, height);
+    this.hits.draw();
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.NONE]);
+    this.use(this.slicing);
+    this.bind(this.slicing, "wholes", 0, wholes);
+    this.bind(this.slicing, "fractions", 1, fractions);
+    gl.bindVertexArray(this.empty);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.deleteTexture(wholes);
+    gl.deleteTexture(fractions);
+    return this.hits;
+  }
+
+  /**
+   * The positions of a slice's columns and rows in grid coordinates.
+   * @param {Plane} plane
+   * @param {number} width
+   * @param {number} height
+   */
+  positions(plane, width, height) {
+    const { gl, field } = this;
+    const most = Math.max(width, height);
+    const wholes = new Int32Array(8 * most);
+    const fractions = new Uint32Array(8 * most);
+    const origin = gridPoint(field, plane.origin);
+    const across = (/** @type {Vector} */ v) => v.map((x, a) => (x / field.size[a]) * field.grid[a]);
+    const right = across(plane.right), up = across(plane.up);
+    const set = (/** @type {number} */ at, /** @type {number} */ axis, /** @type {number} */ x) => {
+      const whole = Math.floor(x);
+      wholes[4 * at + axis] = whole;
+      fractions[4 * at + axis] = Math.floor((x - whole) * 2 ** 32);
+    };
+    for (let axis = 0; axis < 3; ++axis) {
+      // An axis that does not change along the columns gets its origin from the rows, so that it is rounded once.
+      const inRows = right[axis] === 0;
+      for (let x = 0; x < width; ++x) set(x, axis, (inRows ? 0 : origin[axis]) + right[axis] * ((2 * x + 1 - width) / width));
+      for (let y = 0; y < height; ++y) set(most + y, axis, (inRows ? origin[axis] : 0) + up[axis] * ((height - 2 * y - 1) / height));
+    }
+    return {
+      wholes: this.plainTexture(gl.RGBA32I, most, 2, gl.RGBA_INTEGER, gl.INT, wholes),
+      fractions: this.plainTexture(gl.RGBA32UI, most, 2, gl.RGBA_INTEGER, gl.UNSIGNED_INT, fractions),
+    };
+  }
+
+  /**
+   * Traces a surface into the two textures of the returned target: cell; degree, depth and crack; the bits of the value and of
+   * the distance; and the normal.
+   * @param {Rays} rays
+   * @param {number} width
+   * @param {number} height
+   * @param {number} offset
+   */
+  surface(rays, width, height, offset) {
+    const { gl, field } = this;
+    this.state = this.target(this.state, width, height);
+    this.hits = this.target(this.hits, width, height);
+    const found = surfaceBlocks(field, this.bounds, rays, width, height, offset);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.blockBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, found.blocks, gl.STREAM_DRAW);
+    gl.bindVertexArray(this.blocks);
+    for (const [program, target] of /** @type {[WebGLProgram, Target][]} */ ([[this.marching, this.state], [this.hitting, this.hits]])) {
+      target.draw();
+      this.use(program);
+      this.setRays(program, rays, width, height, offset);
+      gl.uniform1f(this.at(program, "startSide"), found.side);
+      gl.uniform1i(this.at(program, "atTriangles"), offset === -field.exact.offset ? 1 : 0);
+      const other = target === this.state ? this.hits : this.state; // the march declares these textures too, but does not read them
+      this.bind(program, "stateIntegers", 0, other.integers);
+      this.bind(program, "stateFloats", 1, other.floats);
+      gl.drawArrays(gl.POINTS, 0, found.blocks.length / 3);
+    }
+    return this.hits;
+  }
+
+  /**
+   * @param {WebGLProgram} program
+   * @param {Rays} rays
+   * @param {number} width
+   * @param {number} height
+   * @param {number} offset
+   */
+  setRays(program, rays, width, height, offset) {
+    const { gl, field } = this;
+    const scale = /** @type {Vector} */ (field.grid.map((x, a) => x / field.size[a]));
+    const set = (/** @type {string} */ name, /** @type {Vector} */ v) => gl.uniform3f(this.at(program, name), ...v);
+    gl.uniform2i(this.at(program, "firstPixel"), 0, 0);
+    gl.uniform2i(this.at(program, "size"), width, height);
+    gl.uniform2i(this.at(program, "viewport"), width, height);
+    set("eye", gridPoint(field, rays.eye));
+    set("forward", rays.forward);
+    set("right", rays.right);
+    set("up", rays.up);
+    set("scale", scale);
+    gl.uniform2f(this.at(program, "pixelStep"), 1 / width, 1 / height);
+    gl.uniform1f(this.at(program, "offset"), offset);
+    gl.uniform1f(this.at(program, "diagonal"), diagonalOf(field));
+    set("shownLo", [0, 0, 0]);
+    set("shownHi", field.grid);
+    gl.uniform1i(this.at(program, "parallel"), rays.parallel ? 1 : 0);
+    gl.uniform1i(this.at(program, "mostSteps"), MOST_STEPS);
+    gl.uniform1i(this.at(program, "mostRefinements"), MOST_REFINEMENTS);
+    gl.uniform1i(this.at(program, "resume"), 0);
+  }
+}
+
+/** Two textures into which a pass draws: one of four integers for each pixel, one of four floats. */
+export class Target {
+  /**
+   * @param {FieldRenderer} renderer
+   * @param {number} width
+   * @param {number} height
+   */
+  constructor(renderer, width, height) {
+    const { gl } = renderer;
+    this.gl = gl;
+    this.width = width;
+    this.height = height;
+    this.integers = renderer.plainTexture(gl.RGBA32UI, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, null);
+    this.floats = renderer.plainTexture(gl.RGBA32F, width, height, gl.RGBA, gl.FLOAT, null);
+    this.frame = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.integers, 0);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, gl.TEXTURE_2D, this.floats, 0);
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+  }
+
+  /** Makes the target that of the next pass, and empties it. */
+  draw() {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.viewport(0, 0, this.width, this.height);
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+    gl.clearBufferuiv(gl.COLOR, 0, new Uint32Array([0xffffffff, 0, 0, 0]));
+    gl.clearBufferfv(gl.COLOR, 1, new Float32Array(4));
+  }
+
+  /**
+   * Returns the cell at a pixel, counted from the top left, and the length of its ray up to there.
+   * @param {number} x
+   * @param {number} y
+   */
+  at(x, y) {
+    const { gl } = this;
+    const texel = new Uint32Array(4);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.readBuffer(gl.COLOR_ATTACHMENT0);
+    gl.readPixels(x, y, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, texel);
+    return { cell: texel[0], distance: new Float32Array(texel.buffer)[3] };
+  }
+
+  /** Returns the integers, four for each pixel, from the top row down. */
+  read() {
+    const { gl } = this;
+    const pixels = new Uint32Array(4 * this.width * this.height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.readBuffer(gl.COLOR_ATTACHMENT0);
+    gl.readPixels(0, 0, this.width, this.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, pixels);
+    return pixels;
+  }
+
+  remove() {
+    const { gl } = this;
+    gl.deleteFramebuffer(this.frame);
+    gl.deleteTexture(this.integers);
+    gl.deleteTexture(this.floats);
+  }
+}
