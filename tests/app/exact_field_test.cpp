@@ -57,6 +57,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"blend", "blend output=$out/f.hpsdf; expect stats.blend > 0"},
     {"bounds", "bounds output=$out/f.hpsdf; expect stats.bounds.greatest > 0"},
     {"info", "info; info json=true"},
+    {"page", "blend width=0; page output=$out/f.html"},
     {"query", "query points=$points output=$out/distances.csv"},
     {"query", "query boxes=0,0,0,0.1,0.1,0.1 output=$out/ranges.csv"},
     {"jumps", "jumps output=$out/jumps.csv; jumps by=gradient"},
