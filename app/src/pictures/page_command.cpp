@@ -57,7 +57,7 @@ void runPage(Session& session, const Arguments& arguments) {
   const CurrentField& current = session.current();
   if (current.field.data().blend > 0)
     throw Error(ErrorKind::field, current.name,
-                "is blended, which pages cannot show yet; 'hpsdf blend --width 0' makes a copy without blending");
+                "is blended, which pages cannot show yet; build it without continuity exact");
   const std::string page = pageOf(current.field, arguments.textOr("title", plainName(current.name)));
   writeTextFile(file, page);
   std::ostream& out = session.console().out;
