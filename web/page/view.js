@@ -1,4 +1,4 @@
-// What a page shows: the state of its view, as values that commands change.
+// The view holds what a page shows, as values that the controls change.
 
 import { centreOf } from "./camera.js";
 import { subtract } from "./vector.js";
