@@ -1,13 +1,15 @@
-# Joins the page's modules, styles and shaders to one HTML file, in which {{title}}, {{date}} and {{field}} stand for what the program
-# fills in: cmake -DPAGE=web/page -DSHADERS=shaders -DOUTPUT=page.html -P bundle.cmake
+# Joins the page's modules, styles and shaders to one HTML file, in which {{title}}, {{pictures}} and {{fields}} stand for what the
+# program fills in: cmake -DPAGE=web/page -DSHADERS=shaders -DOUTPUT=page.html -P bundle.cmake
 #
 # Modules become one script: each name is declared once in all of them, so that imports and exports can be left out. Comments are left
 # out too.
 
 # In an order in which classes come before their use while the script is read.
-set(modules vector field_file exact_leaf leaves query bounds blocks camera shaders colors view renderer painter page)
+set(modules vector dom field_file payload exact_leaf leaves query bounds blocks camera shaders colors view renderer cell_lines painter pick viewer panels
+  controls page)
 set(shaders field.glsl full_screen.vert leaves_alone.glsl leaves_exact.glsl leaves_polynomial.glsl slice.frag
   surface.glsl surface.vert surface_hit.frag surface_march.frag)
+set(page_shaders cells.frag cells.vert picture.frag section.frag)
 
 # Reads a file without the lines that hold comments alone.
 function(read_code file result)
@@ -26,13 +28,14 @@ foreach(module IN LISTS modules)
 endforeach()
 
 set(sources "")
-foreach(shader IN LISTS shaders)
-  read_code("${SHADERS}/${shader}" text)
-  string(APPEND sources "<script type=\"x-shader\" data-name=\"${shader}\">${text}</script>\n")
+list(TRANSFORM shaders PREPEND "${SHADERS}/")
+list(TRANSFORM page_shaders PREPEND "${PAGE}/")
+foreach(shader IN LISTS shaders page_shaders)
+  read_code("${shader}" text)
+  string(REGEX REPLACE "^\n" "" text "${text}")  # a version has to stand first
+  get_filename_component(name "${shader}" NAME)
+  string(APPEND sources "<script type=\"x-shader\" data-name=\"${name}\">${text}</script>\n")
 endforeach()
-read_code("${PAGE}/picture.frag" text)
-string(REGEX REPLACE "^\n" "" text "${text}")  # its version stands first
-string(APPEND sources "<script type=\"x-shader\" data-name=\"picture.frag\">${text}</script>\n")
 
 file(READ "${PAGE}/page.css" style)
 file(READ "${PAGE}/page.html" page)

@@ -29,9 +29,16 @@ def rested(browser: Any) -> str:
     return str(wait.until(lambda page: page.execute_script("return ['sharp', 'failed'].find(s => s === document.body.dataset.state)")))
 
 
+def applied(browser: Any, lines: str) -> None:
+    """Shows the view that lines of a script describe, and waits for its sharp picture."""
+    browser.execute_script("hpsdf.page.apply(arguments[0])", lines)
+    rested(browser)
+    assert browser.find_element("id", "message").text == ""
+
+
 def asked(browser: Any, script: str, *arguments: Any) -> Any:
     """Runs a script with the page's functions."""
-    return browser.execute_script("const {page, field, query, firstView, planeOf, raysOf, scriptOf, degreeOf, add, scaled} = hpsdf;" + script, *arguments)
+    return browser.execute_script("const {page, field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, add, scaled} = hpsdf;" + script, *arguments)
 
 
 def complaints(browser: Any) -> list[str]:
@@ -72,19 +79,19 @@ def pixels(browser: Any, view: str) -> tuple[Any, Any]:
     """Returns the buffers of a view: integers of the shape (height, width, 4), and their bits as floats."""
     script = f"""
         const [width, height] = [{SIZE[0]}, {SIZE[1]}];
-        return Array.from(page.painter.renderer.{view}.read());
+        return Array.from(page.viewer.painter.renderer.{view}.read());
     """
     integers = numpy.array(asked(browser, script), dtype=numpy.uint32).reshape(SIZE[1], SIZE[0], 4)
     return integers, integers.view(numpy.float32)
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_slices_show_the_cells_of_the_field(browser: Any, field: pathlib.Path, axis: int) -> None:
+@pytest.mark.parametrize("plane", ["axis=x", "axis=y offset=0.1", "axis=z", "through=0.1,0,0,1,2,0.5"])
+def test_slices_show_the_cells_of_the_field(browser: Any, field: pathlib.Path, plane: str) -> None:
     opened(browser, field.with_suffix(".html"))
-    view = f"slice(planeOf({{...firstView(field), axis: {axis}, zoom: 1.3}}, field, width, height), width, height)"
-    integers, floats = pixels(browser, view)
+    made = f"planeOf(viewFrom('plane {plane} zoom=1.3', firstView(field), field), field, {SIZE[0]}, {SIZE[1]})"
+    integers, floats = pixels(browser, f"slice({made}, width, height)")
     script = f"""
-        const plane = planeOf({{...firstView(field), axis: {axis}, zoom: 1.3}}, field, {SIZE[0]}, {SIZE[1]});
+        const plane = {made};
         const found = [];
         for (let y = 0; y < {SIZE[1]}; y += 3) for (let x = 0; x < {SIZE[0]}; x += 3) {{
           const u = (2 * x + 1 - {SIZE[0]}) / {SIZE[0]}, v = ({SIZE[1]} - 2 * y - 1) / {SIZE[1]};
@@ -117,7 +124,7 @@ def test_surfaces_lie_where_the_field_has_the_offset(browser: Any, field: pathli
 def test_the_pointer_reads_out_the_field(browser: Any, field: pathlib.Path, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
     opened(browser, field.with_suffix(".html"))
     actions = package("selenium.webdriver.common.action_chains").ActionChains
-    canvas = browser.find_element("id", "canvas")
+    canvas = browser.find_element("tag name", "canvas")
     package("selenium.webdriver.support.ui").Select(browser.find_element("id", "kind")).select_by_value("slice")
     rested(browser)
     actions(browser).move_to_element_with_offset(canvas, 60, 40).perform()
@@ -133,7 +140,7 @@ def test_the_view_follows_mouse_wheel_and_keys(browser: Any, field: pathlib.Path
         pytest.skip("one field suffices")
     opened(browser, field.with_suffix(".html"))
     actions = package("selenium.webdriver.common.action_chains").ActionChains
-    canvas = browser.find_element("id", "canvas")
+    canvas = browser.find_element("tag name", "canvas")
     orbit = lambda: asked(browser, "return page.view.orbit")
     before = orbit()
     actions(browser).move_to_element(canvas).click_and_hold().move_by_offset(50, 25).release().perform()
@@ -142,19 +149,79 @@ def test_the_view_follows_mouse_wheel_and_keys(browser: Any, field: pathlib.Path
     canvas.send_keys("+")
     assert orbit()["distance"] == pytest.approx(0.8 * before["distance"])
     rested(browser)
-    script = asked(browser, "return scriptOf(page.view, field)")
+    script = browser.find_element("id", "script").get_attribute("value")
     assert "show surface" in script and "camera 10,30,0.88" in script
     assert complaints(browser) == []
 
 
+VIEWS = {
+    "surface": "show surface; camera 50,10,0.9; surface offset=0.05; color depth of=surface",
+    "cut": "show surface; surface clip=z clip-offset=0.1; color degree; cells lines depths=1",
+    "plane": "show surface; plane axis=x offset=-0.1 in-space=true; color depth; camera 70,30,1.2 up=z projection=orthographic",
+    "slice": "show slice; plane axis=y offset=0.05 zoom=2 target=0.1,0,0.2; color distance",
+    "oblique": "show slice; plane through=0,0.1,0,1,2,3; color depth; worst mark=0,0.1,0",
+}
+
+
 def test_the_copied_view_is_a_script_of_the_program(browser: Any, field: pathlib.Path, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
     opened(browser, field.with_suffix(".html"))
-    for kind in ("surface", "slice"):
-        lines = asked(browser, f"return scriptOf({{...page.view, kind: '{kind}'}}, field)")
-        script = tmp_path / f"{kind}.hps"
-        script.write_text(f"load {field}\n{lines}\nshot output={tmp_path}/{kind}.png\n")
+    for name, given in VIEWS.items():
+        lines = asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", given)
+        assert asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", lines) == lines
+        script = tmp_path / f"{name}.hps"
+        script.write_text(f"load {field}\n{lines}\nshot output={tmp_path}/{name}.png\n")
         program("run", script)
-        assert (tmp_path / f"{kind}.png").stat().st_size > 10_000
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
+
+
+def test_the_page_reads_the_views_that_the_program_copies(browser: Any, field: pathlib.Path, program: Callable[..., str]) -> None:
+    opened(browser, field.with_suffix(".html"))
+    for name, given in VIEWS.items():
+        printed = program("run", "-e", f"load {field}; {given}; copy-view")
+        copied = printed[printed.index("\nshow ") :]
+        theirs, ours = (asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", text) for text in (copied, given))
+        assert theirs == ours, name
+
+
+def test_lines_that_the_page_does_not_understand_are_named(browser: Any, field: pathlib.Path) -> None:
+    if field.stem != "torus":
+        pytest.skip("one field suffices")
+    opened(browser, field.with_suffix(".html"))
+    for wrong in ("fly 3", "camera 1,2", "plane through=0,0,0,0,0,0", "show nothing", "color slope", "surface clip=w", "camera 1,2,x"):
+        browser.execute_script("hpsdf.page.apply(arguments[0])", wrong)
+        assert wrong in browser.find_element("id", "message").text
+
+
+def shown_pixels(browser: Any) -> Any:
+    """The colours of the canvas, from the bottom row up."""
+    return numpy.array(
+        asked(
+            browser,
+            """
+            const {canvas, painter: {gl}} = page.viewer, bytes = new Uint8Array(4 * canvas.width * canvas.height);
+            gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+            gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+            return [canvas.width, canvas.height, Array.from(bytes)];
+            """,
+        )[2]
+    )
+
+
+def test_cuts_planes_and_cells_stand_in_the_picture_of_a_surface(browser: Any, field: pathlib.Path) -> None:
+    opened(browser, field.with_suffix(".html"))
+    before = shown_pixels(browser)
+    for lines in ("surface clip=z", "surface clip=none; plane axis=x in-space=true", "plane in-space=false; cells lines"):
+        applied(browser, "show surface; color degree; " + lines)
+        after = shown_pixels(browser)
+        assert (after != before).mean() > 0.02, lines
+        before = after
+    assert complaints(browser) == []
+
+
+def payload(text: str) -> tuple[int, int]:
+    """Where the first field stands in a page."""
+    begin = text.index(">", text.index('class="field"')) + 1
+    return begin, text.index("<", begin)
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "empty"])
@@ -162,8 +229,7 @@ def test_damaged_pages_say_so(browser: Any, field: pathlib.Path, tmp_path: pathl
     if field.stem != "torus":
         pytest.skip("one field suffices")
     text = field.with_suffix(".html").read_text(encoding="utf-8")
-    begin = text.index('id="field">') + len('id="field">')
-    end = text.index("<", begin)
+    begin, end = payload(text)
     data = text[begin:end]
     half = len(data) // 2
     wrong = {"cut": data[: half - half % 4], "changed": data[:half] + ("AAAA" if data[half : half + 4] != "AAAA" else "BBBB") + data[half + 4 :], "empty": ""}
@@ -192,8 +258,8 @@ def test_the_page_loads_nothing(field: pathlib.Path) -> None:
 
 def test_the_page_is_small(field: pathlib.Path) -> None:
     text = field.with_suffix(".html").read_text(encoding="utf-8")
-    begin = text.index('id="field">')
-    assert len(text) - (text.index("<", begin + 12) - begin) < 150_000
+    begin, end = payload(text)
+    assert len(text) - (end - begin) < 300_000
 
 
 def test_types_of_the_modules() -> None:

@@ -1,6 +1,6 @@
 // Bounds of the field in every node of the octree, by which rays step (docs/rendering.md, "Tracing").
 
-import { degreeOf, isExact, isLeaf } from "./field_file.js";
+import { coefficientCount, coefficientIndex, degreeOf, isExact, isLeaf } from "./field_file.js";
 import { evaluateExact } from "./exact_leaf.js";
 import { forEachLeaf } from "./leaves.js";
 import { worldPoint } from "./query.js";
@@ -41,11 +41,43 @@ export function boundsOf(field) {
     // children follow their parents
     if (isLeaf(field, n)) continue;
     const first = field.low[n];
-    bounds.low[n] = Math.min(...bounds.low.subarray(first, first + 8));
-    bounds.high[n] = Math.max(...bounds.high.subarray(first, first + 8));
+    bounds.low[n] = Infinity;
+    bounds.high[n] = -Infinity;
+    for (let child = first; child < first + 8; ++child) {
+      bounds.low[n] = Math.min(bounds.low[n], bounds.low[child]);
+      bounds.high[n] = Math.max(bounds.high[n], bounds.high[child]);
+    }
   }
   return bounds;
 }
+
+/**
+ * The greatest derivatives of the products L_i(u) L_j(v) L_k(w) over the cell, for the coefficients of one degree in their order:
+ * nine numbers each, three of first derivatives, three of second derivatives along an axis, three of mixed ones.
+ * @type {Map<number, Float64Array>}
+ */
+const derivativesOfDegree = new Map();
+
+/**
+ * @param {number} degree
+ */
+function derivativesOf(degree) {
+  const known = derivativesOfDegree.get(degree);
+  if (known) return known;
+  const numbers = [];
+  for (let i = 0; i <= degree; ++i)
+    for (let j = 0; j <= degree - i; ++j)
+      for (let k = 0; k <= degree - i - j; ++k) {
+        const [x, y, z] = [i, j, k].map((n) => (n * (n + 1)) / 2);
+        numbers.push(x, y, z, ...[i, j, k].map((n) => ((n - 1) * n * (n + 1) * (n + 2)) / 8), y * z, z * x, x * y);
+      }
+  const made = new Float64Array(numbers);
+  derivativesOfDegree.set(degree, made);
+  return made;
+}
+
+/** Sums of derivatives, which are used again for each leaf. */
+const sums = new Float64Array(9);
 
 /**
  * @param {Field} field
@@ -56,36 +88,42 @@ function setPolynomialBounds(field, node, bounds) {
   const degree = degreeOf(field, node);
   const c = field.coefficients;
   const first = field.first[node];
-  let index = first;
-  let sum = 0, nonlinear = 0;
-  const slope = [0, 0, 0], pure = [0, 0, 0], mixed = [0, 0, 0];
-  for (let i = 0; i <= degree; ++i)
-    for (let j = 0; j <= degree - i; ++j)
-      for (let k = 0; k <= degree - i - j; ++k) {
-        const magnitude = Math.abs(c[index++]);
-        sum += magnitude;
-        if (i + j + k < 2) {
-          if (i + j + k === 1) bounds.linear[4 * node + (i ? 0 : j ? 1 : 2)] = c[index - 1];
-          continue;
-        }
-        nonlinear += magnitude;
-        const one = [i, j, k].map((n) => (n * (n + 1)) / 2);
-        const two = [i, j, k].map((n) => ((n - 1) * n * (n + 1) * (n + 2)) / 8);
-        for (let a = 0; a < 3; ++a) {
-          slope[a] += magnitude * one[a];
-          pure[a] += magnitude * two[a];
-          mixed[a] += magnitude * one[(a + 1) % 3] * one[(a + 2) % 3];
-        }
-      }
-  const rounding = ROUNDING * sum;
+  const count = coefficientCount(degree);
+  const derivatives = derivativesOf(degree);
+  sums.fill(0);
+  let sum = 0;
+  for (let n = 0; n < count; ++n) {
+    const magnitude = Math.abs(c[first + n]);
+    sum += magnitude;
+    if (magnitude > 0) for (let m = 0; m < 9; ++m) sums[m] += magnitude * derivatives[9 * n + m];
+  }
+  // The constant and the linear coefficients, which the linear part takes away. Their order is that of i, j, k.
+  const linear = degree > 0 ? [coefficientIndex(degree, 1, 0, 0), coefficientIndex(degree, 0, 1, 0), coefficientIndex(degree, 0, 0, 1)] : [];
   const mean = c[first];
+  let nonlinear = sum - Math.abs(mean);
+  linear.forEach((index, axis) => {
+    const slope = c[first + index];
+    bounds.linear[4 * node + axis] = slope;
+    nonlinear -= Math.abs(slope);
+    sums[axis] -= Math.abs(slope);
+  });
+  const rounding = ROUNDING * sum;
   const range = sum - Math.abs(mean) + rounding;
   bounds.linear[4 * node + 3] = mean;
   bounds.low[node] = mean - range;
   bounds.high[node] = mean + range;
-  bounds.value[node] = nonlinear + rounding;
-  bounds.gradient[node] = Math.hypot(...slope) * (1 + ROUNDING) + rounding;
-  bounds.second[node] = Math.sqrt(pure.reduce((s, x) => s + x * x, 0) + 2 * mixed.reduce((s, x) => s + x * x, 0)) * (1 + ROUNDING) + rounding;
+  bounds.value[node] = Math.max(nonlinear, 0) + rounding;
+  bounds.gradient[node] = lengthOf(sums, 0) * (1 + ROUNDING) + rounding;
+  bounds.second[node] = Math.sqrt(lengthOf(sums, 3) ** 2 + 2 * lengthOf(sums, 6) ** 2) * (1 + ROUNDING) + rounding;
+}
+
+/**
+ * Returns the length of the vector of three numbers from an index on.
+ * @param {Float64Array} numbers
+ * @param {number} at
+ */
+function lengthOf(numbers, at) {
+  return Math.sqrt(numbers[at] ** 2 + numbers[at + 1] ** 2 + numbers[at + 2] ** 2);
 }
 
 /**

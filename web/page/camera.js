@@ -24,6 +24,7 @@ import { add, cross, dot, normalized, scaled, subtract } from "./vector.js";
 
 const HALF_FIELD_OF_VIEW = Math.tan((0.5 * 35 * Math.PI) / 180);
 const RAY_MARGIN = 0.01;
+const SECTION_MARGIN = 0.025; // around a slice, as a share of the picture's width or height
 
 /**
  * @param {Field} field
@@ -68,18 +69,112 @@ export function raysOf(orbit, field, aspect) {
 }
 
 /**
+ * Returns the ray through the point (u, v) of the picture.
+ * @param {Rays} rays
+ * @param {number} u
+ * @param {number} v
+ * @returns {{start: Vector, direction: Vector}}  the direction has length 1
+ */
+export function rayThrough(rays, u, v) {
+  const across = add(scaled(rays.right, u), scaled(rays.up, v));
+  if (rays.parallel) return { start: add(rays.eye, across), direction: rays.forward };
+  return { start: rays.eye, direction: normalized(add(rays.forward, across)) };
+}
+
+/**
  * A plane that is seen flat: the point (u, v) in [−1, 1]² shows origin + u · right + v · up.
  * @typedef {{origin: Vector, right: Vector, up: Vector}} Plane
  */
 
 /**
- * Returns right and up vectors for a plane with this unit normal.
+ * Returns the unit vector along an axis.
+ * @param {number} axis
+ * @returns {Vector}
+ */
+export function axisVector(axis) {
+  return /** @type {Vector} */ ([0, 1, 2].map((a) => (a === axis ? 1 : 0)));
+}
+
+/**
+ * Returns the index of the axis to which a direction is parallel, or −1.
+ * @param {Vector} direction
+ */
+export function axisAlong(direction) {
+  return [0, 1, 2].findIndex((axis) => direction[(axis + 1) % 3] === 0 && direction[(axis + 2) % 3] === 0);
+}
+
+/**
+ * Returns the unit vectors that point right and up in the picture of a plane with this unit normal. They do not depend on its sign.
  * @param {Vector} normal
  * @returns {[Vector, Vector]}
  */
 export function screenAxes(normal) {
   /** @type {Vector} */
-  const away = Math.abs(normal[2]) < 0.9 ? [0, 0, 1] : [0, 1, 0];
-  const right = normalized(cross(away, normal));
-  return [right, cross(normal, right)];
+  const upwards = Math.abs(normal[2]) > 0.9 ? [0, 1, 0] : [0, 0, 1];
+  const up = normalized(subtract(upwards, scaled(normal, dot(upwards, normal))));
+  const right = normalized(cross(up, normal));
+  const largest = right.reduce((best, x, axis) => (Math.abs(x) > Math.abs(right[best]) ? axis : best), 0);
+  return [right[largest] < 0 ? scaled(right, -1) : right, up];
+}
+
+/**
+ * Returns where a plane crosses the edges of the field's domain.
+ * @param {Field} field
+ * @param {Vector} point
+ * @param {Vector} normal
+ * @returns {Vector[]}
+ */
+function sectionCorners(field, point, normal) {
+  const { lower, upper } = field;
+  /** @type {Vector[]} */
+  const corners = [];
+  for (let axis = 0; axis < 3; ++axis)
+    for (let edge = 0; edge < 4; ++edge) {
+      /** @type {Vector} */
+      const a = [...lower];
+      if (edge & 1) a[(axis + 1) % 3] = upper[(axis + 1) % 3];
+      if (edge & 2) a[(axis + 2) % 3] = upper[(axis + 2) % 3];
+      /** @type {Vector} */
+      const b = [...a];
+      b[axis] = upper[axis];
+      const da = dot(normal, subtract(a, point)), db = dot(normal, subtract(b, point));
+      if (da * db > 0) continue;
+      corners.push(da === db ? a : add(a, scaled(subtract(b, a), da / (da - db))));
+    }
+  return corners;
+}
+
+/**
+ * Returns the plane as a picture of this size shows it at zoom 1: the whole section of the domain, with a margin.
+ * @param {Field} field
+ * @param {Vector} point
+ * @param {Vector} normal  of length 1
+ * @param {number} width
+ * @param {number} height
+ * @returns {Plane}
+ */
+export function sectionPlane(field, point, normal, width, height) {
+  const [right, up] = screenAxes(normal);
+  const centre = centreOf(field);
+  const axis = axisAlong(normal);
+  const base = add(centre, scaled(normal, dot(normal, subtract(point, centre))));
+  if (axis >= 0) base[axis] = point[axis];
+  const corners = sectionCorners(field, point, normal);
+  const [lowX, highX] = extentAlong(corners, base, right);
+  const [lowY, highY] = extentAlong(corners, base, up);
+  const pixel = Math.max((highX - lowX) / width, (highY - lowY) / height, 1e-9 * diagonalOf(field)) / (1 - 2 * SECTION_MARGIN);
+  const origin = add(base, add(scaled(right, (lowX + highX) / 2), scaled(up, (lowY + highY) / 2)));
+  if (axis >= 0) origin[axis] = point[axis];
+  return { origin, right: scaled(right, (pixel * width) / 2), up: scaled(up, (pixel * height) / 2) };
+}
+
+/**
+ * @param {Vector[]} points
+ * @param {Vector} base
+ * @param {Vector} direction
+ * @returns {[number, number]}  the least and greatest coordinates along the direction; zeros without points
+ */
+function extentAlong(points, base, direction) {
+  const along = points.map((point) => dot(direction, subtract(point, base)));
+  return points.length > 0 ? [Math.min(...along), Math.max(...along)] : [0, 0];
 }

@@ -147,8 +147,11 @@ export function readField(bytes) {
   const cursor = new Cursor(bytes);
   const header = readHeader(cursor);
   const nodes = cursor.words(2 * header.nodes);
-  const low = nodes.filter((_, n) => n % 2 === 0);
-  const high = nodes.filter((_, n) => n % 2 === 1);
+  const low = new Uint32Array(header.nodes), high = new Uint32Array(header.nodes);
+  for (let n = 0; n < header.nodes; ++n) {
+    low[n] = nodes[2 * n];
+    high[n] = nodes[2 * n + 1];
+  }
   const isQuantized = header.coefficientBytes === 1;
   const quantized = new Uint8Array(cursor.block(isQuantized ? header.coefficients : 0));
   const plain = cursor.floats(isQuantized ? 0 : header.coefficients, header.coefficientBytes);
@@ -310,9 +313,34 @@ function dequantized(field, stored, step, meanBits) {
     if (!isLeaf(field, n) || isExact(field, n)) continue;
     const isWide = (high[n] >>> 21) & 1;
     const leafStep = step * 2 ** -((high[n] >>> 16) & 31);
-    dequantizeLeaf(new BitReader(stored, low[n]), degreeOf(field, n), leafStep, isWide ? 32 : meanBits, coefficients.subarray(first[n]));
+    dequantizeLeaf(new BitReader(stored, low[n]), degreeOf(field, n), leafStep, isWide ? 32 : meanBits, coefficients, first[n]);
   }
   return coefficients;
+}
+
+/**
+ * The coefficients of a leaf in the order of the file, by total degree: for each the place among the coefficients and the scale.
+ * @typedef {{place: number, scale: number}[][]} FileOrder
+ */
+
+/** @type {Map<number, FileOrder>} */
+const orderOfDegree = new Map();
+
+/**
+ * @param {number} degree
+ * @returns {FileOrder}
+ */
+function fileOrder(degree) {
+  const known = orderOfDegree.get(degree);
+  if (known) return known;
+  /** @type {FileOrder} */
+  const order = Array.from({ length: degree + 1 }, () => []);
+  for (let i = 0; i <= degree; ++i)
+    for (let j = 0; j <= degree - i; ++j)
+      for (let k = 0; k <= degree - i - j; ++k)
+        order[i + j + k].push({ place: coefficientIndex(degree, i, j, k), scale: Math.sqrt((2 * i + 1) * (2 * j + 1) * (2 * k + 1)) });
+  orderOfDegree.set(degree, order);
+  return order;
 }
 
 /**
@@ -321,19 +349,17 @@ function dequantized(field, stored, step, meanBits) {
  * @param {number} step
  * @param {number} meanBits
  * @param {Float32Array} out
+ * @param {number} to  the index of the leaf's first coefficient
  */
-function dequantizeLeaf(reader, degree, step, meanBits, out) {
+function dequantizeLeaf(reader, degree, step, meanBits, out, to) {
   const widths = [meanBits];
   for (let d = 1; d <= degree; ++d) widths.push(reader.read(5));
+  const order = fileOrder(degree);
   for (let d = 0; d <= degree; ++d) {
     const width = widths[d];
-    // The integers of one total degree follow each other; their places in `out` do not.
-    for (let i = 0; i <= d; ++i)
-      for (let j = 0; j <= d - i; ++j) {
-        const k = d - i - j;
-        const q = width === 0 ? 0 : reader.read(width) - 2 ** (width - 1);
-        out[coefficientIndex(degree, i, j, k)] = q * step * Math.sqrt((2 * i + 1) * (2 * j + 1) * (2 * k + 1));
-      }
+    if (width === 0) continue; // all of them are zero
+    const zero = 2 ** (width - 1);
+    for (const { place, scale } of order[d]) out[to + place] = (reader.read(width) - zero) * step * scale;
   }
 }
 

@@ -1,366 +1,417 @@
-// The page: reads the field that stands in it, draws it, and lets the reader turn, slice and ask.
+// The page: reads the fields that stand in it, draws them, and lets the reader turn, slice and ask.
 
-import { cssColor, divergingColor } from "./colors.js";
-import { degreeOf, isExact, isLeaf, readField } from "./field_file.js";
-import { Painter } from "./painter.js";
-import { add, length, scaled } from "./vector.js";
-import { axesOfSlice, firstView, planeOf, scriptOf } from "./view.js";
-import { diagonalOf, raysOf } from "./camera.js";
+import { axisAlong, diagonalOf, raysOf, screenAxes } from "./camera.js";
+import { Controls } from "./controls.js";
+import { element, setChoices } from "./dom.js";
+import { degreeOf, readField } from "./field_file.js";
+import { inflated } from "./payload.js";
+import { showFigures, showLegend, showReadout } from "./panels.js";
 import { query } from "./query.js";
+import { add, dot, scaled } from "./vector.js";
+import { firstView, movePlaneTo, placeOfPlane, planeOf, scriptOf, setPlane, viewFrom } from "./view.js";
+import { Viewer } from "./viewer.js";
 
 /** @typedef {import("./field_file.js").Field} Field */
 /** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("./pick.js").Pick} Pick */
 /** @typedef {import("./view.js").View} View */
 
-const COLORS = { surface: ["normal", "degree", "depth"], slice: ["degree", "depth", "distance"] };
-const FRAME_TIME = 70; // milliseconds that a frame may take while the view changes
-const REST = 150; // milliseconds without a change until the sharp picture is drawn
-const NO_CELL = 0xffffffff;
-
-/**
- * @template {HTMLElement} T
- * @param {string} id
- * @param {{new (): T}} type
- * @returns {T}
- */
-function element(id, type) {
-  const found = document.getElementById(id);
-  if (!(found instanceof type)) throw new Error(`the page lacks #${id}`);
-  return found;
-}
-
-/**
- * Returns the bytes of a zlib stream that is written in base64.
- * @param {string} text
- */
-async function inflated(text) {
-  const bytes = Uint8Array.from(atob(text.trim()), (character) => character.charCodeAt(0));
-  // @ts-ignore: TypeScript 4.8 does not know DecompressionStream, which browsers have had since 2023
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-/**
- * @param {number} x
- */
-function shortNumber(x) {
-  return Math.abs(x) < 1e-12 ? "0" : Number(x.toPrecision(5)).toString().replace("-", "−");
-}
-
-/**
- * @param {HTMLElement} list
- * @param {[string, string][]} rows
- */
-function setRows(list, rows) {
-  list.replaceChildren(
-    ...rows.flatMap(([name, value]) => {
-      const term = document.createElement("dt");
-      const description = document.createElement("dd");
-      term.textContent = name;
-      description.textContent = value;
-      return [term, description];
-    }),
-  );
+/** A field of the page, which is read when it is first shown. */
+class Tab {
+  /**
+   * @param {HTMLScriptElement} script
+   */
+  constructor(script) {
+    this.script = script;
+    this.name = script.dataset.name ?? "field";
+    /** @type {Viewer | null} */
+    this.viewer = null;
+  }
 }
 
 class Page {
-  /**
-   * @param {Field} field
-   * @param {Record<string, string>} sources
-   */
-  constructor(field, sources) {
-    this.field = field;
-    this.canvas = element("canvas", HTMLCanvasElement);
-    this.painter = new Painter(this.canvas, field, sources, sources["picture.frag"]);
-    this.view = firstView(field);
-    this.scale = 0.35; // pixels of the buffers for each of the canvas while the view changes
-    this.sharpAt = 0;
-    this.isPlanned = false;
-    /** @type {import("./renderer.js").Target | null} */
-    this.hits = null;
+  constructor() {
+    this.sources = Object.fromEntries([...document.querySelectorAll("script[data-name][type=x-shader]")].map((script) => [script.getAttribute("data-name"), script.textContent]));
+    this.tabs = [...document.querySelectorAll("script.field")].map((script) => new Tab(/** @type {HTMLScriptElement} */ (script)));
+    /** @type {Tab} */
+    this.tab = this.tabs[0];
+    /** @type {Tab | null} */
+    this.beside = null;
+    /** @type {View | null} */
+    this.theView = null;
+    /** @type {((pick: Pick) => void) | null} */
+    this.onPick = null; // what a click into the picture does
+    /** @type {Map<number, {x: number, y: number}>} */
+    this.pointers = new Map();
+    this.moved = 0; // pixels since a pointer was pressed
+  }
+
+  /** What is shown; it is there once the first field is read. */
+  get view() {
+    if (!this.theView) throw new Error("no field has been read");
+    return this.theView;
+  }
+
+  get viewer() {
+    if (!this.tab.viewer) throw new Error("the field has not been read");
+    return this.tab.viewer;
+  }
+
+  get field() {
+    return this.viewer.field;
+  }
+
+  /** The viewers on the page: one, or two with linked cameras. */
+  get viewers() {
+    return this.beside?.viewer ? [this.viewer, this.beside.viewer] : [this.viewer];
+  }
+
+  async start() {
+    if (this.tabs.length === 0) throw new Error("the page holds no field");
+    await this.open(this.tab);
+    this.controls = new Controls(() => ({ view: this.view, field: this.field, depths: this.viewer.painter.depths }), () => this.changed());
     this.listen();
-    this.show();
-    new ResizeObserver(() => this.resize()).observe(element("stage", HTMLDivElement));
+    this.showTabs();
+    const lines = this.tab.script.dataset.view;
+    if (lines) this.apply(lines);
+    this.arrange();
+    new ResizeObserver(() => this.viewers.forEach((viewer) => viewer.resize())).observe(element("stage", HTMLDivElement));
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    dark.addEventListener("change", () => this.setPaper());
   }
 
-  resize() {
-    const stage = element("stage", HTMLDivElement);
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    this.canvas.width = Math.max(Math.round(stage.clientWidth * ratio), 1);
-    this.canvas.height = Math.max(Math.round(stage.clientHeight * ratio), 1);
-    this.changed();
+  /**
+   * Reads the field of a tab if that has not been done.
+   * @param {Tab} tab
+   */
+  async open(tab) {
+    if (tab.viewer) return;
+    const field = readField(await inflated(tab.script.textContent ?? ""));
+    tab.script.textContent = ""; // its memory is needed no more
+    this.theView ??= firstView(field);
+    const canvas = document.createElement("canvas");
+    canvas.tabIndex = 0;
+    canvas.setAttribute("aria-label", tab.name);
+    canvas.hidden = true;
+    element("stage", HTMLDivElement).prepend(canvas);
+    tab.viewer = new Viewer(canvas, field, this.sources, this.view, { painted: () => this.painted(), rested: () => this.rested(), failed: (error) => this.failed(error) });
+    this.listenTo(tab.viewer);
+    this.setPaper();
   }
 
-  /** Plans a coarse picture for the next frame, and a sharp one for when the view rests. */
-  changed() {
-    this.sharpAt = performance.now() + REST;
-    if (this.isPlanned) return;
-    this.isPlanned = true;
-    requestAnimationFrame(() => this.frame());
-  }
-
-  frame() {
-    this.isPlanned = false;
-    const begin = performance.now();
-    this.hits = this.painter.draw(this.view, this.scale);
-    this.painter.gl.finish();
-    const taken = performance.now() - begin;
-    this.scale = Math.min(Math.max(this.scale * Math.sqrt(FRAME_TIME / Math.max(taken, 1)), 0.1), 1);
-    window.setTimeout(() => this.sharpen(), REST);
-  }
-
-  sharpen() {
-    if (this.isPlanned || performance.now() < this.sharpAt - 1) return;
-    this.hits = this.painter.draw(this.view, 1);
-    document.body.dataset.state = "sharp";
-  }
-
-  /** Shows the state of the view in the controls. */
-  show() {
-    const { view, field } = this;
-    element("kind", HTMLSelectElement).value = view.kind;
-    const colors = element("color", HTMLSelectElement);
-    colors.replaceChildren(...COLORS[view.kind].map((name) => new Option(name, name)));
-    colors.value = view.kind === "slice" ? view.sliceColor : view.surfaceColor;
-    element("axis-of-slice", HTMLLabelElement).hidden = view.kind !== "slice";
-    element("axis", HTMLSelectElement).value = String(view.axis);
-    const offset = element("offset", HTMLInputElement);
-    const isSlice = view.kind === "slice";
-    const reach = 0.25 * Math.min(...field.size);
-    offset.min = String(isSlice ? field.lower[view.axis] : -reach);
-    offset.max = String(isSlice ? field.upper[view.axis] : reach);
-    offset.value = String(isSlice ? view.at : view.offset);
-    element("offset-name", HTMLSpanElement).textContent = isSlice ? "at" : "offset";
-    element("offset-value", HTMLOutputElement).textContent = shortNumber(isSlice ? view.at : view.offset);
-    this.showLegend();
-    this.showFigures();
-    document.body.dataset.state = "changing";
-    this.changed();
-  }
-
-  showLegend() {
-    const { view, painter } = this;
-    const quantity = view.kind === "slice" ? view.sliceColor : view.surfaceColor;
-    const legend = element("legend", HTMLDivElement);
-    const titles = { normal: "surface", degree: "polynomial degree", depth: "octree depth", distance: "distance" };
-    element("legend-title", HTMLHeadingElement).textContent = titles[quantity];
-    if (quantity === "normal") return legend.replaceChildren();
-    if (quantity === "distance") {
-      const bar = document.createElement("div");
-      bar.className = "bar";
-      const stops = Array.from({ length: 17 }, (_, i) => cssColor(divergingColor(i / 8 - 1)));
-      bar.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
-      const ends = document.createElement("div");
-      ends.className = "ends";
-      for (const x of [-painter.range, 0, painter.range]) {
-        const end = document.createElement("span");
-        end.textContent = shortNumber(x);
-        ends.append(end);
-      }
-      return legend.replaceChildren(bar, ends);
+  /** Shows the tab's field, and the one beside it. */
+  async choose(/** @type {Tab} */ tab, /** @type {Tab | null} */ beside) {
+    try {
+      await this.open(tab);
+      if (beside) await this.open(beside);
+    } catch (error) {
+      return this.say(`${tab.name} cannot be shown: ${error instanceof Error ? error.message : error}`);
     }
-    const levels = quantity === "degree" ? painter.degrees : painter.depths;
-    const most = Math.max(...levels.map(({ share }) => share));
-    legend.replaceChildren(
-      ...[...levels].reverse().map(({ level, share, color }) => {
-        const row = document.createElement("div");
-        row.className = "level";
-        const name = document.createElement("b");
-        name.textContent = level === 31 ? "exact" : String(level);
-        name.style.background = cssColor(color);
-        name.style.color = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2] > 0.25 ? "#000" : "#fff";
-        const percent = document.createElement("span");
-        percent.textContent = `${(100 * share).toFixed(1)} %`;
-        const bar = document.createElement("i");
-        bar.style.width = `${(100 * share) / most}%`;
-        row.append(name, percent, bar);
-        return row;
+    this.tab = tab;
+    this.beside = beside === tab ? null : beside;
+    this.showTabs();
+    this.arrange();
+  }
+
+  /** Gives the shown viewers their places on the page. */
+  arrange() {
+    const shown = this.viewers;
+    for (const { viewer } of this.tabs) if (viewer) viewer.canvas.hidden = !shown.includes(viewer);
+    shown.forEach((viewer, place) => {
+      viewer.view = this.view;
+      viewer.canvas.style.left = `${(100 * place) / shown.length}%`;
+      viewer.canvas.style.width = `${100 / shown.length}%`;
+      viewer.resize();
+    });
+    showFigures(this.field);
+    this.changed();
+  }
+
+  /** Shows the state of the view, which something has changed. */
+  changed() {
+    document.body.dataset.state = "changing";
+    this.controls?.show();
+    showLegend(this.view, this.viewer.painter);
+    element("script", HTMLTextAreaElement).value = scriptOf(this.view, this.field);
+    for (const viewer of this.viewers) viewer.changed();
+  }
+
+  painted() {
+    this.placeMark();
+  }
+
+  rested() {
+    if (this.viewers.every((viewer) => viewer.isSharp)) document.body.dataset.state = "sharp";
+  }
+
+  /**
+   * Shows pictures in place of the field, and the reason.
+   * @param {unknown} error
+   */
+  failed(error) {
+    document.body.dataset.state = "failed";
+    for (const { viewer } of this.tabs) if (viewer) viewer.canvas.hidden = true;
+    element("pictures", HTMLDivElement).hidden = false;
+    this.say(`The field cannot be shown: ${error instanceof Error ? error.message : error}`);
+  }
+
+  /**
+   * @param {string} text
+   */
+  say(text) {
+    element("message", HTMLParagraphElement).textContent = text;
+  }
+
+  /** The canvas has the colour of the page's paper, in light and in dark. */
+  setPaper() {
+    const isDark = matchMedia("(prefers-color-scheme: dark)").matches;
+    for (const { viewer } of this.tabs) {
+      if (!viewer) continue;
+      viewer.painter.paper = isDark ? [0.0109, 0.0123, 0.0152] : [0.9559734, 0.9559734, 0.9386857];
+      viewer.painter.ink = isDark ? [0.85, 0.86, 0.88] : [0.08, 0.09, 0.13];
+      viewer.repaint();
+    }
+  }
+
+  showTabs() {
+    const tabs = element("tabs", HTMLElement);
+    tabs.hidden = this.tabs.length < 2;
+    tabs.replaceChildren(
+      ...this.tabs.map((tab) => {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.textContent = tab.name;
+        button.setAttribute("aria-pressed", String(tab === this.tab));
+        button.addEventListener("click", () => this.choose(tab, this.beside));
+        return button;
       }),
     );
-  }
-
-  showFigures() {
-    const { field } = this;
-    let leaves = 0;
-    for (let n = 0; n < field.low.length; ++n) leaves += isLeaf(field, n) ? 1 : 0;
+    element("beside-label", HTMLLabelElement).hidden = this.tabs.length < 2;
     /** @type {[string, string][]} */
-    const rows = [["made from", field.name || "a function"], ["cells", leaves.toLocaleString("en")], ["file", `${(field.bytes / 1e6).toFixed(2)} MB`]];
-    if (field.measured) rows.push(["RMS error near", shortNumber(field.measured.nearRms)], ["greatest near", shortNumber(field.measured.nearMax)], ["RMS error", shortNumber(field.measured.rms)]);
-    setRows(element("figures", HTMLDListElement), rows);
+    const others = this.tabs.map((tab, n) => [String(n), tab.name]);
+    setChoices(element("beside", HTMLSelectElement), [["none", "none"], ...others], this.beside ? String(this.tabs.indexOf(this.beside)) : "none");
   }
 
-  /**
-   * Returns the point that a pixel of the canvas shows, or null.
-   * @param {number} x
-   * @param {number} y
-   * @returns {Vector | null}
-   */
-  pointAt(x, y) {
-    const { view, field, canvas } = this;
-    const u = (2 * x) / canvas.width - 1;
-    const v = 1 - (2 * y) / canvas.height;
-    if (view.kind === "slice") {
-      const plane = planeOf(view, field, canvas.width, canvas.height);
-      return add(plane.origin, add(scaled(plane.right, u), scaled(plane.up, v)));
+  /** Points to the marked place in each picture. */
+  placeMark() {
+    for (const viewer of this.viewers) {
+      const id = `mark-${this.viewers.indexOf(viewer)}`;
+      const mark = document.getElementById(id) ?? element("stage", HTMLDivElement).appendChild(Object.assign(document.createElement("i"), { id, className: "mark" }));
+      const place = this.view.mark && viewer.project(this.view.mark);
+      mark.hidden = !place;
+      if (!place) continue;
+      mark.style.left = `${viewer.canvas.offsetLeft + place[0]}px`;
+      mark.style.top = `${viewer.canvas.offsetTop + place[1]}px`;
     }
-    if (!this.hits) return null;
-    const texel = this.hits.at(Math.floor((x / canvas.width) * this.hits.width), Math.floor((y / canvas.height) * this.hits.height));
-    if (texel.cell === NO_CELL) return null;
-    const rays = raysOf(view.orbit, field, canvas.width / canvas.height);
-    const across = add(scaled(rays.right, u), scaled(rays.up, v));
-    const direction = rays.parallel ? rays.forward : add(rays.forward, across);
-    const start = rays.parallel ? add(rays.eye, across) : rays.eye;
-    return add(start, scaled(direction, texel.distance / length(direction)));
+    if (this.viewers.length === 1) document.getElementById("mark-1")?.remove();
   }
 
   /**
-   * Shows what is at a pixel of the canvas.
-   * @param {number} x
-   * @param {number} y
+   * Shows the view that lines of a script describe.
+   * @param {string} lines
    */
-  readOut(x, y) {
-    const { field } = this;
-    const point = this.pointAt(x, y);
-    const found = point && query(field, point);
-    const list = element("readout", HTMLDListElement);
-    if (!point || !found) return setRows(list, [["", "nothing"]]);
-    const { node, depth } = found.leaf;
-    setRows(list, [
-      ["position", point.map(shortNumber).join(", ")],
-      ["value", shortNumber(found.value)],
-      ["gradient", found.gradient.map(shortNumber).join(", ")],
-      ["cell", String(node)],
-      ["degree", isExact(field, node) ? "exact" : String(degreeOf(field, node))],
-      ["depth", String(depth)],
-    ]);
+  apply(lines) {
+    try {
+      this.theView = viewFrom(lines, this.view, this.field);
+    } catch (error) {
+      return this.say(error instanceof Error ? error.message : String(error));
+    }
+    this.say("");
+    for (const viewer of this.viewers) viewer.view = this.view;
+    this.changed();
   }
 
   listen() {
-    const { canvas } = this;
-    const select = (/** @type {string} */ id, /** @type {(value: string) => void} */ set) =>
-      element(id, HTMLSelectElement).addEventListener("change", (event) => {
-        set(/** @type {HTMLSelectElement} */ (event.target).value);
-        this.show();
-      });
-    select("kind", (value) => (this.view.kind = /** @type {View["kind"]} */ (value)));
-    select("axis", (value) => {
-      this.view.axis = /** @type {0 | 1 | 2} */ (Number(value));
-      this.view.at = this.view.middle[this.view.axis];
+    element("beside", HTMLSelectElement).addEventListener("change", (event) => {
+      const { value } = /** @type {HTMLSelectElement} */ (event.target);
+      this.choose(this.tab, value === "none" ? null : this.tabs[Number(value)]);
     });
-    select("color", (value) => {
-      const quantity = /** @type {import("./view.js").Quantity} */ (value);
-      if (this.view.kind === "slice") this.view.sliceColor = quantity;
-      else this.view.surfaceColor = quantity;
-    });
-    element("offset", HTMLInputElement).addEventListener("input", (event) => {
-      const value = Number(/** @type {HTMLInputElement} */ (event.target).value);
-      if (this.view.kind === "slice") this.view.at = value;
-      else this.view.offset = value;
-      element("offset-value", HTMLOutputElement).textContent = shortNumber(value);
-      this.changed();
-    });
+    element("apply", HTMLButtonElement).addEventListener("click", () => this.apply(element("script", HTMLTextAreaElement).value));
     element("copy", HTMLButtonElement).addEventListener("click", () => this.copyView());
-    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-    canvas.addEventListener("pointermove", (event) => this.move(event));
+    element("png", HTMLButtonElement).addEventListener("click", () => this.savePng());
+  }
+
+  /**
+   * Listens to mouse, fingers and keys on a canvas.
+   * @param {Viewer} viewer
+   */
+  listenTo(viewer) {
+    const { canvas } = viewer;
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      if (this.pointers.size === 0) this.moved = 0;
+      this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    });
+    canvas.addEventListener("pointermove", (event) => this.move(viewer, event));
+    canvas.addEventListener("pointerup", (event) => this.release(viewer, event));
+    canvas.addEventListener("pointercancel", (event) => this.pointers.delete(event.pointerId));
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.zoom(Math.exp(event.deltaY * 0.001));
-    });
+    }, { passive: false });
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
   /**
+   * @param {Viewer} viewer
    * @param {PointerEvent} event
    */
-  move(event) {
-    const { view, canvas } = this;
-    const box = canvas.getBoundingClientRect();
-    const ratio = canvas.width / box.width;
-    if (event.buttons === 0) return this.readOut((event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio);
-    if (view.kind === "slice" || event.buttons === 2 || event.shiftKey) this.pan(event.movementX / box.width, event.movementY / box.height);
-    else this.turn(-0.4 * event.movementX, 0.4 * event.movementY);
+  move(viewer, event) {
+    const before = this.pointers.get(event.pointerId);
+    if (!before) return showReadout(viewer.field, viewer.pick(event.clientX, event.clientY));
+    const dx = event.clientX - before.x, dy = event.clientY - before.y;
+    this.moved += Math.abs(dx) + Math.abs(dy);
+    const { clientWidth: width, clientHeight: height } = viewer.canvas;
+    const share = 1 / this.pointers.size; // two fingers that move together move the picture once
+    const other = [...this.pointers].find(([id]) => id !== event.pointerId)?.[1];
+    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    if (other) {
+      const apart = (/** @type {{x: number, y: number}} */ p) => Math.hypot(p.x - other.x, p.y - other.y);
+      this.zoomView(apart(before) / Math.max(apart({ x: event.clientX, y: event.clientY }), 1));
+      viewer.pan((share * dx) / width, (share * dy) / height);
+    } else if (event.ctrlKey) {
+      this.movePlane(-dy / height);
+    } else if (event.altKey) {
+      this.tiltPlane(viewer, dx / width, dy / height);
+    } else if (this.view.kind === "slice" || event.buttons === 2 || event.shiftKey) {
+      viewer.pan(dx / width, dy / height);
+    } else {
+      this.turnView(-0.4 * dx, 0.4 * dy);
+    }
+    this.changed();
+  }
+
+  /**
+   * @param {Viewer} viewer
+   * @param {PointerEvent} event
+   */
+  release(viewer, event) {
+    this.pointers.delete(event.pointerId);
+    const pick = this.moved < 4 ? viewer.pick(event.clientX, event.clientY) : null;
+    if (!pick) return;
+    showReadout(viewer.field, pick);
+    this.onPick?.(pick);
   }
 
   /**
    * @param {number} azimuth
    * @param {number} elevation
    */
-  turn(azimuth, elevation) {
+  turnView(azimuth, elevation) {
     const { orbit } = this.view;
     orbit.azimuth += azimuth;
     orbit.elevation = Math.min(Math.max(orbit.elevation + elevation, -90), 90);
-    this.changed();
-  }
-
-  /**
-   * Moves the picture by shares of its width and height.
-   * @param {number} x
-   * @param {number} y
-   */
-  pan(x, y) {
-    const { view, field, canvas } = this;
-    if (view.kind === "slice") {
-      const [across, upward] = axesOfSlice(view.axis);
-      const plane = planeOf(view, field, canvas.width, canvas.height);
-      view.middle[across] -= 2 * x * plane.right[across];
-      view.middle[upward] += 2 * y * plane.up[upward];
-    } else {
-      const rays = raysOf(view.orbit, field, canvas.width / canvas.height);
-      const reach = rays.parallel ? 1 : view.orbit.distance * diagonalOf(field);
-      view.orbit.target = add(view.orbit.target, add(scaled(rays.right, -2 * x * reach), scaled(rays.up, 2 * y * reach)));
-    }
-    this.changed();
   }
 
   /**
    * @param {number} factor  above 1 farther away
    */
-  zoom(factor) {
+  zoomView(factor) {
     const { view } = this;
-    if (view.kind === "slice") view.zoom = Math.min(Math.max(view.zoom / factor, 0.5), 1e4);
+    if (view.kind === "slice") view.zoom = Math.min(Math.max(view.zoom / factor, 0.5), 1e5);
     else view.orbit.distance = Math.min(Math.max(view.orbit.distance * factor, 0.01), 20);
+  }
+
+  /**
+   * @param {number} factor
+   */
+  zoom(factor) {
+    this.zoomView(factor);
     this.changed();
+  }
+
+  /**
+   * Moves the slice's plane along its normal, or in a cut surface without a plane the cut, by a share of the domain's diagonal.
+   * @param {number} share
+   */
+  movePlane(share) {
+    const { view, field } = this;
+    const length = share * diagonalOf(field);
+    if (view.kind === "surface" && view.clip && !view.planeInSpace) {
+      const { axis, at } = view.clip;
+      view.clip.at = Math.min(Math.max(at + length, field.lower[axis]), field.upper[axis]);
+    } else {
+      movePlaneTo(view, field, placeOfPlane(view, field) + length);
+    }
+  }
+
+  /**
+   * Tilts the slice's plane about the axes of its picture.
+   * @param {Viewer} viewer
+   * @param {number} x
+   * @param {number} y
+   */
+  tiltPlane(viewer, x, y) {
+    const { view, field } = this;
+    const middle = planeOf(view, field, viewer.canvas.width, viewer.canvas.height).origin;
+    const [right, up] = screenAxes(view.normal);
+    const facing = view.kind === "surface" && dot(view.normal, raysOf(view.orbit, field, 1).forward) > 0 ? -1 : 1;
+    setPlane(view, field, middle, add(view.normal, add(scaled(right, 2 * facing * x), scaled(up, -2 * facing * y))));
   }
 
   /**
    * @param {KeyboardEvent} event
    */
   key(event) {
+    const { view, viewer } = this;
     const step = 5;
-    const isSlice = this.view.kind === "slice";
+    const isSlice = view.kind === "slice";
+    const place = (/** @type {number} */ axis) => () => {
+      setPlane(view, this.field, view.point, /** @type {Vector} */ ([0, 1, 2].map((a) => (a === axis ? 1 : 0))));
+    };
     /** @type {Record<string, () => void>} */
     const actions = {
-      ArrowLeft: () => (isSlice ? this.pan(0.05, 0) : this.turn(step, 0)),
-      ArrowRight: () => (isSlice ? this.pan(-0.05, 0) : this.turn(-step, 0)),
-      ArrowUp: () => (isSlice ? this.pan(0, 0.05) : this.turn(0, step)),
-      ArrowDown: () => (isSlice ? this.pan(0, -0.05) : this.turn(0, -step)),
-      "+": () => this.zoom(0.8),
-      "-": () => this.zoom(1.25),
+      ArrowLeft: () => (isSlice ? viewer.pan(0.05, 0) : this.turnView(step, 0)),
+      ArrowRight: () => (isSlice ? viewer.pan(-0.05, 0) : this.turnView(-step, 0)),
+      ArrowUp: () => (isSlice ? viewer.pan(0, 0.05) : this.turnView(0, step)),
+      ArrowDown: () => (isSlice ? viewer.pan(0, -0.05) : this.turnView(0, -step)),
+      PageUp: () => this.movePlane(0.01),
+      PageDown: () => this.movePlane(-0.01),
+      "+": () => this.zoomView(0.8),
+      "-": () => this.zoomView(1.25),
+      s: () => (view.kind = isSlice ? "surface" : "slice"),
+      x: place(0),
+      y: place(1),
+      z: place(2),
+      Home: () => Object.assign(view, firstView(this.field), { kind: view.kind }),
     };
-    const action = actions[event.key];
+    const action = event.ctrlKey || event.metaKey ? undefined : actions[event.key];
     if (!action) return;
     event.preventDefault();
     action();
+    this.changed();
   }
 
   copyView() {
     const lines = scriptOf(this.view, this.field);
-    const tell = () => (element("message", HTMLParagraphElement).textContent = lines);
-    navigator.clipboard?.writeText(lines).then(tell, tell) ?? tell();
+    navigator.clipboard?.writeText(lines).then(
+      () => this.say("The view is copied: lines of a script of the program, which this page reads too."),
+      () => this.say("The browser does not let the page copy; the lines stand in the panel “view”."),
+    );
+  }
+
+  /** Saves the picture as it is on the canvas. */
+  savePng() {
+    this.viewer.canvas.toBlob((blob) => {
+      if (!blob) return this.say("The browser could not write the picture.");
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(blob);
+      link.download = `${this.tab.name}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    });
   }
 }
 
 async function start() {
-  const message = element("message", HTMLParagraphElement);
+  const page = new Page();
   try {
-    const sources = Object.fromEntries([...document.querySelectorAll("script[data-name]")].map((script) => [script.getAttribute("data-name"), script.textContent]));
-    const field = readField(await inflated(element("field", HTMLScriptElement).textContent ?? ""));
-    const page = new Page(field, sources);
+    await page.start();
     // Tests and curious readers find the page here, with functions to ask it.
-    Object.assign(window, { hpsdf: { page, field, query, firstView, planeOf, raysOf, scriptOf, degreeOf, add, scaled } });
+    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, add, scaled } });
   } catch (error) {
-    message.textContent = `The field cannot be shown: ${error instanceof Error ? error.message : error}`;
-    document.body.dataset.state = "failed";
+    page.failed(error);
   }
 }
 

@@ -3,15 +3,21 @@
 import { degreeOf, isLeaf } from "./field_file.js";
 import { forEachLeaf } from "./leaves.js";
 import { divergingColor, exactColor, orderedColor } from "./colors.js";
-import { FieldRenderer } from "./renderer.js";
+import { FieldRenderer, shownBox } from "./renderer.js";
+import { cellLines } from "./cell_lines.js";
+import { worldPoint } from "./query.js";
 import { planeOf } from "./view.js";
 import { raysOf } from "./camera.js";
 
 /** @typedef {import("./field_file.js").Field} Field */
 /** @typedef {import("./view.js").View} View */
+/** @typedef {import("./view.js").Quantity} Quantity */
 /** @typedef {import("./colors.js").Color} Color */
+/** @typedef {import("./camera.js").Rays} Rays */
+/** @typedef {import("./renderer.js").Buffers} Buffers */
+/** @typedef {import("./renderer.js").Target} Target */
+/** @typedef {import("./renderer.js").Job} Job */
 
-const MODES = { normal: 0, degree: 1, depth: 2, distance: 3 };
 const STEPS = 256; // of a continuous scale
 
 /**
@@ -39,15 +45,35 @@ function levelsOf(field, levelOf) {
   });
 }
 
+/**
+ * A picture: its view, and the buffers that hold it once the jobs are done.
+ * @typedef {object} Drawing
+ * @property {View} view
+ * @property {number} scale  pixels of the buffers for each pixel of the canvas
+ * @property {Rays} rays
+ * @property {Target} hits
+ * @property {Target | null} section
+ * @property {Job[]} jobs
+ */
+
+/**
+ * Returns true where a section hides the surface, as isSectioned in picture.frag.
+ * @param {{cell: number, levels: number, distance: number}} section
+ * @param {{cell: number, distance: number}} hit
+ */
+export function isSectionShown(section, hit) {
+  if (section.cell === 0xffffffff) return false;
+  return hit.cell === 0xffffffff || section.levels >>> 24 === 1 || section.distance < hit.distance;
+}
+
 /** A field with what is needed to draw it, on one canvas. */
 export class Painter {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {Field} field
    * @param {Record<string, string>} sources
-   * @param {string} pictureShader
    */
-  constructor(canvas, field, sources, pictureShader) {
+  constructor(canvas, field, sources) {
     const gl = canvas.getContext("webgl2", { antialias: false, alpha: false, preserveDrawingBuffer: true });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.canvas = canvas;
@@ -55,7 +81,22 @@ export class Painter {
     this.field = field;
     this.renderer = new FieldRenderer(gl, field, sources);
     const vertex = "#version 300 es\n" + sources["full_screen.vert"];
-    this.coloring = this.renderer.program(vertex, pictureShader);
+    this.coloring = this.renderer.program(vertex, sources["picture.frag"]);
+    this.lining = this.renderer.program(sources["cells.vert"], sources["cells.frag"]);
+    this.lineArray = gl.createVertexArray();
+    this.lineBuffer = gl.createBuffer();
+    gl.bindVertexArray(this.lineArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.lineBuffer);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 0, 0);
+    /** @type {{cells: View["cells"], ends: number}} */
+    this.shownLines = { cells: "none", ends: 0 };
+    /** @type {WebGLTexture | null} */
+    this.cellNumbers = null;
+    /** @type {Color} */
+    this.paper = [1, 1, 1];
+    /** @type {Color} */
+    this.ink = [0, 0, 0];
     this.degrees = levelsOf(field, (node) => degreeOf(field, node));
     this.depths = levelsOf(field, (_, depth) => depth);
     this.range = this.rangeOfDistance();
@@ -94,40 +135,133 @@ export class Painter {
   }
 
   /**
-   * Draws a view on the canvas with `scale` pixels of the buffers for each of the canvas.
+   * Returns what has to be drawn before a view can be painted, with `scale` pixels of the buffers for each of the canvas.
    * @param {View} view
    * @param {number} scale
+   * @param {Buffers} buffers
+   * @returns {Drawing}
    */
-  draw(view, scale) {
-    const { gl, canvas } = this;
+  drawing(view, scale, buffers) {
+    const { canvas, renderer, field } = this;
     const width = Math.max(Math.round(canvas.width * scale), 1);
     const height = Math.max(Math.round(canvas.height * scale), 1);
+    const rays = raysOf(view.orbit, field, width / height);
+    const shown = structuredClone(view);
+    if (view.kind === "slice") {
+      const job = renderer.sliceJob(buffers, planeOf(view, field, width, height), width, height);
+      return { view: shown, scale, rays, hits: job.hits, section: null, jobs: [job] };
+    }
+    const jobs = [renderer.surfaceJob(buffers, rays, width, height, view.offset, view.clip)];
+    if (view.clip || view.planeInSpace) jobs.push(renderer.sectionJob(buffers, rays, width, height, view.offset, view.clip, view.planeInSpace ? view : null));
+    return { view: shown, scale, rays, hits: jobs[0].hits, section: jobs[1]?.hits ?? null, jobs };
+  }
+
+  /**
+   * Paints a drawing on the canvas once its jobs are done.
+   * @param {Drawing} drawing
+   */
+  paint({ view, scale, rays, hits, section }) {
+    const { gl, canvas, renderer } = this;
     const isSlice = view.kind === "slice";
-    const rays = raysOf(view.orbit, this.field, width / height);
-    const hits = isSlice ? this.renderer.slice(planeOf(view, this.field, width, height), width, height) : this.renderer.surface(rays, width, height, view.offset);
     const quantity = isSlice ? view.sliceColor : view.surfaceColor;
+    const { mode, texture, range } = this.coloringOf(quantity);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.useProgram(this.coloring);
-    const at = (/** @type {string} */ name) => gl.getUniformLocation(this.coloring, name);
-    const scales = { normal: this.scales.degree, ...this.scales };
-    [["integers", hits.integers], ["floats", hits.floats], ["scale", scales[quantity]], ["ofCells", hits.floats]].forEach(([name, texture], unit) => {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, /** @type {WebGLTexture} */ (texture));
-      gl.uniform1i(at(/** @type {string} */ (name)), unit);
-    });
+    const at = (/** @type {string} */ name) => renderer.at(this.coloring, name);
+    this.bindTextures(this.coloring, { integers: hits.integers, floats: hits.floats, scale: texture, ofCells: this.cellNumbers ?? hits.floats, section: (section ?? hits).integers });
     gl.uniform1i(at("isSlice"), isSlice ? 1 : 0);
-    gl.uniform1i(at("mode"), MODES[quantity]);
-    gl.uniform2f(at("range"), -this.range, this.range);
-    gl.uniform3f(at("forward"), ...rays.forward);
-    gl.uniform3f(at("right"), ...rays.right);
-    gl.uniform3f(at("up"), ...rays.up);
-    gl.uniform1i(at("parallel"), rays.parallel ? 1 : 0);
-    gl.uniform1f(at("isoStep"), isSlice && quantity === "distance" ? this.range / 12 : 0);
-    gl.uniform1i(at("outlines"), quantity === "degree" || quantity === "depth" ? 1 : 0);
+    gl.uniform1i(at("hasSection"), section ? 1 : 0);
+    gl.uniform1i(at("mode"), mode);
+    gl.uniform2f(at("range"), ...range);
+    gl.uniform3f(at("paper"), ...this.paper);
+    this.setCamera(this.coloring, rays);
+    gl.uniform1f(at("isoStep"), quantity === "distance" ? this.range / 12 : 0);
+    gl.uniform1i(at("outlines"), quantity === "distance" || quantity === "normal" ? 0 : 1);
     gl.uniform1f(at("scaleOfBuffers"), scale);
-    gl.bindVertexArray(this.renderer.empty);
+    gl.bindVertexArray(renderer.empty);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
-    return hits;
+    if (!isSlice && view.cells !== "none") this.paintCells(view, scale, rays, hits, section);
+  }
+
+  /**
+   * @param {WebGLProgram} program
+   * @param {Record<string, WebGLTexture>} textures
+   */
+  bindTextures(program, textures) {
+    const { gl, renderer } = this;
+    Object.entries(textures).forEach(([name, texture], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.uniform1i(renderer.at(program, name), unit);
+    });
+  }
+
+  /**
+   * @param {WebGLProgram} program
+   * @param {Rays} rays
+   */
+  setCamera(program, rays) {
+    const { gl, renderer } = this;
+    gl.uniform3f(renderer.at(program, "forward"), ...rays.forward);
+    gl.uniform3f(renderer.at(program, "right"), ...rays.right);
+    gl.uniform3f(renderer.at(program, "up"), ...rays.up);
+    gl.uniform1i(renderer.at(program, "parallel"), rays.parallel ? 1 : 0);
+  }
+
+  /**
+   * Returns how a quantity is coloured: the mode of picture.frag, its scale and the range of the scale.
+   * @param {Quantity} quantity
+   * @returns {{mode: number, texture: WebGLTexture, range: [number, number]}}
+   */
+  coloringOf(quantity) {
+    const range = /** @type {[number, number]} */ ([-this.range, this.range]);
+    if (quantity === "depth") return { mode: 2, texture: this.scales.depth, range };
+    if (quantity === "distance") return { mode: 3, texture: this.scales.distance, range };
+    return { mode: quantity === "degree" ? 1 : 0, texture: this.scales.degree, range };
+  }
+
+  /**
+   * Paints the edges of cells over the picture of a surface.
+   * @param {View} view
+   * @param {number} scale
+   * @param {Rays} rays
+   * @param {Target} hits
+   * @param {Target | null} section
+   */
+  paintCells(view, scale, rays, hits, section) {
+    const { gl, canvas, renderer, field, lining } = this;
+    renderer.checkLinked(lining);
+    gl.useProgram(lining);
+    const at = (/** @type {string} */ name) => renderer.at(lining, name);
+    this.bindTextures(lining, { integers: hits.integers, section: (section ?? hits).integers });
+    gl.uniform1i(at("hasSection"), section ? 1 : 0);
+    gl.uniform1f(at("scaleOfBuffers"), scale);
+    gl.uniform1f(at("height"), canvas.height);
+    gl.uniform3f(at("eye"), ...rays.eye);
+    gl.uniform3f(at("ink"), ...this.ink);
+    const [lower, upper] = shownBox(field, rays, view.clip);
+    gl.uniform3f(at("shownLo"), ...worldPoint(field, lower));
+    gl.uniform3f(at("shownHi"), ...worldPoint(field, upper));
+    this.setCamera(lining, rays);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    gl.bindVertexArray(this.lineArray);
+    gl.drawArrays(gl.LINES, 0, this.setLines(view.cells));
+    gl.disable(gl.BLEND);
+  }
+
+  /**
+   * Brings the edges of these cells to the graphics card, and returns the number of their ends.
+   * @param {View["cells"]} cells
+   */
+  setLines(cells) {
+    const { gl } = this;
+    if (cells === this.shownLines.cells || cells === "none") return this.shownLines.ends;
+    const lines = cellLines(this.field, cells);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.lineBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, lines, gl.STATIC_DRAW);
+    this.shownLines = { cells, ends: lines.length / 4 };
+    return this.shownLines.ends;
   }
 }

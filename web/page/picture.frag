@@ -7,6 +7,9 @@ precision highp sampler2D;
 
 uniform usampler2D integers;  // cell; degree, depth and crack, or degree; the rest as the passes write it
 uniform sampler2D floats;     // normals of a surface
+uniform usampler2D section;   // sections in the picture of a surface, as section.frag writes them
+uniform bool hasSection;
+uniform vec3 paper;           // the background, linear light
 uniform sampler2D scale;      // 32 colours of levels in row 0, 256 of a continuous scale in row 1
 uniform sampler2D ofCells;    // a number for each node
 uniform bool isSlice;
@@ -21,7 +24,6 @@ uniform float scaleOfBuffers;  // pixels of the buffers for each pixel of the ca
 out vec4 color;
 
 const uint kNoCell = 0xffffffffu;
-const vec3 kPaper = vec3(0.9559734, 0.9559734, 0.9386857);
 const vec3 kClay = vec3(0.6444797, 0.3185467, 0.1844750);
 const int kRow = 2048;
 
@@ -33,6 +35,10 @@ vec3 toSrgb(vec3 linear) {
 // Pixels count from the top row down.
 ivec2 size() { return textureSize(integers, 0); }
 uvec4 at(ivec2 pixel) { return texelFetch(integers, pixel, 0); }
+uvec4 onPlane(ivec2 pixel) {
+  pixel = max(pixel, ivec2(0));
+  return isSlice ? texelFetch(integers, pixel, 0) : texelFetch(section, pixel, 0);
+}
 
 uint depthOf(uvec4 texel) { return isSlice ? texel.z : texel.y >> 8 & 0xffu; }
 uint degreeOf(uvec4 texel) { return texel.y & 0xffu; }
@@ -107,9 +113,10 @@ vec3 shaded(ivec2 pixel, uvec4 texel) {
   return colorOf(texel) * light * (0.35 + 0.65 * open) + 0.4 * open * dot(gloss(n, toEye), vec3(1.0 / 3.0));
 }
 
+// A plane that is cut by the field, with the outlines of the cells, lines of equal distance and the surface.
 vec3 sliced(ivec2 pixel, uvec4 texel) {
   vec3 c = mode == 0 ? (valueOf(texel) < 0.0 ? vec3(0.855, 0.730, 0.609) : vec3(0.730, 0.776, 0.831)) : colorOf(texel);
-  uvec4 before = at(max(pixel - ivec2(1, 0), ivec2(0))), above = at(max(pixel - ivec2(0, 1), ivec2(0)));
+  uvec4 before = onPlane(pixel - ivec2(1, 0)), above = onPlane(pixel - ivec2(0, 1));
   if (outlines && (before.x != texel.x || above.x != texel.x)) c = mix(c, vec3(0.0060, 0.0052, 0.0194), 0.62);
   float value = valueOf(texel);
   if (isoStep > 0.0 && (floor(value / isoStep) != floor(valueOf(before) / isoStep) || floor(value / isoStep) != floor(valueOf(above) / isoStep)))
@@ -119,10 +126,23 @@ vec3 sliced(ivec2 pixel, uvec4 texel) {
   return c;
 }
 
+// Returns true where a section hides the surface: a cut does so always, because rays start behind it.
+bool isSectioned(uvec4 cut, uvec4 texel) {
+  if (!hasSection || cut.x == kNoCell) return false;
+  return texel.x == kNoCell || cut.y >> 24 == 1u || uintBitsToFloat(cut.w) < uintBitsToFloat(texel.w);
+}
+
 void main() {
   ivec2 pixel = min(ivec2(gl_FragCoord.xy * scaleOfBuffers), size() - 1);
   pixel.y = size().y - 1 - pixel.y;
   uvec4 texel = at(pixel);
-  color = vec4(toSrgb(kPaper), 1.0);
-  if (texel.x != kNoCell) color.rgb = toSrgb(isSlice ? sliced(pixel, texel) : shaded(pixel, texel));
+  uvec4 cut = onPlane(pixel);
+  color = vec4(toSrgb(paper), 1.0);
+  if (isSlice) {
+    if (texel.x != kNoCell) color.rgb = toSrgb(sliced(pixel, texel));
+  } else if (isSectioned(cut, texel)) {
+    color.rgb = toSrgb(sliced(pixel, cut));
+  } else if (texel.x != kNoCell) {
+    color.rgb = toSrgb(shaded(pixel, texel));
+  }
 }

@@ -4,9 +4,9 @@ import { degreeOf, isExact, isLeaf, coefficientCount, coefficientIndex } from ".
 import { boundsOf } from "./bounds.js";
 import { surfaceBlocks } from "./blocks.js";
 import { gridPoint } from "./query.js";
-import { diagonalOf } from "./camera.js";
+import { axisVector, diagonalOf } from "./camera.js";
 import { cornersOf, signRule } from "./exact_leaf.js";
-import { cross, normalized, subtract } from "./vector.js";
+import { cross, dot, normalized, scaled, subtract } from "./vector.js";
 import { ROW, webShader } from "./shaders.js";
 
 /** @typedef {import("./field_file.js").Field} Field */
@@ -19,6 +19,76 @@ const LOW_DEGREE = 4; // as kLowDegree in field.glsl
 const OFFSET_BITS = 27;
 const MOST_STEPS = 4096;
 const MOST_REFINEMENTS = 24;
+
+/**
+ * Drawing that is done in portions, so that nothing waits long for it.
+ * @typedef {{hits: Target, size: number, draw: (first: number, count: number) => void}} Job
+ */
+
+/**
+ * A plane that cuts the surface open; the half towards the eye is left out.
+ * @typedef {{axis: number, at: number}} Clip
+ */
+
+const CLIP_NUDGE = 1e-6; // rays start so far behind a cut, as a share of the domain
+
+/**
+ * @param {Job} job
+ */
+function whole(job) {
+  if (job.size > 0) job.draw(0, job.size);
+  return job.hits;
+}
+
+/**
+ * @param {Rays} rays
+ * @param {Clip} clip
+ */
+function isEyeAbove(rays, clip) {
+  if (rays.parallel && Math.abs(rays.forward[clip.axis]) > 1e-9) return rays.forward[clip.axis] < 0;
+  return rays.eye[clip.axis] >= clip.at;
+}
+
+/**
+ * @param {Field} field
+ * @param {Clip} clip
+ * @returns {Vector}
+ */
+function clipPoint(field, clip) {
+  return /** @type {Vector} */ (field.lower.map((x, axis) => (axis === clip.axis ? clip.at : x)));
+}
+
+/**
+ * The corners of the part of the domain that a cut leaves, in grid coordinates.
+ * @param {Field} field
+ * @param {Rays} rays
+ * @param {Clip | null} clip
+ * @returns {[Vector, Vector]}
+ */
+export function shownBox(field, rays, clip) {
+  /** @type {[Vector, Vector]} */
+  const box = [[0, 0, 0], [...field.grid]];
+  if (!clip) return box;
+  const { axis } = clip;
+  const isAbove = isEyeAbove(rays, clip);
+  const cut = gridPoint(field, clipPoint(field, clip))[axis] + (isAbove ? -CLIP_NUDGE : CLIP_NUDGE) * field.grid[axis];
+  box[isAbove ? 1 : 0][axis] = Math.min(Math.max(cut, 0), field.grid[axis]);
+  return box;
+}
+
+/**
+ * A plane in grid coordinates: the normal, and the distance from the origin along it. The greatest component of the normal is 1.
+ * @param {Field} field
+ * @param {Vector} point
+ * @param {Vector} normal
+ * @returns {number[]}
+ */
+function gridPlane(field, point, normal) {
+  const across = normal.map((x, axis) => (x * field.size[axis]) / field.grid[axis]);
+  const largest = across.reduce((most, x) => (Math.abs(x) > Math.abs(most) ? x : most), 0);
+  const scaledNormal = /** @type {Vector} */ (across.map((x) => x / largest));
+  return [...scaledNormal, dot(scaledNormal, gridPoint(field, point))];
+}
 
 /** An error of the graphics card, in words for the reader of the page. */
 export class GraphicsError extends Error {}
@@ -147,17 +217,11 @@ export class FieldRenderer {
     this.slicing = this.program(of("full_screen.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "slice.frag"));
     this.marching = this.program(of("surface.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "surface_march.frag"));
     this.hitting = this.program(of("surface.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "surface_hit.frag"));
+    this.sectioning = this.program(of("full_screen.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "section.frag"));
+    /** @type {Map<WebGLProgram, Map<string, WebGLUniformLocation | null>>} */
+    this.locations = new Map();
     this.empty = gl.createVertexArray();
-    this.blocks = gl.createVertexArray();
-    this.blockBuffer = gl.createBuffer();
-    gl.bindVertexArray(this.blocks);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.blockBuffer);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
-    /** @type {Target | null} */
-    this.state = null;
-    /** @type {Target | null} */
-    this.hits = null;
+    this.buffers = new Buffers(this);
   }
 
   /**
@@ -221,10 +285,7 @@ export class FieldRenderer {
    */
   use(program) {
     const { gl, field } = this;
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
-      const logs = (gl.getAttachedShaders(program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
-      throw new GraphicsError(`the graphics card refuses a shader: ${logs.join(" ")} ${gl.getProgramInfoLog(program)}`);
-    }
+    if (!this.locations.has(program)) this.checkLinked(program);
     gl.useProgram(program);
     Object.entries(this.textures).forEach(([name, texture], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -237,6 +298,16 @@ export class FieldRenderer {
   }
 
   /**
+   * @param {WebGLProgram} program
+   */
+  checkLinked(program) {
+    const { gl } = this;
+    if (gl.getProgramParameter(program, gl.LINK_STATUS)) return;
+    const logs = (gl.getAttachedShaders(program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
+    throw new GraphicsError(`the graphics card refuses a shader: ${logs.join(" ")} ${gl.getProgramInfoLog(program)}`);
+  }
+
+  /**
    * @returns {Vector}
    */
   cellSize() {
@@ -244,11 +315,15 @@ export class FieldRenderer {
   }
 
   /**
+   * Returns where a uniform of a program is.
    * @param {WebGLProgram} program
    * @param {string} name
    */
   at(program, name) {
-    return this.gl.getUniformLocation(program, name);
+    const known = this.locations.get(program) ?? new Map();
+    this.locations.set(program, known);
+    if (!known.has(name)) known.set(name, this.gl.getUniformLocation(program, name));
+    return known.get(name) ?? null;
   }
 
   /**
@@ -267,37 +342,51 @@ export class FieldRenderer {
   }
 
   /**
-   * Returns a target of this size, the one before if it fits.
-   * @param {Target | null} before
+   * Samples a plane into the first texture of `buffers.hits`: cell, degree, depth and the bits of the value. The portions are rows of
+   * pixels.
+   * @param {Buffers} buffers
+   * @param {Plane} plane
    * @param {number} width
    * @param {number} height
+   * @returns {Job}
    */
-  target(before, width, height) {
-    if (before && before.width === width && before.height === height) return before;
-    before?.remove();
-    return new Target(this, width, height);
+  sliceJob(buffers, plane, width, height) {
+    const { gl } = this;
+    const hits = buffers.resize("hits", width, height);
+    const { wholes, fractions } = buffers.setPositions(this.positions(plane, width, height));
+    const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
+      hits.bind([gl.COLOR_ATTACHMENT0, gl.NONE]);
+      this.use(this.slicing);
+      this.bind(this.slicing, "wholes", 0, wholes);
+      this.bind(this.slicing, "fractions", 1, fractions);
+      this.drawRows(first, count, width);
+    };
+    return { hits, size: height, draw };
   }
 
   /**
-   * Samples a plane into the first texture of the returned target: cell, degree, depth and the bits of the value.
+   * Runs the current program for some rows of pixels.
+   * @param {number} first
+   * @param {number} count
+   * @param {number} width
+   */
+  drawRows(first, count, width) {
+    const { gl } = this;
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(0, first, width, count);
+    gl.bindVertexArray(this.empty);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.SCISSOR_TEST);
+  }
+
+  /**
+   * Draws a whole slice.
    * @param {Plane} plane
    * @param {number} width
    * @param {number} height
    */
   slice(plane, width, height) {
-    const { gl } = this;
-    const { wholes, fractions } = this.positions(plane, width, height);
-    this.hits = this.target(this.hits, width, height);
-    this.hits.draw();
-    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.NONE]);
-    this.use(this.slicing);
-    this.bind(this.slicing, "wholes", 0, wholes);
-    this.bind(this.slicing, "fractions", 1, fractions);
-    gl.bindVertexArray(this.empty);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    gl.deleteTexture(wholes);
-    gl.deleteTexture(fractions);
-    return this.hits;
+    return whole(this.sliceJob(this.buffers, plane, width, height));
   }
 
   /**
@@ -332,33 +421,77 @@ export class FieldRenderer {
   }
 
   /**
-   * Traces a surface into the two textures of the returned target: cell; degree, depth and crack; the bits of the value and of
-   * the distance; and the normal.
+   * Traces a surface into the two textures of `buffers.hits`: cell; degree, depth and crack; the bits of the value and of the distance;
+   * and the normal. The portions are blocks of pixels.
+   * @param {Buffers} buffers
    * @param {Rays} rays
    * @param {number} width
    * @param {number} height
    * @param {number} offset
+   * @param {Clip | null} clip
+   * @returns {Job}
    */
-  surface(rays, width, height, offset) {
+  surfaceJob(buffers, rays, width, height, offset, clip) {
     const { gl, field } = this;
-    this.state = this.target(this.state, width, height);
-    this.hits = this.target(this.hits, width, height);
+    const state = buffers.resize("state", width, height);
+    const hits = buffers.resize("hits", width, height);
     const found = surfaceBlocks(field, this.bounds, rays, width, height, offset);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.blockBuffer);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.blocks);
     gl.bufferData(gl.ARRAY_BUFFER, found.blocks, gl.STREAM_DRAW);
-    gl.bindVertexArray(this.blocks);
-    for (const [program, target] of /** @type {[WebGLProgram, Target][]} */ ([[this.marching, this.state], [this.hitting, this.hits]])) {
-      target.draw();
-      this.use(program);
-      this.setRays(program, rays, width, height, offset);
-      gl.uniform1f(this.at(program, "startSide"), found.side);
-      gl.uniform1i(this.at(program, "atTriangles"), offset === -field.exact.offset ? 1 : 0);
-      const other = target === this.state ? this.hits : this.state; // the march declares these textures too, but does not read them
-      this.bind(program, "stateIntegers", 0, other.integers);
-      this.bind(program, "stateFloats", 1, other.floats);
-      gl.drawArrays(gl.POINTS, 0, found.blocks.length / 3);
-    }
-    return this.hits;
+    const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
+      gl.bindVertexArray(buffers.blockArray);
+      for (const [program, target, other] of /** @type {[WebGLProgram, Target, Target][]} */ ([[this.marching, state, hits], [this.hitting, hits, state]])) {
+        target.bind([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+        this.use(program);
+        this.setRays(program, rays, width, height, offset, clip);
+        gl.uniform1f(this.at(program, "startSide"), found.side);
+        gl.uniform1i(this.at(program, "atTriangles"), offset === -field.exact.offset ? 1 : 0);
+        this.bind(program, "stateIntegers", 0, other.integers); // the march declares these textures too, but does not read them
+        this.bind(program, "stateFloats", 1, other.floats);
+        gl.drawArrays(gl.POINTS, first, count);
+      }
+    };
+    return { hits, size: found.blocks.length / 3, draw };
+  }
+
+  /**
+   * Draws a whole surface.
+   * @param {Rays} rays
+   * @param {number} width
+   * @param {number} height
+   * @param {number} offset
+   * @param {Clip | null} clip
+   */
+  surface(rays, width, height, offset, clip = null) {
+    return whole(this.surfaceJob(this.buffers, rays, width, height, offset, clip));
+  }
+
+  /**
+   * Samples the sections of a surface's picture into the first texture of `buffers.section` (section.frag): with the plane that cuts
+   * the surface open, and with another plane. The portions are rows of pixels.
+   * @param {Buffers} buffers
+   * @param {Rays} rays
+   * @param {number} width
+   * @param {number} height
+   * @param {number} offset
+   * @param {Clip | null} clip
+   * @param {{point: Vector, normal: Vector} | null} plane
+   * @returns {Job}
+   */
+  sectionJob(buffers, rays, width, height, offset, clip, plane) {
+    const { gl, field, sectioning } = this;
+    const hits = buffers.resize("section", width, height);
+    const cut = clip ? gridPlane(field, clipPoint(field, clip), axisVector(clip.axis)) : [0, 0, 0, 0];
+    const shown = plane ? gridPlane(field, plane.point, plane.normal) : [0, 0, 0, 0];
+    const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
+      hits.bind([gl.COLOR_ATTACHMENT0, gl.NONE]);
+      this.use(sectioning);
+      this.setRays(sectioning, rays, width, height, offset, clip);
+      gl.uniform4fv(this.at(sectioning, "planes"), [...cut, ...shown]);
+      gl.uniform3f(this.at(sectioning, "nudge"), ...(clip ? scaled(axisVector(clip.axis), (isEyeAbove(rays, clip) ? -CLIP_NUDGE : CLIP_NUDGE) * field.grid[clip.axis]) : axisVector(-1)));
+      this.drawRows(first, count, width);
+    };
+    return { hits, size: height, draw };
   }
 
   /**
@@ -367,8 +500,9 @@ export class FieldRenderer {
    * @param {number} width
    * @param {number} height
    * @param {number} offset
+   * @param {Clip | null} clip
    */
-  setRays(program, rays, width, height, offset) {
+  setRays(program, rays, width, height, offset, clip) {
     const { gl, field } = this;
     const scale = /** @type {Vector} */ (field.grid.map((x, a) => x / field.size[a]));
     const set = (/** @type {string} */ name, /** @type {Vector} */ v) => gl.uniform3f(this.at(program, name), ...v);
@@ -383,12 +517,61 @@ export class FieldRenderer {
     gl.uniform2f(this.at(program, "pixelStep"), 1 / width, 1 / height);
     gl.uniform1f(this.at(program, "offset"), offset);
     gl.uniform1f(this.at(program, "diagonal"), diagonalOf(field));
-    set("shownLo", [0, 0, 0]);
-    set("shownHi", field.grid);
+    const [shownLo, shownHi] = shownBox(field, rays, clip);
+    set("shownLo", shownLo);
+    set("shownHi", shownHi);
     gl.uniform1i(this.at(program, "parallel"), rays.parallel ? 1 : 0);
     gl.uniform1i(this.at(program, "mostSteps"), MOST_STEPS);
     gl.uniform1i(this.at(program, "mostRefinements"), MOST_REFINEMENTS);
     gl.uniform1i(this.at(program, "resume"), 0);
+  }
+}
+
+/** What a picture is drawn into. One picture can be shown while the next one is drawn into other buffers. */
+export class Buffers {
+  /**
+   * @param {FieldRenderer} renderer
+   */
+  constructor(renderer) {
+    const { gl } = renderer;
+    this.renderer = renderer;
+    /** @type {{state: Target | null, hits: Target | null, section: Target | null}} */
+    this.targets = { state: null, hits: null, section: null };
+    /** @type {{wholes: WebGLTexture, fractions: WebGLTexture} | null} */
+    this.positions = null;
+    this.blockArray = gl.createVertexArray();
+    this.blocks = gl.createBuffer();
+    gl.bindVertexArray(this.blockArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.blocks);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+  }
+
+  /**
+   * Returns an empty target of this size.
+   * @param {"state" | "hits" | "section"} name
+   * @param {number} width
+   * @param {number} height
+   */
+  resize(name, width, height) {
+    let target = this.targets[name];
+    if (!target || target.width !== width || target.height !== height) {
+      target?.remove();
+      target = this.targets[name] = new Target(this.renderer, width, height);
+    }
+    target.clear();
+    return target;
+  }
+
+  /**
+   * Keeps the positions of a slice, in place of those before.
+   * @param {{wholes: WebGLTexture, fractions: WebGLTexture}} positions
+   */
+  setPositions(positions) {
+    const { gl } = this.renderer;
+    if (this.positions) for (const texture of Object.values(this.positions)) gl.deleteTexture(texture);
+    this.positions = positions;
+    return positions;
   }
 }
 
@@ -413,18 +596,26 @@ export class Target {
     gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
   }
 
-  /** Makes the target that of the next pass, and empties it. */
-  draw() {
+  /**
+   * Makes the target that of the next pass.
+   * @param {number[]} attachments  into which it draws
+   */
+  bind(attachments) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.viewport(0, 0, this.width, this.height);
-    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+    gl.drawBuffers(attachments);
+  }
+
+  clear() {
+    const { gl } = this;
+    this.bind([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
     gl.clearBufferuiv(gl.COLOR, 0, new Uint32Array([0xffffffff, 0, 0, 0]));
     gl.clearBufferfv(gl.COLOR, 1, new Float32Array(4));
   }
 
   /**
-   * Returns the cell at a pixel, counted from the top left, and the length of its ray up to there.
+   * Returns the cell at a pixel, counted from the top left, its levels as the shader packs them, and the length of its ray up to there.
    * @param {number} x
    * @param {number} y
    */
@@ -434,7 +625,7 @@ export class Target {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.readBuffer(gl.COLOR_ATTACHMENT0);
     gl.readPixels(x, y, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, texel);
-    return { cell: texel[0], distance: new Float32Array(texel.buffer)[3] };
+    return { cell: texel[0], levels: texel[1], distance: new Float32Array(texel.buffer)[3] };
   }
 
   /** Returns the integers, four for each pixel, from the top row down. */

@@ -1,30 +1,38 @@
-// The view holds what a page shows, as values that the controls change.
+// The view holds what a page shows, as values that the controls change. It is written as lines of a script of the program, and read
+// from such lines.
 
-import { centreOf } from "./camera.js";
-import { subtract } from "./vector.js";
+import { axisAlong, axisVector, centreOf, sectionPlane } from "./camera.js";
+import { add, dot, normalized, scaled, subtract } from "./vector.js";
 
 /** @typedef {import("./field_file.js").Field} Field */
 /** @typedef {import("./field_file.js").Vector} Vector */
 /** @typedef {import("./camera.js").Orbit} Orbit */
 /** @typedef {import("./camera.js").Plane} Plane */
 
-/** @typedef {"normal" | "degree" | "depth" | "distance"} Quantity */
+/** @typedef {"normal" | "degree" | "depth" | "distance" | "value-jump" | "gradient-jump" | "cell-error"} Quantity */
 
 /**
  * @typedef {object} View
  * @property {"surface" | "slice"} kind
  * @property {Orbit} orbit
  * @property {number} offset  of the surface
- * @property {0 | 1 | 2} axis  of the slice
- * @property {number} at  the slice's coordinate along its axis
- * @property {number} zoom
- * @property {Vector} middle  the point in the middle of a slice
+ * @property {{axis: number, at: number} | null} clip  the plane that cuts the surface open
+ * @property {Vector} point  a point of the slice's plane
+ * @property {Vector} normal  of the slice's plane, of length 1; exactly along an axis where it is meant so
+ * @property {boolean} planeInSpace  whether the plane stands in the picture of the surface too
+ * @property {Vector | null} target  the point in the middle of a slice; null: the middle of the section
+ * @property {number} zoom  of the slice
+ * @property {"none" | "all" | number} cells  whose edges stand in the picture of the surface; a number: those of this depth
  * @property {Quantity} surfaceColor
  * @property {Quantity} sliceColor
+ * @property {Vector | null} mark  a point to which the picture points
  */
 
+/** An error in the text of a view. */
+export class ViewError extends Error {}
+
 /**
- * The view of a field that has just been opened.
+ * Returns the view of a field that has just been opened.
  * @param {Field} field
  * @returns {View}
  */
@@ -34,22 +42,17 @@ export function firstView(field) {
     kind: "surface",
     orbit: { azimuth: 30, elevation: 20, distance: 1.1, target: middle, parallel: false, upZ: false },
     offset: 0,
-    axis: 2,
-    at: middle[2],
+    clip: null,
+    point: middle,
+    normal: axisVector(2),
+    planeInSpace: false,
+    target: null,
     zoom: 1,
-    middle,
+    cells: "none",
     surfaceColor: "normal",
     sliceColor: "degree",
+    mark: null,
   };
-}
-
-/**
- * The axes of a picture of a slice: to the right and upwards.
- * @param {0 | 1 | 2} axis
- * @returns {[number, number]}
- */
-export function axesOfSlice(axis) {
-  return [axis === 0 ? 1 : 0, axis === 2 ? 1 : 2];
 }
 
 /**
@@ -61,19 +64,91 @@ export function axesOfSlice(axis) {
  * @returns {Plane}
  */
 export function planeOf(view, field, width, height) {
-  const [across, upward] = axesOfSlice(view.axis);
-  const margin = 1.05;
-  const unit = Math.max(field.size[across] / width, field.size[upward] / height) * (margin / 2 / view.zoom);
-  /** @type {Vector} */
-  const origin = [...view.middle];
-  origin[view.axis] = view.at;
-  /** @type {Vector} */
-  const right = [0, 0, 0];
-  /** @type {Vector} */
-  const up = [0, 0, 0];
-  right[across] = unit * width;
-  up[upward] = unit * height;
-  return { origin, right, up };
+  const { origin, right, up } = sectionPlane(field, view.point, view.normal, width, height);
+  let middle = origin;
+  if (view.target)
+    for (const side of [right, up]) middle = add(middle, scaled(side, dot(side, subtract(view.target, middle)) / dot(side, side)));
+  const axis = axisAlong(view.normal);
+  if (axis >= 0) middle[axis] = view.point[axis];
+  return { origin: middle, right: scaled(right, 1 / view.zoom), up: scaled(up, 1 / view.zoom) };
+}
+
+/**
+ * Returns the place of the slice's plane: its coordinate on its axis, or its distance from the domain's centre if it is oblique.
+ * @param {View} view
+ * @param {Field} field
+ */
+export function placeOfPlane(view, field) {
+  const axis = axisAlong(view.normal);
+  return axis >= 0 ? view.point[axis] : dot(view.normal, subtract(view.point, centreOf(field)));
+}
+
+/**
+ * Moves the slice's plane to a place, which is kept within the domain.
+ * @param {View} view
+ * @param {Field} field
+ * @param {number} place  as placeOfPlane has it
+ */
+export function movePlaneTo(view, field, place) {
+  const [least, greatest] = placesOfPlane(view, field);
+  const at = Math.min(Math.max(place, least), greatest);
+  const axis = axisAlong(view.normal);
+  view.point = axis >= 0 ? /** @type {Vector} */ (view.point.map((x, a) => (a === axis ? at : x))) : add(centreOf(field), scaled(view.normal, at));
+}
+
+/**
+ * Returns the least and the greatest place at which the slice's plane meets the domain.
+ * @param {View} view
+ * @param {Field} field
+ * @returns {[number, number]}
+ */
+export function placesOfPlane(view, field) {
+  const axis = axisAlong(view.normal);
+  if (axis >= 0) return [field.lower[axis], field.upper[axis]];
+  const reach = 0.5 * view.normal.reduce((sum, x, a) => sum + Math.abs(x) * field.size[a], 0);
+  return [-reach, reach];
+}
+
+/**
+ * @param {number} x
+ */
+function numberText(x) {
+  return String(Number(x.toPrecision(9)));
+}
+
+/**
+ * @param {readonly number[]} v
+ */
+function vectorText(v) {
+  return v.map(numberText).join(",");
+}
+
+/**
+ * @param {View} view
+ */
+function planeLine(view) {
+  const axis = axisAlong(view.normal);
+  const place = axis >= 0 ? `axis=${"xyz"[axis]} offset=${numberText(view.point[axis])}` : `through=${vectorText([...view.point, ...view.normal])}`;
+  return `plane ${place} in-space=${view.planeInSpace} zoom=${numberText(view.zoom)} target=${view.target ? vectorText(view.target) : "center"}`;
+}
+
+/**
+ * @param {View} view
+ */
+function surfaceLine({ offset, clip }) {
+  const cut = clip ? `clip=${"xyz"[clip.axis]} clip-offset=${numberText(clip.at)}` : "clip=none";
+  return `surface offset=${numberText(offset)} ${cut}`;
+}
+
+/**
+ * @param {View} view
+ * @param {Field} field
+ */
+function cameraLine({ orbit }, field) {
+  const { azimuth, elevation, distance, target, parallel, upZ } = orbit;
+  const isCentre = Math.hypot(...subtract(target, centreOf(field))) < 1e-9 * Math.hypot(...field.size);
+  const projection = parallel ? "orthographic" : "perspective";
+  return `camera ${vectorText([azimuth, elevation, distance])} target=${isCentre ? "center" : vectorText(target)} up=${upZ ? "z" : "y"} projection=${projection}`;
 }
 
 /**
@@ -82,18 +157,175 @@ export function planeOf(view, field, width, height) {
  * @param {Field} field
  */
 export function scriptOf(view, field) {
-  const number = (/** @type {number} */ x) => String(Number(x.toPrecision(9)));
-  const vector = (/** @type {Vector} */ v) => v.map(number).join(",");
-  const lines = [];
-  if (view.kind === "surface") {
-    const { azimuth, elevation, distance, target, parallel, upZ } = view.orbit;
-    const moved = Math.hypot(...subtract(target, centreOf(field))) > 1e-9 * Math.hypot(...field.size);
-    lines.push("show surface", `surface offset=${number(view.offset)}`);
-    lines.push(`camera ${[azimuth, elevation, distance].map(number).join(",")}${moved ? ` target=${vector(target)}` : ""}${parallel ? " projection=orthographic" : ""}${upZ ? " up=z" : ""}`);
-    lines.push(`color ${view.surfaceColor}`);
-  } else {
-    lines.push("show slice", `plane axis=${"xyz"[view.axis]} offset=${number(view.at)} zoom=${number(view.zoom)} target=${vector(view.middle)}`);
-    lines.push(`color ${view.sliceColor}`);
+  const cells = view.cells === "none" ? "cells none" : `cells lines depths=${view.cells}`;
+  return [
+    `show ${view.kind}`,
+    cameraLine(view, field),
+    surfaceLine(view),
+    planeLine(view),
+    cells,
+    `color ${view.surfaceColor} of=surface`,
+    `color ${view.sliceColor} of=slice`,
+    `worst mark=${view.mark ? vectorText(view.mark) : "none"}`,
+  ].join("\n");
+}
+
+/** The words of a command in a script: those without a name, and those with one. */
+class Words {
+  /**
+   * @param {string} line
+   */
+  constructor(line) {
+    const words = line.trim().split(/\s+/);
+    this.command = words[0];
+    this.line = line.trim();
+    this.plain = words.slice(1).filter((word) => !word.includes("="));
+    this.named = new Map(words.filter((word) => word.includes("=")).map((word) => [word.slice(0, word.indexOf("=")), word.slice(word.indexOf("=") + 1)]));
   }
-  return lines.join("\n");
+
+  /**
+   * Returns numbers with commas between them.
+   * @param {string} text
+   * @param {number} count
+   */
+  numbers(text, count) {
+    const numbers = text.split(",").map((word) => (word.trim() === "" ? NaN : Number(word)));
+    if (numbers.length !== count || !numbers.every(Number.isFinite)) throw new ViewError(`“${this.line}”: “${text}” is not ${count === 1 ? "a number" : `${count} numbers with commas`}`);
+    return numbers;
+  }
+
+  /**
+   * Calls `set` with the numbers of a name if it is given, or with null if it has the word `none`.
+   * @param {string} name
+   * @param {number} count
+   * @param {string} none
+   * @param {(numbers: number[] | null) => void} set
+   */
+  whenNumbers(name, count, none, set) {
+    const text = this.named.get(name);
+    if (text !== undefined) set(text === none ? null : this.numbers(text, count));
+  }
+
+  /**
+   * Calls `set` with the word of a name if it is given; it has to be one of `words`.
+   * @param {string} name
+   * @param {readonly string[]} words
+   * @param {(word: string) => void} set
+   */
+  whenWord(name, words, set) {
+    const word = this.named.get(name);
+    if (word === undefined) return;
+    if (!words.includes(word)) throw new ViewError(`“${this.line}”: ${name} is one of ${words.join(", ")}`);
+    set(word);
+  }
+}
+
+const AXES = ["x", "y", "z"];
+const QUANTITIES = ["normal", "degree", "depth", "distance", "value-jump", "gradient-jump", "cell-error"];
+/** Commands of scripts about views that mean nothing to the page. */
+const IGNORED = ["panel", "triangles", "arrows", "beside", "load", "shot"];
+
+/**
+ * What each command of a script does to a view.
+ * @type {Record<string, (words: Words, view: View, field: Field) => void>}
+ */
+const COMMANDS = {
+  show(words, view) {
+    const [kind] = words.plain;
+    if (kind !== "surface" && kind !== "slice") throw new ViewError(`“${words.line}”: show surface or slice`);
+    view.kind = kind;
+  },
+  camera(words, view, field) {
+    const { orbit } = view;
+    if (words.plain.length > 0) [orbit.azimuth, orbit.elevation, orbit.distance] = words.numbers(words.plain[0], 3);
+    words.whenNumbers("target", 3, "center", (target) => (orbit.target = /** @type {Vector} */ (target ?? centreOf(field))));
+    words.whenWord("up", ["y", "z"], (word) => (orbit.upZ = word === "z"));
+    words.whenWord("projection", ["perspective", "orthographic"], (word) => (orbit.parallel = word === "orthographic"));
+  },
+  surface(words, view, field) {
+    words.whenNumbers("offset", 1, "", (offset) => (view.offset = offset ? offset[0] : 0));
+    words.whenWord("clip", ["none", ...AXES], (word) => {
+      const axis = AXES.indexOf(word);
+      view.clip = axis < 0 ? null : { axis, at: centreOf(field)[axis] };
+    });
+    words.whenNumbers("clip-offset", 1, "", (at) => view.clip && at && (view.clip.at = at[0]));
+  },
+  plane(words, view, field) {
+    words.whenWord("axis", AXES, (word) => {
+      view.normal = axisVector(AXES.indexOf(word));
+      view.point = centreOf(field);
+    });
+    words.whenNumbers("offset", 1, "auto", (at) => movePlaneTo(view, field, at ? at[0] : placeOfPlane({ ...view, point: centreOf(field) }, field)));
+    words.whenNumbers("through", 6, "", (numbers) => {
+      const [x, y, z, ...normal] = numbers ?? [];
+      if (!(Math.hypot(...normal) > 0)) throw new ViewError(`“${words.line}”: the normal is zero`);
+      setPlane(view, field, [x, y, z], /** @type {Vector} */ (normal));
+    });
+    words.whenWord("in-space", ["true", "false"], (word) => (view.planeInSpace = word === "true"));
+    words.whenNumbers("zoom", 1, "", (zoom) => (view.zoom = Math.max(zoom ? zoom[0] : 1, 1e-3)));
+    words.whenNumbers("target", 3, "center", (target) => (view.target = /** @type {Vector | null} */ (target)));
+  },
+  cells(words, view) {
+    const depths = words.named.get("depths") ?? "all";
+    if (words.plain[0] === "none") view.cells = "none";
+    else if (words.plain[0] === "lines" || words.plain.length === 0) view.cells = depths === "all" ? "all" : words.numbers(depths, 1)[0];
+    else throw new ViewError(`“${words.line}”: the page draws cells by lines`);
+  },
+  color(words, view) {
+    const [quantity] = words.plain;
+    if (!QUANTITIES.includes(quantity)) throw new ViewError(`“${words.line}”: the page colours by ${QUANTITIES.join(", ")}`);
+    const of = words.named.get("of") ?? view.kind;
+    if (of === "slice") view.sliceColor = /** @type {Quantity} */ (quantity);
+    else view.surfaceColor = /** @type {Quantity} */ (quantity);
+  },
+  worst(words, view) {
+    words.whenNumbers("mark", 3, "none", (mark) => (view.mark = /** @type {Vector | null} */ (mark)));
+  },
+};
+
+/**
+ * Lays the slice's plane through a point. A normal along an axis becomes exactly that axis.
+ * @param {View} view
+ * @param {Field} field
+ * @param {Vector} point
+ * @param {Vector} normal  of any length above 0
+ */
+export function setPlane(view, field, point, normal) {
+  const axis = axisAlong(normal);
+  view.normal = axis >= 0 ? axisVector(axis) : normalized(normal);
+  view.point = point;
+  movePlaneTo(view, field, placeOfPlane(view, field));
+}
+
+/**
+ * Returns the normal that a choice of the slice's axis stands for: x, y or z, or else the plane's own normal, tilted if it lies along an
+ * axis, so that it can be seen to be oblique.
+ * @param {string} choice
+ * @param {View} view
+ * @returns {Vector}
+ */
+export function normalFor(choice, view) {
+  const axis = AXES.indexOf(choice);
+  if (axis >= 0) return axisVector(axis);
+  const own = axisAlong(view.normal);
+  return own < 0 ? view.normal : normalized(/** @type {Vector} */ ([0, 1, 2].map((a) => (a === own ? 1 : a === (own + 1) % 3 ? 0.5 : 0.25))));
+}
+
+/**
+ * Returns the view that lines of a script show, from another view for what they do not tell.
+ * @param {string} text
+ * @param {View} before
+ * @param {Field} field
+ * @returns {View}
+ */
+export function viewFrom(text, before, field) {
+  const view = structuredClone(before);
+  for (const line of text.split(/[;\n]/)) {
+    const words = new Words(line.replace(/#.*/, ""));
+    if (words.command === "" || IGNORED.includes(words.command)) continue;
+    const command = COMMANDS[words.command];
+    if (!command) throw new ViewError(`“${words.line}”: the page does not know “${words.command}”`);
+    command(words, view, field);
+  }
+  return view;
 }

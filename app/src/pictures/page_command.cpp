@@ -47,7 +47,10 @@ void replace(std::string& text, std::string_view mark, std::string_view with) {
 std::string pageOf(const Field& field, const std::string& title) {
   std::string page(web::pageTemplate());
   replace(page, "{{title}}", htmlEscaped(title));
-  replace(page, "{{field}}", base64(compressed(bytesOf(field))));
+  replace(page, "{{pictures}}", "");
+  replace(page, "{{fields}}",
+          fmt::format("<script type=\"application/octet-stream\" class=\"field\" data-name=\"{}\">{}</script>\n",
+                      htmlEscaped(title), base64(compressed(bytesOf(field)))));
   return page;
 }
 

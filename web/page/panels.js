@@ -1,0 +1,110 @@
+// The panels beside the picture: the legend, what is under the pointer, figures of the field.
+
+import { cssColor, divergingColor } from "./colors.js";
+import { element, setRows, shortNumber } from "./dom.js";
+import { degreeOf, isExact, isLeaf } from "./field_file.js";
+
+/** @typedef {import("./field_file.js").Field} Field */
+/** @typedef {import("./painter.js").Levels} Levels */
+/** @typedef {import("./painter.js").Painter} Painter */
+/** @typedef {import("./pick.js").Pick} Pick */
+/** @typedef {import("./view.js").View} View */
+/** @typedef {import("./view.js").Quantity} Quantity */
+
+/** @type {Record<Quantity, string>} */
+const TITLES = {
+  normal: "surface",
+  degree: "polynomial degree",
+  depth: "octree depth",
+  distance: "distance",
+  "value-jump": "greatest jump of the value",
+  "gradient-jump": "greatest jump of the gradient",
+  "cell-error": "bound of the error",
+};
+
+/**
+ * @param {View} view
+ * @param {Painter} painter
+ */
+export function showLegend(view, painter) {
+  const quantity = view.kind === "slice" ? view.sliceColor : view.surfaceColor;
+  const legend = element("legend", HTMLDivElement);
+  element("legend-title", HTMLElement).textContent = TITLES[quantity];
+  if (quantity === "normal") legend.replaceChildren();
+  else if (quantity === "distance") legend.replaceChildren(...scaleBar((t) => divergingColor(2 * t - 1), [-painter.range, 0, painter.range]));
+  else legend.replaceChildren(...levelRows(quantity === "degree" ? painter.degrees : painter.depths));
+}
+
+/**
+ * Returns a bar of a continuous scale, with numbers below it.
+ * @param {(t: number) => import("./colors.js").Color} colorAt  for t from 0 to 1
+ * @param {number[]} numbers
+ */
+export function scaleBar(colorAt, numbers) {
+  const bar = document.createElement("div");
+  bar.className = "bar";
+  const stops = Array.from({ length: 17 }, (_, i) => cssColor(colorAt(i / 16)));
+  bar.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
+  const ends = document.createElement("div");
+  ends.className = "ends";
+  for (const x of numbers) {
+    const end = document.createElement("span");
+    end.textContent = shortNumber(x);
+    ends.append(end);
+  }
+  return [bar, ends];
+}
+
+/**
+ * Returns a row for each level, from the highest down: its colour and its share of the volume.
+ * @param {Levels} levels
+ */
+function levelRows(levels) {
+  const most = Math.max(...levels.map(({ share }) => share));
+  return [...levels].reverse().map(({ level, share, color }) => {
+    const row = document.createElement("div");
+    row.className = "level";
+    const name = document.createElement("b");
+    name.textContent = level === 31 ? "exact" : String(level);
+    name.style.background = cssColor(color);
+    name.style.color = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2] > 0.25 ? "#000" : "#fff";
+    const percent = document.createElement("span");
+    percent.textContent = `${(100 * share).toFixed(1)} %`;
+    const bar = document.createElement("i");
+    bar.style.width = `${(100 * share) / most}%`;
+    row.append(name, percent, bar);
+    return row;
+  });
+}
+
+/**
+ * @param {Field} field
+ */
+export function showFigures(field) {
+  let leaves = 0;
+  for (let n = 0; n < field.low.length; ++n) leaves += isLeaf(field, n) ? 1 : 0;
+  /** @type {[string, string][]} */
+  const rows = [["made from", field.name || "a function"], ["cells", leaves.toLocaleString("en")], ["file", `${(field.bytes / 1e6).toFixed(2)} MB`], ["size", field.size.map(shortNumber).join(" × ")]];
+  if (field.measured)
+    rows.push(["RMS error near", shortNumber(field.measured.nearRms)], ["greatest near", shortNumber(field.measured.nearMax)], ["RMS error", shortNumber(field.measured.rms)], ["greatest error", shortNumber(field.measured.max)]);
+  setRows(element("figures", HTMLDListElement), rows);
+}
+
+/**
+ * Shows what is under the pointer.
+ * @param {Field} field
+ * @param {Pick | null} pick
+ */
+export function showReadout(field, pick) {
+  const list = element("readout", HTMLDListElement);
+  if (!pick) return setRows(list, [["", "nothing"]]);
+  const { node, depth } = pick.leaf;
+  setRows(list, [
+    ["position", pick.point.map(shortNumber).join(", ")],
+    ["value", shortNumber(pick.value)],
+    ["gradient", pick.gradient.map(shortNumber).join(", ")],
+    ["cell", String(node)],
+    ["degree", isExact(field, node) ? "exact" : String(degreeOf(field, node))],
+    ["depth", String(depth)],
+  ]);
+}
