@@ -137,11 +137,14 @@ class Page {
   }
 
   painted() {
+    if (performance.getEntriesByName("first picture").length === 0) performance.mark("first picture");
     this.placeMark();
   }
 
   rested() {
-    if (this.viewers.every((viewer) => viewer.isSharp)) document.body.dataset.state = "sharp";
+    if (!this.viewers.every((viewer) => viewer.isSharp)) return;
+    performance.mark("sharp picture");
+    document.body.dataset.state = "sharp";
   }
 
   /**
@@ -169,7 +172,7 @@ class Page {
       if (!viewer) continue;
       viewer.painter.paper = isDark ? [0.0109, 0.0123, 0.0152] : [0.9559734, 0.9559734, 0.9386857];
       viewer.painter.ink = isDark ? [0.85, 0.86, 0.88] : [0.08, 0.09, 0.13];
-      viewer.repaint();
+      viewer.changed();
     }
   }
 

@@ -17,6 +17,7 @@ import { raysOf } from "./camera.js";
 /** @typedef {import("./renderer.js").Buffers} Buffers */
 /** @typedef {import("./renderer.js").Target} Target */
 /** @typedef {import("./renderer.js").Job} Job */
+/** @typedef {import("./renderer.js").ColorTarget} ColorTarget */
 
 const STEPS = 256; // of a continuous scale
 
@@ -53,6 +54,7 @@ function levelsOf(field, levelOf) {
  * @property {Rays} rays
  * @property {Target} hits
  * @property {Target | null} section
+ * @property {ColorTarget} colors
  * @property {Job[]} jobs
  */
 
@@ -149,39 +151,64 @@ export class Painter {
     const shown = structuredClone(view);
     if (view.kind === "slice") {
       const job = renderer.sliceJob(buffers, planeOf(view, field, width, height), width, height);
-      return { view: shown, scale, rays, hits: job.hits, section: null, jobs: [job] };
+      return this.withColors({ view: shown, scale, rays, hits: job.hits, section: null, colors: buffers.resizeColors(width, height), jobs: [job] });
     }
     const jobs = [renderer.surfaceJob(buffers, rays, width, height, view.offset, view.clip)];
     if (view.clip || view.planeInSpace) jobs.push(renderer.sectionJob(buffers, rays, width, height, view.offset, view.clip, view.planeInSpace ? view : null));
-    return { view: shown, scale, rays, hits: jobs[0].hits, section: jobs[1]?.hits ?? null, jobs };
+    return this.withColors({ view: shown, scale, rays, hits: jobs[0].hits, section: jobs[1]?.hits ?? null, colors: buffers.resizeColors(width, height), jobs });
   }
 
   /**
-   * Paints a drawing on the canvas once its jobs are done.
+   * Adds the job that colours a drawing.
    * @param {Drawing} drawing
    */
-  paint({ view, scale, rays, hits, section }) {
-    const { gl, canvas, renderer } = this;
+  withColors(drawing) {
+    drawing.jobs.push(this.colorJob(drawing));
+    return drawing;
+  }
+
+  /**
+   * Colours the buffers of a drawing. The portions are rows of pixels.
+   * @param {Drawing} drawing
+   * @returns {Job}
+   */
+  colorJob({ view, rays, hits, section, colors }) {
+    const { gl, renderer, coloring } = this;
     const isSlice = view.kind === "slice";
     const quantity = isSlice ? view.sliceColor : view.surfaceColor;
-    const { mode, texture, range } = this.coloringOf(quantity);
+    const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
+      const { mode, texture, range } = this.coloringOf(quantity);
+      colors.bind();
+      renderer.checkLinked(coloring);
+      gl.useProgram(coloring);
+      const at = (/** @type {string} */ name) => renderer.at(coloring, name);
+      this.bindTextures(coloring, { integers: hits.integers, floats: hits.floats, scale: texture, ofCells: this.cellNumbers ?? hits.floats, section: (section ?? hits).integers });
+      gl.uniform1i(at("isSlice"), isSlice ? 1 : 0);
+      gl.uniform1i(at("hasSection"), section ? 1 : 0);
+      gl.uniform1i(at("mode"), mode);
+      gl.uniform2f(at("range"), ...range);
+      gl.uniform3f(at("paper"), ...this.paper);
+      this.setCamera(coloring, rays);
+      gl.uniform1f(at("isoStep"), quantity === "distance" ? this.range / 12 : 0);
+      gl.uniform1i(at("outlines"), quantity === "distance" || quantity === "normal" ? 0 : 1);
+      renderer.drawRows(first, count, hits.width);
+    };
+    return { kind: "colors", hits, size: hits.height, draw };
+  }
+
+  /**
+   * Brings a drawing whose jobs are done to the canvas.
+   * @param {Drawing} drawing
+   */
+  paint({ view, scale, rays, hits, section, colors }) {
+    const { gl, canvas } = this;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, colors.frame);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    // Rows of the buffers run from the top down, those of the canvas from the bottom up.
+    gl.blitFramebuffer(0, 0, colors.width, colors.height, 0, canvas.height, canvas.width, 0, gl.COLOR_BUFFER_BIT, scale === 1 ? gl.NEAREST : gl.LINEAR);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.useProgram(this.coloring);
-    const at = (/** @type {string} */ name) => renderer.at(this.coloring, name);
-    this.bindTextures(this.coloring, { integers: hits.integers, floats: hits.floats, scale: texture, ofCells: this.cellNumbers ?? hits.floats, section: (section ?? hits).integers });
-    gl.uniform1i(at("isSlice"), isSlice ? 1 : 0);
-    gl.uniform1i(at("hasSection"), section ? 1 : 0);
-    gl.uniform1i(at("mode"), mode);
-    gl.uniform2f(at("range"), ...range);
-    gl.uniform3f(at("paper"), ...this.paper);
-    this.setCamera(this.coloring, rays);
-    gl.uniform1f(at("isoStep"), quantity === "distance" ? this.range / 12 : 0);
-    gl.uniform1i(at("outlines"), quantity === "distance" || quantity === "normal" ? 0 : 1);
-    gl.uniform1f(at("scaleOfBuffers"), scale);
-    gl.bindVertexArray(renderer.empty);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    if (!isSlice && view.cells !== "none") this.paintCells(view, scale, rays, hits, section);
+    if (view.kind === "surface" && view.cells !== "none") this.paintCells(view, scale, rays, hits, section);
   }
 
   /**

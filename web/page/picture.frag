@@ -19,7 +19,6 @@ uniform vec3 forward, right, up;
 uniform bool parallel;
 uniform float isoStep;  // between two lines of equal distance, 0 for none
 uniform bool outlines;
-uniform float scaleOfBuffers;  // pixels of the buffers for each pixel of the canvas
 
 out vec4 color;
 
@@ -133,8 +132,7 @@ bool isSectioned(uvec4 cut, uvec4 texel) {
 }
 
 void main() {
-  ivec2 pixel = min(ivec2(gl_FragCoord.xy * scaleOfBuffers), size() - 1);
-  pixel.y = size().y - 1 - pixel.y;
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
   uvec4 texel = at(pixel);
   uvec4 cut = onPlane(pixel);
   color = vec4(toSrgb(paper), 1.0);

@@ -22,7 +22,7 @@ const MOST_REFINEMENTS = 24;
 
 /**
  * Drawing that is done in portions, so that nothing waits long for it.
- * @typedef {{hits: Target, size: number, draw: (first: number, count: number) => void}} Job
+ * @typedef {{kind: string, hits: Target, size: number, draw: (first: number, count: number) => void}} Job
  */
 
 /**
@@ -361,7 +361,7 @@ export class FieldRenderer {
       this.bind(this.slicing, "fractions", 1, fractions);
       this.drawRows(first, count, width);
     };
-    return { hits, size: height, draw };
+    return { kind: "slice", hits, size: height, draw };
   }
 
   /**
@@ -451,7 +451,7 @@ export class FieldRenderer {
         gl.drawArrays(gl.POINTS, first, count);
       }
     };
-    return { hits, size: found.blocks.length / 3, draw };
+    return { kind: "surface", hits, size: found.blocks.length / 3, draw };
   }
 
   /**
@@ -491,7 +491,7 @@ export class FieldRenderer {
       gl.uniform3f(this.at(sectioning, "nudge"), ...(clip ? scaled(axisVector(clip.axis), (isEyeAbove(rays, clip) ? -CLIP_NUDGE : CLIP_NUDGE) * field.grid[clip.axis]) : axisVector(-1)));
       this.drawRows(first, count, width);
     };
-    return { hits, size: height, draw };
+    return { kind: "section", hits, size: height, draw };
   }
 
   /**
@@ -537,6 +537,8 @@ export class Buffers {
     this.renderer = renderer;
     /** @type {{state: Target | null, hits: Target | null, section: Target | null}} */
     this.targets = { state: null, hits: null, section: null };
+    /** @type {ColorTarget | null} */
+    this.colors = null;
     /** @type {{wholes: WebGLTexture, fractions: WebGLTexture} | null} */
     this.positions = null;
     this.blockArray = gl.createVertexArray();
@@ -564,6 +566,18 @@ export class Buffers {
   }
 
   /**
+   * Returns the target for colours of this size.
+   * @param {number} width
+   * @param {number} height
+   */
+  resizeColors(width, height) {
+    if (this.colors?.width === width && this.colors.height === height) return this.colors;
+    this.colors?.remove();
+    this.colors = new ColorTarget(this.renderer, width, height);
+    return this.colors;
+  }
+
+  /**
    * Keeps the positions of a slice, in place of those before.
    * @param {{wholes: WebGLTexture, fractions: WebGLTexture}} positions
    */
@@ -572,6 +586,37 @@ export class Buffers {
     if (this.positions) for (const texture of Object.values(this.positions)) gl.deleteTexture(texture);
     this.positions = positions;
     return positions;
+  }
+}
+
+/** A texture of colours. */
+export class ColorTarget {
+  /**
+   * @param {FieldRenderer} renderer
+   * @param {number} width
+   * @param {number} height
+   */
+  constructor(renderer, width, height) {
+    const { gl } = renderer;
+    this.gl = gl;
+    this.width = width;
+    this.height = height;
+    this.texture = renderer.plainTexture(gl.RGBA8, width, height, gl.RGBA, gl.UNSIGNED_BYTE, null);
+    this.frame = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.texture, 0);
+  }
+
+  /** Makes the target that of the next pass. */
+  bind() {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.viewport(0, 0, this.width, this.height);
+  }
+
+  remove() {
+    this.gl.deleteFramebuffer(this.frame);
+    this.gl.deleteTexture(this.texture);
   }
 }
 

@@ -16,6 +16,8 @@ import { planeOf } from "./view.js";
 
 const FRAME_TIME = 45; // milliseconds that a coarse picture may take
 const PORTION_TIME = 50; // milliseconds that a portion of the sharp picture may take
+const FIRST_SHARE = 0.02; // of a job, at first
+const MOST_SHARE = 0.25;
 const REST = 150; // milliseconds without a change until the sharp picture is begun
 
 /**
@@ -44,7 +46,8 @@ export class Viewer {
     this.coarse = new Buffers(this.painter.renderer);
     this.sharp = new Buffers(this.painter.renderer);
     this.scale = 0.2; // pixels of the buffers for each of the canvas while the view changes
-    this.portions = 0.02; // portions of a job for each millisecond and pixel of its picture
+    /** @type {Map<string, number>} */
+    this.shares = new Map(); // what part of a job of each kind is done at a time
     this.isStale = false;
     this.isRunning = false;
     this.isSharp = false;
@@ -70,14 +73,6 @@ export class Viewer {
     this.isStale = true;
     this.isSharp = false;
     if (!this.isRunning) this.run();
-  }
-
-  /** Paints the picture that is there anew, because its colours or lines changed. */
-  repaint() {
-    if (this.isRunning || !this.shown) return;
-    this.shown.view = structuredClone(this.view);
-    this.painter.paint(this.shown);
-    this.listener.painted(this);
   }
 
   async run() {
@@ -120,15 +115,16 @@ export class Viewer {
   /**
    * @param {Job} job
    */
-  async drawInPortions({ size, draw }) {
+  async drawInPortions({ kind, size, draw }) {
     for (let at = 0; at < size && !this.isStale; ) {
-      const count = Math.max(Math.min(Math.round(this.portions * size), size - at), 1);
+      const share = this.shares.get(kind) ?? FIRST_SHARE;
+      const count = Math.max(Math.min(Math.round(share * size), size - at), 1);
       const begin = performance.now();
       draw(at, count);
       await this.done();
       at += count;
-      const taken = performance.now() - begin;
-      this.portions = Math.min(Math.max(this.portions * Math.min(PORTION_TIME / Math.max(taken, 1), 3), 1e-3), 1);
+      const faster = PORTION_TIME / Math.max(performance.now() - begin, 1);
+      this.shares.set(kind, Math.min(Math.max(share * Math.min(faster, 1.5), 1e-3), MOST_SHARE));
     }
   }
 
