@@ -5,11 +5,12 @@
 # out too.
 
 # In an order in which classes come before their use while the script is read.
-set(modules vector dom field_file payload exact_leaf leaves query bounds blocks camera shaders colors view renderer cell_lines painter pick viewer panels
-  controls page)
+set(modules field/vector field/field_file field/payload field/exact_leaf field/leaves field/query
+  drawing/camera drawing/bounds drawing/blocks drawing/shaders drawing/colors drawing/view drawing/renderer drawing/cell_lines
+  drawing/painter drawing/pick drawing/viewer panels/dom panels/panels panels/controls page)
 set(shaders field.glsl full_screen.vert leaves_alone.glsl leaves_exact.glsl leaves_polynomial.glsl slice.frag
   surface.glsl surface.vert surface_hit.frag surface_march.frag)
-set(page_shaders cells.frag cells.vert picture.frag section.frag)
+set(page_shaders drawing/cells.frag drawing/cells.vert drawing/picture.frag drawing/section.frag)
 
 # Reads a file without the lines that hold comments alone.
 function(read_code file result)

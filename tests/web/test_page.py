@@ -263,7 +263,7 @@ def test_the_page_is_small(field: pathlib.Path) -> None:
 
 
 def test_types_of_the_modules() -> None:
-    files = sorted(map(str, (ROOT / "web" / "page").glob("*.js")))
+    files = sorted(map(str, (ROOT / "web" / "page").rglob("*.js")))
     words = "--noEmit --allowJs --checkJs --strict --target es2022 --module es2022 --moduleResolution node --lib dom,dom.iterable,es2022"
     try:
         made = subprocess.run(["tsc", *words.split(), *files], capture_output=True, text=True)

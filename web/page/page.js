@@ -1,20 +1,20 @@
 // The page: reads the fields that stand in it, draws them, and lets the reader turn, slice and ask.
 
-import { axisAlong, diagonalOf, raysOf, screenAxes } from "./camera.js";
-import { Controls } from "./controls.js";
-import { element, setChoices } from "./dom.js";
-import { degreeOf, readField } from "./field_file.js";
-import { inflated } from "./payload.js";
-import { showFigures, showLegend, showReadout } from "./panels.js";
-import { query } from "./query.js";
-import { add, dot, scaled } from "./vector.js";
-import { firstView, movePlaneTo, placeOfPlane, planeOf, scriptOf, setPlane, viewFrom } from "./view.js";
-import { Viewer } from "./viewer.js";
+import { axisAlong, diagonalOf, raysOf, screenAxes } from "./drawing/camera.js";
+import { Controls } from "./panels/controls.js";
+import { element, setChoices } from "./panels/dom.js";
+import { degreeOf, readField } from "./field/field_file.js";
+import { inflated } from "./field/payload.js";
+import { showFigures, showLegend, showReadout } from "./panels/panels.js";
+import { query } from "./field/query.js";
+import { add, dot, scaled } from "./field/vector.js";
+import { firstView, movePlaneTo, placeOfPlane, planeOf, scriptOf, setPlane, viewFrom } from "./drawing/view.js";
+import { Viewer } from "./drawing/viewer.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
-/** @typedef {import("./pick.js").Pick} Pick */
-/** @typedef {import("./view.js").View} View */
+/** @typedef {import("./field/field_file.js").Field} Field */
+/** @typedef {import("./field/field_file.js").Vector} Vector */
+/** @typedef {import("./drawing/pick.js").Pick} Pick */
+/** @typedef {import("./drawing/view.js").View} View */
 
 /** A field of the page, which is read when it is first shown. */
 class Tab {

@@ -1,15 +1,15 @@
 // Turns the buffers of a view into colours on a canvas.
 
-import { degreeOf, isLeaf } from "./field_file.js";
-import { forEachLeaf } from "./leaves.js";
+import { degreeOf, isLeaf } from "../field/field_file.js";
+import { forEachLeaf } from "../field/leaves.js";
 import { divergingColor, exactColor, orderedColor } from "./colors.js";
 import { FieldRenderer, shownBox } from "./renderer.js";
 import { cellLines } from "./cell_lines.js";
-import { worldPoint } from "./query.js";
+import { worldPoint } from "../field/query.js";
 import { planeOf } from "./view.js";
 import { raysOf } from "./camera.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Field} Field */
 /** @typedef {import("./view.js").View} View */
 /** @typedef {import("./view.js").Quantity} Quantity */
 /** @typedef {import("./colors.js").Color} Color */

@@ -1,16 +1,16 @@
 // Draws fields into buffers by WebGL 2, with the program's own shaders.
 
-import { degreeOf, isExact, isLeaf, coefficientCount, coefficientIndex } from "./field_file.js";
+import { degreeOf, isExact, isLeaf, coefficientCount, coefficientIndex } from "../field/field_file.js";
 import { boundsOf } from "./bounds.js";
 import { surfaceBlocks } from "./blocks.js";
-import { gridPoint } from "./query.js";
+import { gridPoint } from "../field/query.js";
 import { axisVector, diagonalOf } from "./camera.js";
-import { cornersOf, signRule } from "./exact_leaf.js";
-import { cross, dot, normalized, scaled, subtract } from "./vector.js";
+import { cornersOf, signRule } from "../field/exact_leaf.js";
+import { cross, dot, normalized, scaled, subtract } from "../field/vector.js";
 import { ROW, webShader } from "./shaders.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 /** @typedef {import("./camera.js").Rays} Rays */
 /** @typedef {import("./camera.js").Plane} Plane */
 /** @typedef {import("./bounds.js").Bounds} Bounds */

@@ -2,10 +2,10 @@
 // from such lines.
 
 import { axisAlong, axisVector, centreOf, sectionPlane } from "./camera.js";
-import { add, dot, normalized, scaled, subtract } from "./vector.js";
+import { add, dot, normalized, scaled, subtract } from "../field/vector.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 /** @typedef {import("./camera.js").Orbit} Orbit */
 /** @typedef {import("./camera.js").Plane} Plane */
 

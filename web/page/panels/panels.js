@@ -1,15 +1,15 @@
 // The panels beside the picture: the legend, what is under the pointer, figures of the field.
 
-import { cssColor, divergingColor } from "./colors.js";
+import { cssColor, divergingColor } from "../drawing/colors.js";
 import { element, setRows, shortNumber } from "./dom.js";
-import { degreeOf, isExact, isLeaf } from "./field_file.js";
+import { degreeOf, isExact, isLeaf } from "../field/field_file.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./painter.js").Levels} Levels */
-/** @typedef {import("./painter.js").Painter} Painter */
-/** @typedef {import("./pick.js").Pick} Pick */
-/** @typedef {import("./view.js").View} View */
-/** @typedef {import("./view.js").Quantity} Quantity */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../drawing/painter.js").Levels} Levels */
+/** @typedef {import("../drawing/painter.js").Painter} Painter */
+/** @typedef {import("../drawing/pick.js").Pick} Pick */
+/** @typedef {import("../drawing/view.js").View} View */
+/** @typedef {import("../drawing/view.js").Quantity} Quantity */
 
 /** @type {Record<Quantity, string>} */
 const TITLES = {
@@ -37,7 +37,7 @@ export function showLegend(view, painter) {
 
 /**
  * Returns a bar of a continuous scale, with numbers below it.
- * @param {(t: number) => import("./colors.js").Color} colorAt  for t from 0 to 1
+ * @param {(t: number) => import("../drawing/colors.js").Color} colorAt  for t from 0 to 1
  * @param {number[]} numbers
  */
 export function scaleBar(colorAt, numbers) {

@@ -2,15 +2,15 @@
 
 import { rayThrough } from "./camera.js";
 import { isSectionShown } from "./painter.js";
-import { query } from "./query.js";
-import { add, dot, scaled } from "./vector.js";
+import { query } from "../field/query.js";
+import { add, dot, scaled } from "../field/vector.js";
 import { planeOf } from "./view.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 /** @typedef {import("./painter.js").Drawing} Drawing */
-/** @typedef {import("./query.js").ValueAndGradient} ValueAndGradient */
-/** @typedef {import("./query.js").LeafPoint} LeafPoint */
+/** @typedef {import("../field/query.js").ValueAndGradient} ValueAndGradient */
+/** @typedef {import("../field/query.js").LeafPoint} LeafPoint */
 
 /** @typedef {ValueAndGradient & {point: Vector, leaf: LeafPoint, onSurface: boolean}} Pick */
 

@@ -1,12 +1,12 @@
 // Bounds of the field in every node of the octree, by which rays step (docs/rendering.md, "Tracing").
 
-import { coefficientCount, coefficientIndex, degreeOf, isExact, isLeaf } from "./field_file.js";
-import { evaluateExact } from "./exact_leaf.js";
-import { forEachLeaf } from "./leaves.js";
-import { worldPoint } from "./query.js";
+import { coefficientCount, coefficientIndex, degreeOf, isExact, isLeaf } from "../field/field_file.js";
+import { evaluateExact } from "../field/exact_leaf.js";
+import { forEachLeaf } from "../field/leaves.js";
+import { worldPoint } from "../field/query.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 
 /** Relative rounding of single precision with which the bounds are widened. */
 const ROUNDING = 4e-6;

@@ -1,11 +1,11 @@
 // Blocks of pixels whose rays may hit the surface, with a lower bound of the distance to it: only these are drawn. The program
 // finds them in the same way (render/src/view/surface_blocks.h).
 
-import { isLeaf } from "./field_file.js";
-import { gridPoint } from "./query.js";
+import { isLeaf } from "../field/field_file.js";
+import { gridPoint } from "../field/query.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 /** @typedef {import("./bounds.js").Bounds} Bounds */
 /** @typedef {import("./camera.js").Rays} Rays */
 
@@ -23,6 +23,42 @@ function inverseRows(a, b, c) {
   const ab = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const determinant = a[0] * bc[0] + a[1] * bc[1] + a[2] * bc[2];
   return [bc, ca, ab].map((row) => row.map((x) => x / determinant));
+}
+
+/**
+ * @param {number} x
+ * @param {number} least
+ * @param {number} greatest
+ */
+function clampBetween(x, least, greatest) {
+  return x < least ? least : x > greatest ? greatest : x;
+}
+
+/**
+ * @param {number} block
+ * @param {number} count
+ */
+function clampTo(block, count) {
+  return clampBetween(block, 0, count);
+}
+
+/**
+ * Returns the first block that has to do with the view coordinate `at`. Pixel i has its centre at the coordinate x for which
+ * 2i + 1 = (1 + x) · pixels. The margin is one pixel.
+ * @param {number} at
+ * @param {number} pixels
+ */
+function firstBlock(at, pixels) {
+  return Math.floor((0.5 * ((1 + at) * pixels - 1) - 1) / BLOCK);
+}
+
+/**
+ * Returns the block behind the last one that has to do with the view coordinate `at`.
+ * @param {number} at
+ * @param {number} pixels
+ */
+function lastBlock(at, pixels) {
+  return Math.floor((0.5 * ((1 + at) * pixels - 1) + 1) / BLOCK) + 1;
 }
 
 /**
@@ -50,6 +86,12 @@ export function surfaceBlocks(field, bounds, rays, width, height, offset) {
   const homeNode = (home[2] * field.grid[1] + home[1]) * field.grid[0] + home[0];
   const side = 0.5 * (bounds.low[homeNode] + bounds.high[homeNode]) >= offset ? 1 : -1;
 
+  // Thousands of boxes are projected for each picture: no array is made for one.
+  const [depthRow, rightRow, upRow] = view;
+  const [eyeX, eyeY, eyeZ] = eye;
+  const [unitX, unitY, unitZ] = toWorld;
+  const along = (/** @type {number[]} */ row, /** @type {number} */ x, /** @type {number} */ y, /** @type {number} */ z) => row[0] * x + row[1] * y + row[2] * z;
+
   /** The blocks that rays through a box may have: x0, y0, x1, y1, half-open. */
   const rect = [0, 0, 0, 0];
   /**
@@ -59,60 +101,61 @@ export function surfaceBlocks(field, bounds, rays, width, height, offset) {
    * @param {number} size
    */
   const project = (x, y, z, size) => {
-    const corner = view.map((row) => row[0] * (x - eye[0]) + row[1] * (y - eye[1]) + row[2] * (z - eye[2]));
     let x0 = Infinity, y0 = Infinity, x1 = -Infinity, y1 = -Infinity;
-    let behind = 0;
-    const outside = [0, 0, 0, 0];
+    let behind = 0, left = 0, right = 0, below = 0, above = 0;
     for (let i = 0; i < 8; ++i) {
-      const dx = i & 1 ? size : 0, dy = i & 2 ? size : 0, dz = i & 4 ? size : 0;
-      const depth = corner[0] + view[0][0] * dx + view[0][1] * dy + view[0][2] * dz;
-      const u = corner[1] + view[1][0] * dx + view[1][1] * dy + view[1][2] * dz;
-      const v = corner[2] + view[2][0] * dx + view[2][1] * dy + view[2][2] * dz;
+      const dx = x - eyeX + (i & 1 ? size : 0), dy = y - eyeY + (i & 2 ? size : 0), dz = z - eyeZ + (i & 4 ? size : 0);
+      const depth = along(depthRow, dx, dy, dz);
+      const u = along(rightRow, dx, dy, dz);
+      const v = along(upRow, dx, dy, dz);
       const edge = rays.parallel ? 1 : depth;
-      if (u > edge) ++outside[0];
-      if (-u > edge) ++outside[1];
-      if (v > edge) ++outside[2];
-      if (-v > edge) ++outside[3];
+      if (u > edge) ++right;
+      if (-u > edge) ++left;
+      if (v > edge) ++above;
+      if (-v > edge) ++below;
       if (!(depth > near)) {
         ++behind;
         if (!rays.parallel) continue;
       }
-      x0 = Math.min(x0, u / edge);
-      x1 = Math.max(x1, u / edge);
-      y0 = Math.min(y0, -v / edge);
-      y1 = Math.max(y1, -v / edge);
+      const across = u / edge, down = -v / edge;
+      if (across < x0) x0 = across;
+      if (across > x1) x1 = across;
+      if (down < y0) y0 = down;
+      if (down > y1) y1 = down;
     }
     rect[0] = rect[1] = 0;
     rect[2] = columns;
     rect[3] = rows;
-    if (behind === 8 || outside.includes(8)) {
+    if (behind === 8 || left === 8 || right === 8 || above === 8 || below === 8) {
       rect[2] = rect[3] = 0;
       return;
     }
     if (behind > 0 && !rays.parallel) return;
-    // Pixel i has its centre at the view coordinate x for which 2i + 1 = (1 + x) · width. The margin is one pixel.
-    const first = (/** @type {number} */ at, /** @type {number} */ pixels) => Math.floor((0.5 * ((1 + at) * pixels - 1) - 1) / BLOCK);
-    const last = (/** @type {number} */ at, /** @type {number} */ pixels) => Math.floor((0.5 * ((1 + at) * pixels - 1) + 1) / BLOCK) + 1;
-    rect[0] = Math.min(Math.max(first(x0, width), 0), columns);
-    rect[1] = Math.min(Math.max(first(y0, height), 0), rows);
-    rect[2] = Math.min(Math.max(last(x1, width), 0), columns);
-    rect[3] = Math.min(Math.max(last(y1, height), 0), rows);
+    rect[0] = clampTo(firstBlock(x0, width), columns);
+    rect[1] = clampTo(firstBlock(y0, height), rows);
+    rect[2] = clampTo(lastBlock(x1, width), columns);
+    rect[3] = clampTo(lastBlock(y1, height), rows);
   };
 
-  /** A lower bound of the length along any ray from its start to a box. */
-  const distance = (/** @type {number} */ x, /** @type {number} */ y, /** @type {number} */ z, /** @type {number} */ size) => {
-    const box = [x, y, z];
-    let sum = 0;
+  /**
+   * Returns a lower bound of the length along any ray from its start to a box.
+   * @param {number} x
+   * @param {number} y
+   * @param {number} z
+   * @param {number} size
+   */
+  const distance = (x, y, z, size) => {
     if (rays.parallel) {
-      for (let a = 0; a < 3; ++a)
-        sum += (rays.forward[a] * (box[a] + 0.5 * size - eye[a]) - Math.abs(rays.forward[a]) * 0.5 * size) * toWorld[a];
-      return Math.max(sum, 0) * (1 - 1e-6);
+      const [fx, fy, fz] = rays.forward;
+      const half = 0.5 * size;
+      const toMiddle = fx * (x + half - eyeX) * unitX + fy * (y + half - eyeY) * unitY + fz * (z + half - eyeZ) * unitZ;
+      const reach = half * (Math.abs(fx) * unitX + Math.abs(fy) * unitY + Math.abs(fz) * unitZ);
+      return Math.max(toMiddle - reach, 0) * (1 - 1e-6);
     }
-    for (let a = 0; a < 3; ++a) {
-      const away = (Math.min(Math.max(eye[a], box[a]), box[a] + size) - eye[a]) * toWorld[a];
-      sum += away * away;
-    }
-    return Math.sqrt(sum) * (1 - 1e-6);
+    const dx = (clampBetween(eyeX, x, x + size) - eyeX) * unitX;
+    const dy = (clampBetween(eyeY, y, y + size) - eyeY) * unitY;
+    const dz = (clampBetween(eyeZ, z, z + size) - eyeZ) * unitZ;
+    return Math.sqrt(dx * dx + dy * dy + dz * dz) * (1 - 1e-6);
   };
 
   /**
@@ -127,7 +170,7 @@ export function surfaceBlocks(field, bounds, rays, width, height, offset) {
     const below = bounds.high[node] < offset;
     if (side > 0 ? above : below) return;
     project(x, y, z, size);
-    const [x0, y0, x1, y1] = rect;
+    const x0 = rect[0], y0 = rect[1], x1 = rect[2], y1 = rect[3];
     if (x0 >= x1 || y0 >= y1) return;
     if (above || below || isLeaf(field, node) || (x1 - x0 <= 1 && y1 - y0 <= 1)) {
       const start = distance(x, y, z, size);

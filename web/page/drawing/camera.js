@@ -1,9 +1,9 @@
 // Cameras and slices, as the program has them (hpsdf/render/view.h).
 
-import { add, cross, dot, normalized, scaled, subtract } from "./vector.js";
+import { add, cross, dot, normalized, scaled, subtract } from "../field/vector.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 
 /**
  * A camera that looks at a target.

@@ -5,11 +5,11 @@ import { raysOf, diagonalOf } from "./camera.js";
 import { pickAt } from "./pick.js";
 import { Painter } from "./painter.js";
 import { Buffers } from "./renderer.js";
-import { add, dot, scaled, subtract } from "./vector.js";
+import { add, dot, scaled, subtract } from "../field/vector.js";
 import { planeOf } from "./view.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 /** @typedef {import("./painter.js").Drawing} Drawing */
 /** @typedef {import("./renderer.js").Job} Job */
 /** @typedef {import("./view.js").View} View */

@@ -1,9 +1,9 @@
 // The edges of the cells that stand in the picture of a surface.
 
-import { forEachLeaf } from "./leaves.js";
+import { forEachLeaf } from "../field/leaves.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 
 /**
  * Returns the edges of leaves, in the field's units: for each of its two ends x, y, z and the length of the edge. An edge that cells of one

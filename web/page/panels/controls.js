@@ -1,14 +1,14 @@
 // The controls above the picture: they show the view and change it.
 
-import { axisAlong, centreOf } from "./camera.js";
+import { axisAlong, centreOf } from "../drawing/camera.js";
 import { element, setChoices, shortNumber } from "./dom.js";
-import { movePlaneTo, placeOfPlane, placesOfPlane, setPlane, normalFor } from "./view.js";
+import { movePlaneTo, placeOfPlane, placesOfPlane, setPlane, normalFor } from "../drawing/view.js";
 
-/** @typedef {import("./field_file.js").Field} Field */
-/** @typedef {import("./field_file.js").Vector} Vector */
-/** @typedef {import("./view.js").Quantity} Quantity */
-/** @typedef {import("./view.js").View} View */
-/** @typedef {import("./painter.js").Levels} Levels */
+/** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
+/** @typedef {import("../drawing/view.js").Quantity} Quantity */
+/** @typedef {import("../drawing/view.js").View} View */
+/** @typedef {import("../drawing/painter.js").Levels} Levels */
 
 /** @type {Record<View["kind"], [Quantity, string][]>} */
 const COLORS = {
