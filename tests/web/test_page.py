@@ -11,40 +11,10 @@ import numpy
 import pytest
 
 from conftest import package, started
+from pages import applied, asked, complaints, opened, payload, rested, shown_pixels
 
 ROOT = pathlib.Path(__file__).parents[2]
 SIZE = (400, 300)
-
-
-def opened(browser: Any, page: pathlib.Path) -> Any:
-    """Opens a page and waits until its first sharp picture is drawn, or until it tells why it draws none."""
-    browser.get(page.as_uri())
-    rested(browser)
-    return browser
-
-
-def rested(browser: Any) -> str:
-    """Waits for the sharp picture of the view, and returns the page's state."""
-    wait = package("selenium.webdriver.support.ui").WebDriverWait(browser, 120)
-    return str(wait.until(lambda page: page.execute_script("return ['sharp', 'failed'].find(s => s === document.body.dataset.state)")))
-
-
-def applied(browser: Any, lines: str) -> None:
-    """Shows the view that lines of a script describe, and waits for its sharp picture."""
-    browser.execute_script("hpsdf.page.apply(arguments[0])", lines)
-    rested(browser)
-    assert browser.find_element("id", "message").text == ""
-
-
-def asked(browser: Any, script: str, *arguments: Any) -> Any:
-    """Runs a script with the page's functions."""
-    return browser.execute_script("const {page, field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, add, scaled} = hpsdf;" + script, *arguments)
-
-
-def complaints(browser: Any) -> list[str]:
-    """What the browser logged, but for remarks on its software renderer."""
-    remarks = ("software WebGL", "GPU stall due to ReadPixels")
-    return [entry["message"] for entry in browser.get_log("browser") if not any(remark in entry["message"] for remark in remarks)]
 
 
 def columns(text: str) -> dict[str, Any]:
@@ -192,21 +162,6 @@ def test_lines_that_the_page_does_not_understand_are_named(browser: Any, field: 
         assert wrong in browser.find_element("id", "message").text
 
 
-def shown_pixels(browser: Any) -> Any:
-    """The colours of the canvas, from the bottom row up."""
-    return numpy.array(
-        asked(
-            browser,
-            """
-            const {canvas, painter: {gl}} = page.viewer, bytes = new Uint8Array(4 * canvas.width * canvas.height);
-            gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-            gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-            return [canvas.width, canvas.height, Array.from(bytes)];
-            """,
-        )[2]
-    )
-
-
 def test_cuts_planes_and_cells_stand_in_the_picture_of_a_surface(browser: Any, field: pathlib.Path) -> None:
     opened(browser, field.with_suffix(".html"))
     before = shown_pixels(browser)
@@ -216,12 +171,6 @@ def test_cuts_planes_and_cells_stand_in_the_picture_of_a_surface(browser: Any, f
         assert (after != before).mean() > 0.02, lines
         before = after
     assert complaints(browser) == []
-
-
-def payload(text: str) -> tuple[int, int]:
-    """Where the first field stands in a page."""
-    begin = text.index(">", text.index('class="field"')) + 1
-    return begin, text.index("<", begin)
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "empty"])

@@ -4,6 +4,7 @@ import { axisAlong, diagonalOf, raysOf, screenAxes } from "./drawing/camera.js";
 import { Controls } from "./panels/controls.js";
 import { element, setChoices } from "./panels/dom.js";
 import { degreeOf, readField } from "./field/field_file.js";
+import { pickAt } from "./drawing/pick.js";
 import { inflated } from "./field/payload.js";
 import { showFigures, showLegend, showReadout } from "./panels/panels.js";
 import { query } from "./field/query.js";
@@ -412,7 +413,7 @@ async function start() {
   try {
     await page.start();
     // Tests and curious readers find the page here, with functions to ask it.
-    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, add, scaled } });
+    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled } });
   } catch (error) {
     page.failed(error);
   }

@@ -1,5 +1,6 @@
 // Cameras and slices, as the program has them (hpsdf/render/view.h).
 
+import { gridDirection, gridPoint } from "../field/query.js";
 import { add, cross, dot, normalized, scaled, subtract } from "../field/vector.js";
 
 /** @typedef {import("../field/field_file.js").Field} Field */
@@ -154,27 +155,64 @@ function sectionCorners(field, point, normal) {
  * @returns {Plane}
  */
 export function sectionPlane(field, point, normal, width, height) {
+  const axis = axisAlong(normal);
+  if (axis >= 0) {
+    // The same arithmetic as in the program, so that the same pixels lie on faces between cells.
+    const across = axis === 0 ? 1 : 0, upward = axis === 2 ? 1 : 2;
+    const { lower, upper } = field;
+    return framed([lower[across], upper[across]], [lower[upward], upper[upward]], scaled(axisVector(axis), point[axis]), axisVector(across), axisVector(upward), width, height);
+  }
   const [right, up] = screenAxes(normal);
   const centre = centreOf(field);
-  const axis = axisAlong(normal);
-  const base = add(centre, scaled(normal, dot(normal, subtract(point, centre))));
-  if (axis >= 0) base[axis] = point[axis];
+  const base = subtract(centre, scaled(normal, dot(normal, subtract(centre, point))));
   const corners = sectionCorners(field, point, normal);
-  const [lowX, highX] = extentAlong(corners, base, right);
-  const [lowY, highY] = extentAlong(corners, base, up);
-  const pixel = Math.max((highX - lowX) / width, (highY - lowY) / height, 1e-9 * diagonalOf(field)) / (1 - 2 * SECTION_MARGIN);
-  const origin = add(base, add(scaled(right, (lowX + highX) / 2), scaled(up, (lowY + highY) / 2)));
-  if (axis >= 0) origin[axis] = point[axis];
-  return { origin, right: scaled(right, (pixel * width) / 2), up: scaled(up, (pixel * height) / 2) };
+  const least = 1e-9 * diagonalOf(field);
+  return framed(extentAlong(corners, base, right, least), extentAlong(corners, base, up, least), base, right, up, width, height);
 }
 
 /**
+ * Returns the plane of a picture that shows a rectangle of it with a margin.
+ * @param {[number, number]} across  the rectangle's ends along `right`
+ * @param {[number, number]} upward
+ * @param {Vector} base
+ * @param {Vector} right  of length 1
+ * @param {Vector} up
+ * @param {number} width
+ * @param {number} height
+ * @returns {Plane}
+ */
+function framed(across, upward, base, right, up, width, height) {
+  const pixel = Math.max((across[1] - across[0]) / width, (upward[1] - upward[0]) / height) / (1 - 2 * SECTION_MARGIN);
+  const origin = add(add(base, scaled(right, 0.5 * (across[0] + across[1]))), scaled(up, 0.5 * (upward[0] + upward[1])));
+  return { origin, right: scaled(right, 0.5 * (pixel * width)), up: scaled(up, 0.5 * (pixel * height)) };
+}
+
+/**
+ * Returns the point that a pixel of a picture of a plane shows, in grid coordinates, by the program's arithmetic.
+ * @param {Field} field
+ * @param {Plane} plane
+ * @param {number} column
+ * @param {number} row
+ * @param {number} width
+ * @param {number} height
+ * @returns {Vector}
+ */
+export function gridPointOfPixel(field, plane, column, row, width, height) {
+  const across = 2 * ((2 * column + 1 - width) * (0.5 / width)), upward = 2 * ((height - 2 * row - 1) * (0.5 / height));
+  const right = scaled(gridDirection(field, plane.right), across);
+  return add(add(gridPoint(field, plane.origin), right), scaled(gridDirection(field, plane.up), upward));
+}
+
+/**
+ * Returns the least and the greatest coordinates of points along a direction, at least `least` apart.
  * @param {Vector[]} points
  * @param {Vector} base
  * @param {Vector} direction
- * @returns {[number, number]}  the least and greatest coordinates along the direction; zeros without points
+ * @param {number} least
+ * @returns {[number, number]}
  */
-function extentAlong(points, base, direction) {
+function extentAlong(points, base, direction, least) {
   const along = points.map((point) => dot(direction, subtract(point, base)));
-  return points.length > 0 ? [Math.min(...along), Math.max(...along)] : [0, 0];
+  const low = Math.min(...along), high = Math.max(...along);
+  return points.length > 0 && high - low >= least ? [low, high] : [-0.5 * least, 0.5 * least];
 }

@@ -1,8 +1,8 @@
 // The point of a field that a pixel of a picture shows, in double precision.
 
-import { rayThrough } from "./camera.js";
+import { gridPointOfPixel, rayThrough } from "./camera.js";
 import { isSectionShown } from "./painter.js";
-import { query } from "../field/query.js";
+import { query, queryGrid, worldPoint } from "../field/query.js";
 import { add, dot, scaled } from "../field/vector.js";
 import { planeOf } from "./view.js";
 
@@ -29,12 +29,14 @@ export function pickAt(field, drawing, x, y) {
   const { hits, view } = drawing;
   const column = Math.min(Math.floor(x * hits.width), hits.width - 1);
   const row = Math.min(Math.floor(y * hits.height), hits.height - 1);
-  const u = (2 * column + 1) / hits.width - 1;
-  const v = 1 - (2 * row + 1) / hits.height;
   if (view.kind === "slice") {
     const plane = planeOf(view, field, hits.width, hits.height);
-    return pickOf(field, add(plane.origin, add(scaled(plane.right, u), scaled(plane.up, v))), false);
+    const grid = gridPointOfPixel(field, plane, column, row, hits.width, hits.height);
+    const found = queryGrid(field, grid);
+    return found && { ...found, point: worldPoint(field, grid), onSurface: false };
   }
+  const u = (2 * column + 1) / hits.width - 1;
+  const v = 1 - (2 * row + 1) / hits.height;
   const texel = hits.at(column, row);
   const cut = drawing.section?.at(column, row) ?? null;
   const ray = rayThrough(drawing.rays, u, v);

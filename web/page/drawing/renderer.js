@@ -4,7 +4,7 @@ import { degreeOf, isExact, isLeaf, coefficientCount, coefficientIndex } from ".
 import { boundsOf } from "./bounds.js";
 import { surfaceBlocks } from "./blocks.js";
 import { gridPoint } from "../field/query.js";
-import { axisVector, diagonalOf } from "./camera.js";
+import { axisVector, diagonalOf, gridPointOfPixel } from "./camera.js";
 import { cornersOf, signRule } from "../field/exact_leaf.js";
 import { cross, dot, normalized, scaled, subtract } from "../field/vector.js";
 import { ROW, webShader } from "./shaders.js";
@@ -400,19 +400,23 @@ export class FieldRenderer {
     const most = Math.max(width, height);
     const wholes = new Int32Array(8 * most);
     const fractions = new Uint32Array(8 * most);
-    const origin = gridPoint(field, plane.origin);
-    const across = (/** @type {Vector} */ v) => v.map((x, a) => (x / field.size[a]) * field.grid[a]);
-    const right = across(plane.right), up = across(plane.up);
     const set = (/** @type {number} */ at, /** @type {number} */ axis, /** @type {number} */ x) => {
-      const whole = Math.floor(x);
-      wholes[4 * at + axis] = whole;
-      fractions[4 * at + axis] = Math.floor((x - whole) * 2 ** 32);
+      const integer = Math.floor(x);
+      wholes[4 * at + axis] = integer;
+      fractions[4 * at + axis] = Math.floor((x - integer) * 2 ** 32);
     };
+    const still = /** @type {Vector} */ ([0, 0, 0]);
+    const pointAt = (/** @type {Plane} */ moved, /** @type {number} */ x, /** @type {number} */ y) => gridPointOfPixel(field, moved, x, y, width, height);
+    const middle = gridPoint(field, plane.origin);
     for (let axis = 0; axis < 3; ++axis) {
-      // An axis that does not change along the columns gets its origin from the rows, so that it is rounded once.
-      const inRows = right[axis] === 0;
-      for (let x = 0; x < width; ++x) set(x, axis, (inRows ? 0 : origin[axis]) + right[axis] * ((2 * x + 1 - width) / width));
-      for (let y = 0; y < height; ++y) set(most + y, axis, (inRows ? origin[axis] : 0) + up[axis] * ((height - 2 * y - 1) / height));
+      // A coordinate that only columns or only rows change is rounded as in the program.
+      const inRows = plane.right[axis] === 0;
+      const isShared = !inRows && plane.up[axis] !== 0;
+      for (let x = 0; x < width; ++x) set(x, axis, inRows ? 0 : pointAt({ ...plane, up: still }, x, 0)[axis]);
+      for (let y = 0; y < height; ++y) {
+        const here = inRows || isShared ? pointAt({ ...plane, right: still }, 0, y)[axis] : 0;
+        set(most + y, axis, isShared ? here - middle[axis] : here);
+      }
     }
     return {
       wholes: this.plainTexture(gl.RGBA32I, most, 2, gl.RGBA_INTEGER, gl.INT, wholes),

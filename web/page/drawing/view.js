@@ -32,18 +32,34 @@ import { add, dot, normalized, scaled, subtract } from "../field/vector.js";
 export class ViewError extends Error {}
 
 /**
+ * Returns the middle of the box around the surface, rounded to four digits of the box's size, where planes stand at first.
+ * @param {Field} field
+ * @returns {Vector}
+ */
+export function middleOf(field) {
+  const [lower, upper] = field.box;
+  return /** @type {Vector} */ (
+    lower.map((x, axis) => {
+      const middle = 0.5 * (x + upper[axis]), size = upper[axis] - x;
+      if (!(size > 0)) return middle;
+      const power = 10 ** (3 - Math.floor(Math.log10(size)));
+      return Math.round(middle * power) / power + 0;
+    })
+  );
+}
+
+/**
  * Returns the view of a field that has just been opened.
  * @param {Field} field
  * @returns {View}
  */
 export function firstView(field) {
-  const middle = centreOf(field);
   return {
     kind: "surface",
-    orbit: { azimuth: 30, elevation: 20, distance: 1.1, target: middle, parallel: false, upZ: false },
+    orbit: { azimuth: 30, elevation: 20, distance: 1.1, target: centreOf(field), parallel: false, upZ: false },
     offset: 0,
     clip: null,
-    point: middle,
+    point: middleOf(field),
     normal: axisVector(2),
     planeInSpace: false,
     target: null,
@@ -246,16 +262,16 @@ const COMMANDS = {
     words.whenNumbers("offset", 1, "", (offset) => (view.offset = offset ? offset[0] : 0));
     words.whenWord("clip", ["none", ...AXES], (word) => {
       const axis = AXES.indexOf(word);
-      view.clip = axis < 0 ? null : { axis, at: centreOf(field)[axis] };
+      view.clip = axis < 0 ? null : { axis, at: middleOf(field)[axis] };
     });
     words.whenNumbers("clip-offset", 1, "", (at) => view.clip && at && (view.clip.at = at[0]));
   },
   plane(words, view, field) {
     words.whenWord("axis", AXES, (word) => {
       view.normal = axisVector(AXES.indexOf(word));
-      view.point = centreOf(field);
+      view.point = middleOf(field);
     });
-    words.whenNumbers("offset", 1, "auto", (at) => movePlaneTo(view, field, at ? at[0] : placeOfPlane({ ...view, point: centreOf(field) }, field)));
+    words.whenNumbers("offset", 1, "auto", (at) => movePlaneTo(view, field, at ? at[0] : placeOfPlane({ ...view, point: middleOf(field) }, field)));
     words.whenNumbers("through", 6, "", (numbers) => {
       const [x, y, z, ...normal] = numbers ?? [];
       if (!(Math.hypot(...normal) > 0)) throw new ViewError(`“${words.line}”: the normal is zero`);
@@ -292,7 +308,8 @@ const COMMANDS = {
  */
 export function setPlane(view, field, point, normal) {
   const axis = axisAlong(normal);
-  view.normal = axis >= 0 ? axisVector(axis) : normalized(normal);
+  const largest = Math.max(...normal.map(Math.abs));
+  view.normal = axis >= 0 ? axisVector(axis) : normalized(/** @type {Vector} */ (normal.map((x) => x / largest)));
   view.point = point;
   movePlaneTo(view, field, placeOfPlane(view, field));
 }

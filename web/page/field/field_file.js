@@ -19,6 +19,7 @@
  * @property {Vector} lower  the domain's lower corner, in the field's units
  * @property {Vector} upper
  * @property {Vector} size
+ * @property {[Vector, Vector]} box  corners of the part of the domain around the surface; of the whole domain where it is unknown
  * @property {number} targetError
  * @property {number} tolerance
  * @property {number} blend  width of the blended zones as a part of a cell's edges; 0: none
@@ -167,13 +168,26 @@ export function readField(bytes) {
   const size = /** @type {Vector} */ (upper.map((x, axis) => x - lower[axis]));
   /** @type {Field} */
   const field = {
-    name, grid, lower, upper, size, targetError, tolerance, blend, measured, low, high, first,
+    name, grid, lower, upper, size, box: withinDomain(header.box, lower, upper), targetError, tolerance, blend, measured, low, high, first,
     coefficients: new Float32Array(0), exact, bytes: bytes.length,
   };
   if (blend > 0) throw new FieldError("it is blended, which this page cannot draw");
   checkTree(field);
   field.coefficients = isQuantized ? dequantized(field, quantized, header.step, header.meanBits) : placed(field, plain);
   return field;
+}
+
+/**
+ * Returns the part of a box within the domain, or the domain if there is none.
+ * @param {[Vector, Vector]} box
+ * @param {Vector} lower
+ * @param {Vector} upper
+ * @returns {[Vector, Vector]}
+ */
+function withinDomain(box, lower, upper) {
+  const low = /** @type {Vector} */ (box[0].map((x, a) => Math.max(x, lower[a])));
+  const high = /** @type {Vector} */ (box[1].map((x, a) => Math.min(x, upper[a])));
+  return low.every((x, a) => x <= high[a]) ? [low, high] : [lower, upper];
 }
 
 /**
@@ -192,7 +206,9 @@ function readHeader(cursor) {
   const nameLength = cursor.u32();
   const nameAt = cursor.skip(nameLength);
   const name = new TextDecoder().decode(cursor.bytes.subarray(nameAt, nameAt + nameLength));
-  cursor.skip(3 * 8 + 6 * 8 + 4 * 8); // fingerprint, vertices, faces; the surface's box; the normalization
+  cursor.skip(3 * 8); // fingerprint, vertices, faces
+  const box = /** @type {[Vector, Vector]} */ ([cursor.vector(), cursor.vector()]);
+  cursor.skip(4 * 8); // the normalization
   const targetError = cursor.f64();
   cursor.skip(3 * 8 + 3 * 4 + 1 + 4 * 8 + 3 + 2 * 8 + 1 + 8);
   const blend = cursor.f64();
@@ -218,7 +234,7 @@ function readHeader(cursor) {
   const step = isQuantized ? cursor.f64() : 0;
   const meanBits = isQuantized ? cursor.u32() : 0;
   return {
-    coefficientBytes, nodes, coefficients, grid, lower, upper, name, targetError, tolerance, blend, bounds, vertexBytes, vertices,
+    coefficientBytes, nodes, coefficients, grid, lower, upper, box, name, targetError, tolerance, blend, bounds, vertexBytes, vertices,
     triangles, lists, offset, measured, step, meanBits,
   };
 }

@@ -28,6 +28,16 @@ export function gridPoint(field, point) {
 }
 
 /**
+ * Returns a vector in grid coordinates.
+ * @param {Field} field
+ * @param {Vector} direction
+ * @returns {Vector}
+ */
+export function gridDirection(field, direction) {
+  return /** @type {Vector} */ (direction.map((x, a) => (x / field.size[a]) * field.grid[a]));
+}
+
+/**
  * Returns the world coordinates of a point of the grid.
  * @param {Field} field
  * @param {Vector} point
@@ -71,7 +81,16 @@ export function leafAt(field, grid) {
  * @returns {(ValueAndGradient & {leaf: LeafPoint}) | null}
  */
 export function query(field, point) {
-  const grid = gridPoint(field, point);
+  return queryGrid(field, gridPoint(field, point));
+}
+
+/**
+ * As `query`, at a point in grid coordinates.
+ * @param {Field} field
+ * @param {Vector} grid
+ * @returns {(ValueAndGradient & {leaf: LeafPoint}) | null}
+ */
+export function queryGrid(field, grid) {
   const leaf = leafAt(field, grid);
   if (!leaf) return null;
   return { ...evaluateLeaf(field, grid, leaf), leaf };

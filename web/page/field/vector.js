@@ -60,5 +60,5 @@ export function length(a) {
  */
 export function normalized(a) {
   const size = length(a);
-  return size > 0 ? scaled(a, 1 / size) : [0, 0, 0];
+  return size > 0 ? [a[0] / size, a[1] / size, a[2] / size] : [0, 0, 0];
 }

@@ -1,8 +1,8 @@
 // The controls above the picture: they show the view and change it.
 
-import { axisAlong, centreOf } from "../drawing/camera.js";
+import { axisAlong } from "../drawing/camera.js";
 import { element, setChoices, shortNumber } from "./dom.js";
-import { movePlaneTo, placeOfPlane, placesOfPlane, setPlane, normalFor } from "../drawing/view.js";
+import { middleOf, movePlaneTo, normalFor, placeOfPlane, placesOfPlane, setPlane } from "../drawing/view.js";
 
 /** @typedef {import("../field/field_file.js").Field} Field */
 /** @typedef {import("../field/field_file.js").Vector} Vector */
@@ -46,7 +46,7 @@ export class Controls {
     this.onSelect("axis", (view, field, value) => setPlane(view, field, view.point, normalFor(value, view)));
     this.onSelect("cut", (view, field, value) => {
       const axis = "xyz".indexOf(value);
-      view.clip = axis < 0 ? null : { axis, at: centreOf(field)[axis] };
+      view.clip = axis < 0 ? null : { axis, at: middleOf(field)[axis] };
     });
     this.onSelect("cells", (view, _, value) => (view.cells = value === "none" || value === "all" ? value : Number(value)));
     this.onInput("offset", (view, _, value) => (view.offset = value));

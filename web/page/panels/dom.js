@@ -13,11 +13,13 @@ export function element(id, type) {
 }
 
 /**
- * Returns a number with five digits.
+ * Returns a number with four or five digits.
  * @param {number} x
  */
 export function shortNumber(x) {
-  return Math.abs(x) < 1e-12 ? "0" : Number(x.toPrecision(5)).toString().replace("-", "−");
+  const size = Math.abs(x);
+  const text = size < 1e-12 ? "0" : size < 1e-3 || size >= 1e6 ? String(Number(x.toPrecision(4)).toExponential()) : String(Number(x.toPrecision(5)));
+  return text.replaceAll("-", "−");
 }
 
 /**
