@@ -20,8 +20,8 @@ std::vector<std::string> inputFiles(const Command& command, const Arguments& arg
   std::vector<std::string> files;
   for (const Parameter& parameter : command.parameters) {
     const bool isInput = parameter.type == ParameterType::path || parameter.type == ParameterType::text;
-    if (isInput && !parameter.isRepeatable && arguments.given(parameter.name))
-      files.push_back(arguments.text(parameter.name));
+    if (!isInput || !arguments.given(parameter.name)) continue;
+    for (const std::string& file : arguments.texts(parameter.name)) files.push_back(file);
   }
   return files;
 }

@@ -1,17 +1,20 @@
 #include <fmt/format.h>
-#include <zlib.h>
+#include <fmt/ranges.h>
 
-#include <filesystem>
+#include <algorithm>
+#include <set>
 #include <string>
+#include <vector>
 
-#include "files/html_page.h"
-#include "files/output_folder.h"
+#include "console/long_work.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
-#include "hpsdf/web/page_template.h"
+#include "hpsdf/render/renderer.h"
+#include "pictures/field_page.h"
 #include "pictures/picture_commands.h"
+#include "session/backend.h"
 #include "session/field_argument.h"
 #include "session/session.h"
 #include "text/json.h"
@@ -20,52 +23,69 @@
 namespace hpsdf::app {
 namespace {
 
-/// Returns the bytes of the field's file.
-std::string bytesOf(const Field& field) {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = folder.path() / "field.hpsdf";
-  save(field, file);
-  return readWholeFile(file.string());
+/// Returns the renderer that the arguments choose, or that of the CPU where OpenGL cannot draw: a page is worth more
+/// than the device that draws its two small pictures.
+render::Renderer& pictureRenderer(Session& session, const Arguments& arguments) {
+  const Backend chosen = backend(arguments);
+  try {
+    return session.renderer(chosen);
+  } catch (const render::GlError&) {
+    if (arguments.given("gl")) throw;
+    return session.renderer({.cpu = true});
+  }
 }
 
-std::string compressed(const std::string& bytes) {
-  uLongf size = compressBound(bytes.size());
-  std::string result(size, '\0');
-  const int status = compress2(reinterpret_cast<Bytef*>(result.data()), &size,
-                               reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), Z_BEST_COMPRESSION);
-  if (status != Z_OK)
-    throw Error(ErrorKind::limit, "page", "the field cannot be compressed: there is too little memory");
-  result.resize(size);
-  return result;
+std::vector<std::string> namesOf(const Arguments& arguments, const std::vector<std::string>& files) {
+  const std::vector<std::string> given = arguments.texts("name");
+  return given.empty() ? distinctNames(files) : given;
 }
 
-void replace(std::string& text, std::string_view mark, std::string_view with) {
-  for (std::size_t at = text.find(mark); at != std::string::npos; at = text.find(mark, at + with.size()))
-    text.replace(at, mark.size(), with);
+/// Adds the current field to the page.
+void addCurrent(FieldPage& page, Session& session, const Arguments& arguments, const std::string& name) {
+  const Field& field = session.current().field;
+  if (const std::string reason = refusal(field); !reason.empty())
+    throw Error(ErrorKind::field, session.current().name, reason);
+  FieldInPage described{.name = name, .view = arguments.textOr("view", "")};
+  if (arguments.flag("pictures"))
+    described.pictures = fallbackPictures(pictureRenderer(session, arguments), field, name);
+  withProgress(session.console(), [&](const Progress& progress) {
+    page.add(field, described, progress);
+    return true;
+  });
 }
 
-std::string pageOf(const Field& field, const std::string& title) {
-  std::string page(web::pageTemplate());
-  replace(page, "{{title}}", htmlEscaped(title));
-  replace(page, "{{pictures}}", "");
-  replace(page, "{{fields}}",
-          fmt::format("<script type=\"application/octet-stream\" class=\"field\" data-name=\"{}\">{}</script>\n",
-                      htmlEscaped(title), base64(compressed(bytesOf(field)))));
-  return page;
+void checkPage(const Arguments& arguments) {
+  backend(arguments);  // throws `Error` for contradicting options
+  const std::vector<std::string> names = arguments.texts("name");
+  const std::size_t fields = std::max(arguments.texts("field").size(), std::size_t{1});
+  if (!names.empty() && names.size() != fields)
+    throw Error(fmt::format("name: given {} times for {}; give one for each field", names.size(),
+                            countOf(fields, "field", "fields")));
+  if (std::set<std::string>(names.begin(), names.end()).size() < names.size())
+    throw Error("name: two fields have the same; give them different ones");
 }
 
 void runPage(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
-  useField(session, arguments);
-  const CurrentField& current = session.current();
-  if (current.field.data().blend > 0)
-    throw Error(ErrorKind::field, current.name,
-                "is blended, which pages cannot show yet; build it without continuity exact");
-  const std::string page = pageOf(current.field, arguments.textOr("title", plainName(current.name)));
-  writeTextFile(file, page);
+  checkWritable(file);
+  checkView(session.registry(), arguments.textOr("view", ""));
+  const std::vector<std::string> files = arguments.texts("field");
+  for (const std::string& field : files)
+    if (!isFieldFile(field)) load(field);  // throws `Error` before the work on other fields begins
+  const std::vector<std::string> names =
+      namesOf(arguments, files.empty() ? std::vector{session.current().name} : files);
+  FieldPage page;
+  if (files.empty()) addCurrent(page, session, arguments, names.front());
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    loadField(session, files[n]);
+    addCurrent(page, session, arguments, names[n]);
+  }
+  const std::string html = page.html(arguments.textOr("title", fmt::format("{}", fmt::join(names, ", "))));
+  writeTextFile(file, html);
   std::ostream& out = session.console().out;
-  if (session.wantsJson(arguments)) return printJson(out, {{"output", file}, {"file_bytes", page.size()}});
-  out << fmt::format("{}: {}, opens in any browser\n", file, bytesText(double(page.size())));
+  if (session.wantsJson(arguments))
+    return printJson(out, {{"output", file}, {"file_bytes", html.size()}, {"fields", names}});
+  out << fmt::format("{}: {}, opens in any browser\n", file, bytesText(double(html.size())));
 }
 
 }  // namespace
@@ -73,22 +93,36 @@ void runPage(Session& session, const Arguments& arguments) {
 void addPageCommand(Registry& registry) {
   registry.add({
       .name = "page",
-      .summary = "Write one HTML file in which a field can be turned, sliced and asked in a browser.",
+      .summary = "Write one HTML file in which fields can be turned, sliced and asked in a browser.",
       .help = paragraphs(R"(
 Writes a page that holds the field and all that is needed to draw it by WebGL 2. It needs no network and sends nothing: it can be
 mailed, attached to a report, or opened from a disk. The field in it is the one that is stored, and its values are computed in
-double precision. Blended fields are refused.
+double precision. Blended fields are refused. Several fields stand in one page, each under a tab of its own.
 
-Use it to show a field to somebody who has no hpsdf. The page takes about 0.14 MB besides the field, and the field a third more than
-its file.
+Use it to show a field to somebody who has no hpsdf. The page takes about 0.2 MB besides the field, and the field a third more than
+its file. Two small pictures of each field take another 0.1 MB: they are what a browser without WebGL shows, and are drawn by the CPU
+where there is no OpenGL.
 
 docs/page.md is the manual.)"),
-      .examples = {"hpsdf page bunny.hpsdf -o bunny.html"},
-      .parameters = {fieldParameter(),
-                     {"output", outputFile().as('o').required(), "HTML file of the page."},
-                     {"title", text("TEXT"), "Title of the page. The default is the name of the field's file."}},
+      .examples = {"hpsdf page bunny.hpsdf -o bunny.html",
+                   "hpsdf page coarse.hpsdf fine.hpsdf -o both.html --title 'Two bunnies'",
+                   "hpsdf page bunny.hpsdf -o slice.html --view 'show slice; plane axis=x offset=0.2; color depth'"},
+      .parameters = joined(
+          {{{"field", file("FIELD").positional().repeatable().requiredOnCommandLine(),
+             "Files of fields. A script may leave them out and writes a page of the current field then."},
+            {"output", outputFile().as('o').required(), "HTML file of the page."},
+            {"title", text("TEXT"), "Title of the page. The default is the names of the fields."},
+            {"name", text("TEXT").repeatable(),
+             "Name of a field in the page; given once for each field, in their order. The default is the name of its "
+             "file, with the name of the folder where files have equal names."},
+            {"view", text("LINES"),
+             "Lines of a script that describe what the page shows first, as its own 'copy view' and the command "
+             "'copy-view' write them; ';' separates them."},
+            {"pictures", flag("true").under(kPicture),
+             "Adds pictures for browsers without WebGL. --pictures=false leaves them out."}},
+           backendParameters()}),
       .action = runPage,
-      .check = [](const Arguments& arguments) { checkWritable(arguments.text("output")); },
+      .check = checkPage,
   });
 }
 
