@@ -151,6 +151,9 @@ TEST_F(Films, reportIsOnePageWithItsPictures) {
   EXPECT_THAT(page, Not(HasSubstr("http")));
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_NO_THROW(load(at("new/report/torus.hpsdf")));
+  EXPECT_THAT(page, HasSubstr("<iframe src=\"explorer.html\""));
+  EXPECT_EQ(json.at("explorer").get<std::string>(), at("new/report/explorer.html"));
+  EXPECT_THAT(readFile(at("new/report/explorer.html")), HasSubstr("class=\"field\" data-name=\"torus\""));
 }
 
 TEST(ReportPage, escapesWhatItShows) {

@@ -53,6 +53,21 @@ std::string levels(const std::string& title, const std::map<int, double>& shares
   return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", htmlEscaped(title), rows);
 }
 
+constexpr std::string_view kLiveStyle = R"(
+.live { margin: 1.6rem 0 0; }
+.live iframe { display: block; width: 100%; aspect-ratio: 16 / 10; min-height: 22rem; border: 1px solid var(--line); border-radius: 4px;
+               box-sizing: border-box; }
+@media print { .live { display: none; } }
+)";
+
+/// Shows another page within this one. It is not printed: pictures show there what it shows.
+std::string liveView(const std::string& page) {
+  return fmt::format(
+      "<div class=\"live\">\n<iframe src=\"{0}\" title=\"the field\" loading=\"lazy\" "
+      "allow=\"clipboard-write\"></iframe>\n<p><a href=\"{0}\">open alone</a></p>\n</div>\n",
+      htmlEscaped(page));
+}
+
 std::string figure(const ReportPicture& picture) {
   return fmt::format(
       "<figure>\n<img src=\"{0}\" alt=\"{1}\">\n<figcaption><b>{1}</b>{2}\n<code>{3}</code></figcaption>\n</figure>\n",
@@ -173,7 +188,8 @@ std::string htmlFoot(const std::string& footer) {
 }
 
 std::string reportHtml(const ReportPage& page) {
-  std::string html = htmlHead(page.title, page.subtitle, "");
+  std::string html = htmlHead(page.title, page.subtitle, kLiveStyle);
+  if (!page.explorer.empty()) html += liveView(page.explorer);
   html += "<h2>Figures</h2>\n<table>\n";
   for (const auto& [name, value] : page.figures) html += htmlFact(name, value);
   html += "</table>\n";

@@ -1,5 +1,5 @@
 #pragma once
-// Writes the page of a report: one HTML file beside its pictures, without JavaScript and without network
+// Writes the page of a report: one HTML file beside its pictures, without JavaScript of its own and without network
 // access.
 
 #include <map>
@@ -20,6 +20,7 @@ struct ReportPicture {
 struct ReportPage {
   std::string title;
   std::string subtitle;
+  std::string explorer = {};  ///< page that shows the field live, relative to this one; "" for none
   std::vector<std::pair<std::string, std::string>> figures = {};
   std::map<int, double> degrees = {};  ///< share of the domain's volume by degree, 0 to 1
   std::map<int, double> depths = {};

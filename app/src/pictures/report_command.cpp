@@ -16,6 +16,7 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/picture.h"
+#include "pictures/field_page.h"
 #include "pictures/picture_arguments.h"
 #include "pictures/picture_commands.h"
 #include "session/backend.h"
@@ -127,6 +128,27 @@ std::vector<std::pair<std::string, std::string>> figures(const Field& field, con
   return rows;
 }
 
+constexpr const char* kExplorerFile = "explorer.html";
+
+/// Writes the page of the current field into the folder, so that the report shows the field live. Returns false for a
+/// field that pages cannot show.
+bool writeExplorer(Session& session, render::Renderer& renderer, const fs::path& folder) {
+  const Field& field = session.current().field;
+  const std::string name = plainName(session.current().name);
+  if (const std::string reason = refusal(field); !reason.empty()) {
+    note(session.console(), fmt::format("the report shows the field by pictures alone: it {}", reason));
+    return false;
+  }
+  FieldPage page;
+  const FieldInPage described{.name = name, .pictures = fallbackPictures(renderer, field, name)};
+  withProgress(session.console(), [&](const Progress& progress) {
+    page.add(field, described, progress);
+    return true;
+  });
+  writeTextFile(folder / kExplorerFile, page.html(name));
+  return true;
+}
+
 void runReport(Session& session, const Arguments& arguments) {
   const Console& console = session.console();
   const Backend chosen = backend(arguments);
@@ -147,9 +169,11 @@ void runReport(Session& session, const Arguments& arguments) {
   save(field, folder.path() / fieldFile);
 
   const FieldStatistics counts = statistics(field);
+  const bool isLive = writeExplorer(session, renderer, folder.path());
   ReportPage page{.title = fmt::format("{} as an hp-adaptive signed distance field", plainName(current.name)),
                   .subtitle = fmt::format("{} leaf cells{}, {}, {}", grouped(counts.leaves), exactCountText(counts),
                                           bytesText(double(counts.bytes)), measuredText(field)),
+                  .explorer = isLive ? kExplorerFile : "",
                   .figures = figures(field, counts, built ? &*built : nullptr),
                   .degrees = counts.degreeVolume,
                   .depths = counts.depthVolume,
@@ -170,6 +194,7 @@ void runReport(Session& session, const Arguments& arguments) {
     for (const ReportPicture& picture : page.pictures) files.push_back((folder.path() / picture.file).string());
     return printJson(console.out, {{"page", index.string()},
                                    {"field_file", (folder.path() / fieldFile).string()},
+                                   {"explorer", isLive ? Json((folder.path() / kExplorerFile).string()) : Json()},
                                    {"pictures", files},
                                    {"build_seconds", built ? Json(built->seconds) : Json()},
                                    {"frame_seconds", seconds},
@@ -185,10 +210,12 @@ void runReport(Session& session, const Arguments& arguments) {
 void addReportCommand(Registry& registry) {
   registry.add({
       .name = "report",
-      .summary = "Write one offline page: pictures and figures of a field.",
+      .summary = "Write one offline page: a field to turn and slice, its pictures and its figures.",
       .help =
           "SOURCE is a field's file (*.hpsdf) or anything that 'hpsdf build' takes, with the same options. The folder "
-          "receives index.html, its pictures, each with the command that makes it, and the field itself.",
+          "receives index.html, its pictures, each with the command that makes it, the field itself, and "
+          "explorer.html: "
+          "the page of 'hpsdf page', which index.html shows on top, so that the field can be turned and sliced there.",
       .examples = {"hpsdf report bunny.hpsdf -o report", "hpsdf report builtin:torus -o torus --target-error 1e-7"},
       .parameters =
           joined({{{"source", text("SOURCE").positional().requiredOnCommandLine(),

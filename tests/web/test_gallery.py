@@ -1,0 +1,107 @@
+"""Pages of several fields, pictures for browsers that cannot show fields, and the pages of other commands that show fields."""
+
+import pathlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from conftest import package, started
+from test_page import complaints, opened, rested
+
+NAMES = ("torus", "box")
+
+
+@pytest.fixture(scope="module")
+def fields(tmp_path_factory: pytest.TempPathFactory, program: Callable[..., str]) -> list[pathlib.Path]:
+    folder = tmp_path_factory.mktemp("gallery")
+    for name in NAMES:
+        program("build", f"builtin:{name}", "--target-error", "1e-3", "-o", folder / f"{name}.hpsdf")
+    return [folder / f"{name}.hpsdf" for name in NAMES]
+
+
+@pytest.fixture(scope="module")
+def gallery(fields: list[pathlib.Path], program: Callable[..., str]) -> pathlib.Path:
+    """A page of both fields, whose first view is a slice."""
+    page = fields[0].with_name("gallery.html")
+    program("page", *fields, "-o", page, "--view", "show slice; plane axis=x offset=0.125; color depth", "--cpu")
+    return page
+
+
+@pytest.fixture
+def browser_without_scripts() -> Iterator[Any]:
+    made = started()
+    made.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    yield made
+    made.quit()
+
+
+def source_shown(browser: Any) -> str:
+    """Returns what the shown field was made from, as the page tells it."""
+    return str(browser.execute_script("return [...document.querySelectorAll('#figures dt')].find(t => t.textContent === 'made from').nextSibling.textContent"))
+
+
+def seen_pictures(browser: Any) -> list[str]:
+    """Returns the captions of the pictures that the browser could read and shows."""
+    figures = browser.find_elements("css selector", "#pictures figure")
+    seen = [figure for figure in figures if figure.is_displayed() and int(figure.find_element("tag name", "img").get_property("naturalWidth")) == 400]
+    return [str(figure.find_element("tag name", "figcaption").text) for figure in seen]
+
+
+def expected_captions() -> list[str]:
+    return [f"{name}: {what}" for name in NAMES for what in ("the surface", "the polynomial degrees of the cells in a plane")]
+
+
+def test_each_field_has_a_tab(browser: Any, gallery: pathlib.Path) -> None:
+    opened(browser, gallery)
+    tabs = browser.find_elements("css selector", "nav button")
+    assert [tab.text for tab in tabs] == list(NAMES)
+    assert source_shown(browser) == "builtin:torus"
+    tabs[1].click()
+    package("selenium.webdriver.support.ui").WebDriverWait(browser, 60).until(lambda page: source_shown(page) == "builtin:box")
+    assert rested(browser) == "sharp"
+    assert seen_pictures(browser) == []
+    assert complaints(browser) == []
+
+
+def test_the_first_view_is_the_one_that_was_asked_for(browser: Any, gallery: pathlib.Path) -> None:
+    opened(browser, gallery)
+    lines = browser.find_element("id", "script").get_attribute("value").splitlines()
+    assert "show slice" in lines and "color depth of=slice" in lines
+    assert any(line.startswith("plane axis=x offset=0.125") for line in lines)
+
+
+def test_without_webgl_there_are_pictures(gallery: pathlib.Path) -> None:
+    browser = started("--disable-3d-apis")
+    try:
+        opened(browser, gallery)
+        assert "WebGL 2" in browser.find_element("id", "message").text
+        assert seen_pictures(browser) == expected_captions()
+    finally:
+        browser.quit()
+
+
+def test_without_scripts_there_are_pictures(browser_without_scripts: Any, gallery: pathlib.Path) -> None:
+    browser_without_scripts.get(gallery.as_uri())
+    assert seen_pictures(browser_without_scripts) == expected_captions()
+
+
+def test_a_report_shows_its_field_live_and_prints_pictures(
+    browser: Any, fields: list[pathlib.Path], program: Callable[..., str], tmp_path: pathlib.Path
+) -> None:
+    program("report", fields[0], "-o", tmp_path, "--samples", "1")
+    browser.get((tmp_path / "index.html").as_uri())
+    frame = browser.find_element("css selector", ".live iframe")
+    assert frame.location["y"] < 260, "a reader sees it without scrolling"
+    browser.switch_to.frame(frame)
+    assert rested(browser) == "sharp"
+    assert source_shown(browser) == "builtin:torus"
+    browser.switch_to.default_content()
+    assert browser.find_element("link text", "open alone").get_attribute("href") == (tmp_path / "explorer.html").as_uri()
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        assert not frame.is_displayed()
+        assert [picture.is_displayed() for picture in browser.find_elements("css selector", "figure img")] == [True] * 5
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert complaints(browser) == []
