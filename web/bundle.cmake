@@ -1,5 +1,5 @@
-# Joins the page's modules, styles and shaders to one HTML file, in which {{title}}, {{pictures}} and {{fields}} stand for what the
-# program fills in: cmake -DPAGE=web/page -DSHADERS=shaders -DOUTPUT=page.html -P bundle.cmake
+# Joins the page's modules and shaders to one file, program.html, and its styles and markup to another one, page.html:
+# cmake -DPAGE=web/page -DSHADERS=shaders -DOUTPUT=folder -P bundle.cmake
 #
 # Modules become one script: each name is declared once in all of them, so that imports and exports can be left out. Comments are left
 # out too.
@@ -41,6 +41,5 @@ endforeach()
 file(READ "${PAGE}/page.css" style)
 file(READ "${PAGE}/page.html" page)
 string(REPLACE "{{style}}" "${style}" page "${page}")
-string(REPLACE "{{shaders}}" "${sources}" page "${page}")
-string(REPLACE "{{script}}" "${script}" page "${page}")
-file(WRITE "${OUTPUT}" "${page}")
+file(WRITE "${OUTPUT}/page.html" "${page}")
+file(WRITE "${OUTPUT}/program.html" "${sources}<script type=\"module\">${script}</script>\n")

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from conftest import package, started
-from test_page import complaints, opened, rested
+from pages import complaints, opened, rested
 
 NAMES = ("torus", "box")
 

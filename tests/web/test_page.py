@@ -3,6 +3,7 @@
 import csv
 import io
 import pathlib
+import re
 import subprocess
 from collections.abc import Callable
 from typing import Any
@@ -139,7 +140,7 @@ def test_the_copied_view_is_a_script_of_the_program(browser: Any, field: pathlib
         lines = asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", given)
         assert asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", lines) == lines
         script = tmp_path / f"{name}.hps"
-        script.write_text(f"load {field}\n{lines}\nshot output={tmp_path}/{name}.png\n")
+        script.write_text(f"load {field}\n{lines}\nshow size=320x240\nshot output={tmp_path}/{name}.png\n")
         program("run", script)
         assert (tmp_path / f"{name}.png").stat().st_size > 10_000
 
@@ -208,7 +209,9 @@ def test_the_page_loads_nothing(field: pathlib.Path) -> None:
 def test_the_page_is_small(field: pathlib.Path) -> None:
     text = field.with_suffix(".html").read_text(encoding="utf-8")
     begin, end = payload(text)
-    assert len(text) - (end - begin) < 300_000
+    pictures = sum(map(len, re.findall("data:image/png;base64,[^\"]*", text)))
+    assert pictures > 10_000
+    assert len(text) - (end - begin) - pictures < 150_000
 
 
 def test_types_of_the_modules() -> None:

@@ -112,8 +112,10 @@ void FieldPage::add(const Field& field, const FieldInPage& described, const Prog
 }
 
 std::string FieldPage::html(const std::string& title) const {
-  return filled(web::pageTemplate(),
-                {{"{{title}}", htmlEscaped(title)}, {"{{fields}}", fields_}, {"{{pictures}}", pictures_}});
+  return filled(web::pageTemplate(), {{"{{title}}", htmlEscaped(title)},
+                                      {"{{fields}}", fields_},
+                                      {"{{pictures}}", pictures_},
+                                      {"{{program}}", base64(compressed(std::string(web::pageProgram()), {}))}});
 }
 
 std::vector<PagePicture> fallbackPictures(render::Renderer& renderer, const Field& field, const std::string& name) {
