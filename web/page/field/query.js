@@ -110,9 +110,38 @@ export function evaluateLeaf(field, grid, leaf) {
   return { value, gradient: /** @type {Vector} */ (gradient.map((g, a) => (g * scale * field.grid[a]) / field.size[a])) };
 }
 
+/**
+ * Evaluates the function of a leaf at a point that is not necessarily in it.
+ * @param {Field} field
+ * @param {import("./leaves.js").OctreeNode} leaf
+ * @param {Vector} grid  grid coordinates of the point
+ */
+export function evaluateIn(field, leaf, grid) {
+  const local = /** @type {Vector} */ (grid.map((x, a) => 2 * (x * 2 ** leaf.depth - leaf.cell[a]) - 1));
+  return evaluateLeaf(field, grid, { ...leaf, local });
+}
+
 const kRow = 32;
 const legendre = new Float64Array(3 * kRow);
 const slopes = new Float64Array(3 * kRow);
+
+/**
+ * Writes the Legendre polynomials up to a degree at one coordinate, and their derivatives, to rows of tables.
+ * @param {number} x
+ * @param {number} degree
+ * @param {Float64Array} values
+ * @param {Float64Array} derivatives
+ * @param {number} row  index at which the row begins
+ */
+export function tabulateLegendre(x, degree, values, derivatives, row) {
+  values[row] = 1;
+  derivatives[row] = 0;
+  for (let n = 0; n < degree; ++n) {
+    const before = n > 0 ? values[row + n - 1] : 0;
+    values[row + n + 1] = ((2 * n + 1) * x * values[row + n] - n * before) / (n + 1);
+    derivatives[row + n + 1] = (n > 0 ? derivatives[row + n - 1] : 0) + (2 * n + 1) * values[row + n];
+  }
+}
 
 /**
  * Evaluates Σ c_ijk L_i(u) L_j(v) L_k(w) and its gradient with respect to (u, v, w).
@@ -123,16 +152,7 @@ const slopes = new Float64Array(3 * kRow);
  * @returns {ValueAndGradient}
  */
 export function evaluatePolynomial(c, at, degree, local) {
-  for (let a = 0; a < 3; ++a) {
-    const row = a * kRow;
-    legendre[row] = 1;
-    slopes[row] = 0;
-    for (let n = 0; n < degree; ++n) {
-      const before = n > 0 ? legendre[row + n - 1] : 0;
-      legendre[row + n + 1] = ((2 * n + 1) * local[a] * legendre[row + n] - n * before) / (n + 1);
-      slopes[row + n + 1] = (n > 0 ? slopes[row + n - 1] : 0) + (2 * n + 1) * legendre[row + n];
-    }
-  }
+  for (let a = 0; a < 3; ++a) tabulateLegendre(local[a], degree, legendre, slopes, a * kRow);
   let value = 0, gx = 0, gy = 0, gz = 0;
   let index = at;
   for (let i = 0; i <= degree; ++i) {
