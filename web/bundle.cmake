@@ -7,7 +7,8 @@
 # In an order in which classes come before their use while the script is read.
 set(modules field/vector field/field_file field/payload field/exact_leaf field/leaves field/query
   drawing/camera drawing/bounds drawing/blocks drawing/shaders drawing/colors drawing/view drawing/renderer drawing/cell_lines
-  drawing/painter drawing/pick drawing/viewer panels/dom panels/panels panels/controls page)
+  drawing/painter drawing/pick drawing/viewer panels/dom questions/jumps questions/line_probe questions/line_plot questions/measure
+  panels/panels panels/questions panels/controls page)
 set(shaders field.glsl full_screen.vert leaves_alone.glsl leaves_exact.glsl leaves_polynomial.glsl slice.frag
   surface.glsl surface.vert surface_hit.frag surface_march.frag)
 set(page_shaders drawing/cells.frag drawing/cells.vert drawing/picture.frag drawing/section.frag)
@@ -15,7 +16,7 @@ set(page_shaders drawing/cells.frag drawing/cells.vert drawing/picture.frag draw
 # Reads a file without the lines that hold comments alone.
 function(read_code file result)
   file(READ "${file}" text)
-  string(REGEX REPLACE "\n *(//|/\\*\\*|\\*)[^\n]*" "" text "\n${text}")
+  string(REGEX REPLACE "\n *(//|/\\*\\*|\\*[ /])[^\n]*" "" text "\n${text}")
   string(REGEX REPLACE "\n\n+" "\n" text "${text}")
   set(${result} "${text}" PARENT_SCOPE)
 endfunction()

@@ -7,7 +7,11 @@ import { degreeOf, readField } from "./field/field_file.js";
 import { pickAt } from "./drawing/pick.js";
 import { inflated } from "./field/payload.js";
 import { showFigures, showLegend, showReadout } from "./panels/panels.js";
+import { Questions } from "./panels/questions.js";
 import { query } from "./field/query.js";
+import { FaceMeter, Jumps } from "./questions/jumps.js";
+import { sampleLine } from "./questions/line_probe.js";
+import { distanceBetween, thicknessAt } from "./questions/measure.js";
 import { add, dot, scaled } from "./field/vector.js";
 import { firstView, movePlaneTo, placeOfPlane, planeOf, scriptOf, setPlane, viewFrom } from "./drawing/view.js";
 import { Viewer } from "./drawing/viewer.js";
@@ -71,6 +75,7 @@ class Page {
     if (this.tabs.length === 0) throw new Error("the page holds no field");
     await this.open(this.tab);
     this.controls = new Controls(() => ({ view: this.view, field: this.field, depths: this.viewer.painter.depths }), () => this.changed());
+    this.questions = new Questions(this);
     this.listen();
     this.showTabs();
     const lines = this.tab.script.dataset.view;
@@ -125,6 +130,7 @@ class Page {
       viewer.resize();
     });
     showFigures(this.field);
+    this.questions?.fieldChanged();
     this.changed();
   }
 
@@ -135,6 +141,7 @@ class Page {
     showLegend(this.view, this.viewer.painter);
     element("script", HTMLTextAreaElement).value = scriptOf(this.view, this.field);
     for (const viewer of this.viewers) viewer.changed();
+    this.questions?.viewChanged();
   }
 
   painted() {
@@ -413,7 +420,7 @@ async function start() {
   try {
     await page.start();
     // Tests and curious readers find the page here, with functions to ask it.
-    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled } });
+    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled, Jumps, FaceMeter, sampleLine, thicknessAt, distanceBetween } });
   } catch (error) {
     page.failed(error);
   }

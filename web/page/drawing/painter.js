@@ -93,8 +93,8 @@ export class Painter {
     gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 0, 0);
     /** @type {{cells: View["cells"], ends: number}} */
     this.shownLines = { cells: "none", ends: 0 };
-    /** @type {WebGLTexture | null} */
-    this.cellNumbers = null;
+    /** @type {Map<Quantity, {texture: WebGLTexture, decades: [number, number]}>} */
+    this.cellNumbers = new Map(); // quantities of which each cell has one number
     /** @type {Color} */
     this.paper = [1, 1, 1];
     /** @type {Color} */
@@ -102,7 +102,12 @@ export class Painter {
     this.degrees = levelsOf(field, (node) => degreeOf(field, node));
     this.depths = levelsOf(field, (_, depth) => depth);
     this.range = this.rangeOfDistance();
-    this.scales = { degree: this.levelScale(this.degrees), depth: this.levelScale(this.depths), distance: this.distanceScale() };
+    this.scales = {
+      degree: this.levelScale(this.degrees),
+      depth: this.levelScale(this.depths),
+      distance: this.continuousScale((t) => divergingColor(2 * t - 1)),
+      ordered: this.continuousScale(orderedColor),
+    };
   }
 
   /** A bound of the field's magnitude, for colours. */
@@ -130,10 +135,24 @@ export class Painter {
     return this.scaleTexture(texels);
   }
 
-  distanceScale() {
+  /**
+   * @param {(t: number) => Color} colorAt  for t from 0 to 1
+   */
+  continuousScale(colorAt) {
     const texels = new Float32Array(8 * STEPS);
-    for (let i = 0; i < STEPS; ++i) texels.set(divergingColor((2 * i) / (STEPS - 1) - 1), 4 * (STEPS + i));
+    for (let i = 0; i < STEPS; ++i) texels.set(colorAt(i / (STEPS - 1)), 4 * (STEPS + i));
     return this.scaleTexture(texels);
+  }
+
+  /**
+   * Gives each cell a number of a quantity by which cells can be coloured.
+   * @param {Quantity} quantity
+   * @param {Float32Array} numbers  for each node
+   * @param {[number, number]} decades  powers of ten at the ends of the scale
+   */
+  setCellNumbers(quantity, numbers, decades) {
+    const { renderer, gl } = this;
+    this.cellNumbers.set(quantity, { texture: renderer.texture(gl.R32F, numbers, 1), decades });
   }
 
   /**
@@ -177,12 +196,12 @@ export class Painter {
     const isSlice = view.kind === "slice";
     const quantity = isSlice ? view.sliceColor : view.surfaceColor;
     const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
-      const { mode, texture, range } = this.coloringOf(quantity);
+      const { mode, texture, range, ofCells } = this.coloringOf(quantity);
       colors.bind();
       renderer.checkLinked(coloring);
       gl.useProgram(coloring);
       const at = (/** @type {string} */ name) => renderer.at(coloring, name);
-      this.bindTextures(coloring, { integers: hits.integers, floats: hits.floats, scale: texture, ofCells: this.cellNumbers ?? hits.floats, section: (section ?? hits).integers });
+      this.bindTextures(coloring, { integers: hits.integers, floats: hits.floats, scale: texture, ofCells: ofCells ?? hits.floats, section: (section ?? hits).integers });
       gl.uniform1i(at("isSlice"), isSlice ? 1 : 0);
       gl.uniform1i(at("hasSection"), section ? 1 : 0);
       gl.uniform1i(at("mode"), mode);
@@ -239,9 +258,11 @@ export class Painter {
   /**
    * Returns how a quantity is coloured: the mode of picture.frag, its scale and the range of the scale.
    * @param {Quantity} quantity
-   * @returns {{mode: number, texture: WebGLTexture, range: [number, number]}}
+   * @returns {{mode: number, texture: WebGLTexture, range: [number, number], ofCells?: WebGLTexture}}
    */
   coloringOf(quantity) {
+    const cells = this.cellNumbers.get(quantity);
+    if (cells) return { mode: 4, texture: this.scales.ordered, range: [cells.decades[0] * Math.LN10, cells.decades[1] * Math.LN10], ofCells: cells.texture };
     const range = /** @type {[number, number]} */ ([-this.range, this.range]);
     if (quantity === "depth") return { mode: 2, texture: this.scales.depth, range };
     if (quantity === "distance") return { mode: 3, texture: this.scales.distance, range };

@@ -12,8 +12,8 @@ import { middleOf, movePlaneTo, normalFor, placeOfPlane, placesOfPlane, setPlane
 
 /** @type {Record<View["kind"], [Quantity, string][]>} */
 const COLORS = {
-  surface: [["normal", "lit"], ["degree", "degree"], ["depth", "depth"]],
-  slice: [["degree", "degree"], ["depth", "depth"], ["distance", "distance"]],
+  surface: [["normal", "lit"], ["degree", "degree"], ["depth", "depth"], ["value-jump", "jump of the value"], ["gradient-jump", "jump of the gradient"]],
+  slice: [["degree", "degree"], ["depth", "depth"], ["distance", "distance"], ["value-jump", "jump of the value"], ["gradient-jump", "jump of the gradient"]],
 };
 
 /** Which controls are seen with which view. */

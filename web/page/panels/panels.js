@@ -1,10 +1,12 @@
 // The panels beside the picture: the legend, what is under the pointer, figures of the field.
 
-import { cssColor, divergingColor } from "../drawing/colors.js";
+import { cssColor, divergingColor, orderedColor } from "../drawing/colors.js";
 import { element, setRows, shortNumber } from "./dom.js";
 import { degreeOf, isExact, isLeaf } from "../field/field_file.js";
+import { FaceMeter } from "../questions/jumps.js";
 
 /** @typedef {import("../field/field_file.js").Field} Field */
+/** @typedef {import("../field/field_file.js").Vector} Vector */
 /** @typedef {import("../drawing/painter.js").Levels} Levels */
 /** @typedef {import("../drawing/painter.js").Painter} Painter */
 /** @typedef {import("../drawing/pick.js").Pick} Pick */
@@ -31,14 +33,15 @@ export function showLegend(view, painter) {
   const legend = element("legend", HTMLDivElement);
   element("legend-title", HTMLElement).textContent = TITLES[quantity];
   if (quantity === "normal") legend.replaceChildren();
-  else if (quantity === "distance") legend.replaceChildren(...scaleBar((t) => divergingColor(2 * t - 1), [-painter.range, 0, painter.range]));
+  else if (quantity === "value-jump" || quantity === "gradient-jump") showScaleOfCells(legend, painter, quantity);
+  else if (quantity === "distance") legend.replaceChildren(...scaleBar((t) => divergingColor(2 * t - 1), [-painter.range, 0, painter.range].map(shortNumber)));
   else legend.replaceChildren(...levelRows(quantity === "degree" ? painter.degrees : painter.depths));
 }
 
 /**
  * Returns a bar of a continuous scale, with numbers below it.
  * @param {(t: number) => import("../drawing/colors.js").Color} colorAt  for t from 0 to 1
- * @param {number[]} numbers
+ * @param {string[]} numbers
  */
 export function scaleBar(colorAt, numbers) {
   const bar = document.createElement("div");
@@ -47,12 +50,25 @@ export function scaleBar(colorAt, numbers) {
   bar.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
   const ends = document.createElement("div");
   ends.className = "ends";
-  for (const x of numbers) {
+  for (const number of numbers) {
     const end = document.createElement("span");
-    end.textContent = shortNumber(x);
+    end.textContent = number;
     ends.append(end);
   }
   return [bar, ends];
+}
+
+/**
+ * Shows the logarithmic scale of a quantity of which each cell has one number, once the numbers are known.
+ * @param {HTMLElement} legend
+ * @param {Painter} painter
+ * @param {Quantity} quantity
+ */
+function showScaleOfCells(legend, painter, quantity) {
+  const known = painter.cellNumbers.get(quantity);
+  if (!known) return legend.replaceChildren("being measured …");
+  const [low, high] = known.decades;
+  legend.replaceChildren(...scaleBar(orderedColor, Array.from({ length: high - low + 1 }, (_, n) => `1e${low + n}`.replace("-", "−"))));
 }
 
 /**
@@ -90,6 +106,22 @@ export function showFigures(field) {
   setRows(element("figures", HTMLDListElement), rows);
 }
 
+/** @type {WeakMap<Field, FaceMeter>} */
+const meters = new WeakMap();
+
+/**
+ * Returns rows with the jumps on the face of the cell that is nearest to a point.
+ * @param {Field} field
+ * @param {Vector} point
+ * @returns {[string, string][]}
+ */
+function jumpRows(field, point) {
+  const meter = meters.get(field) ?? new FaceMeter(field);
+  meters.set(field, meter);
+  const jumps = meter.jumpsNear(point);
+  return jumps ? [["jump at nearest face", shortNumber(jumps.value)], ["jump of gradient", shortNumber(jumps.gradient)]] : [];
+}
+
 /**
  * Shows what is under the pointer.
  * @param {Field} field
@@ -106,5 +138,6 @@ export function showReadout(field, pick) {
     ["cell", String(node)],
     ["degree", isExact(field, node) ? "exact" : String(degreeOf(field, node))],
     ["depth", String(depth)],
+    ...jumpRows(field, pick.point),
   ]);
 }
