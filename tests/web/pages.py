@@ -1,6 +1,9 @@
 """What the tests do with pages in a browser."""
 
+import csv
+import io
 import pathlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy
@@ -37,6 +40,17 @@ def complaints(browser: Any) -> list[str]:
     """What the browser logged, but for remarks on its software renderer."""
     remarks = ("software WebGL", "GPU stall due to ReadPixels")
     return [entry["message"] for entry in browser.get_log("browser") if not any(remark in entry["message"] for remark in remarks)]
+
+
+def columns(text: str) -> dict[str, Any]:
+    rows = list(csv.DictReader(io.StringIO(text)))
+    return {name: numpy.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def queried(program: Callable[..., str], field: pathlib.Path, points: Any, folder: pathlib.Path) -> dict[str, Any]:
+    file = folder / "points.txt"
+    file.write_text("\n".join(" ".join(repr(float(x)) for x in point) for point in points))
+    return columns(program("query", field, file))
 
 
 def payload(text: str) -> tuple[int, int]:

@@ -1,7 +1,5 @@
 """The page of a field, in a browser: its values against the program's, its controls by real events, and what is said of damage."""
 
-import csv
-import io
 import pathlib
 import re
 import subprocess
@@ -12,26 +10,15 @@ import numpy
 import pytest
 
 from conftest import package, started
-from pages import applied, asked, complaints, opened, payload, rested, shown_pixels
+from pages import applied, asked, complaints, opened, payload, queried, rested, shown_pixels
 
 ROOT = pathlib.Path(__file__).parents[2]
 SIZE = (400, 300)
 
 
-def columns(text: str) -> dict[str, Any]:
-    rows = list(csv.DictReader(io.StringIO(text)))
-    return {name: numpy.array([float(row[name]) for row in rows]) for name in rows[0]}
-
-
 def points_in(browser: Any, count: int) -> Any:
     lower, upper = asked(browser, "return [field.lower, field.upper]")
     return numpy.random.default_rng(1).uniform(lower, upper, (count, 3))
-
-
-def queried(program: Callable[..., str], field: pathlib.Path, points: Any, folder: pathlib.Path) -> dict[str, Any]:
-    file = folder / "points.txt"
-    file.write_text("\n".join(" ".join(repr(float(x)) for x in point) for point in points))
-    return columns(program("query", field, file))
 
 
 def test_values_and_gradients_equal_those_of_the_program(
