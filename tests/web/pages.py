@@ -33,7 +33,7 @@ def applied(browser: Any, lines: str) -> None:
 
 def asked(browser: Any, script: str, *arguments: Any) -> Any:
     """Runs a script with the page's functions."""
-    return browser.execute_script("const {page, field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled} = hpsdf;" + script, *arguments)
+    return browser.execute_script("const {page, field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled, cellErrors, forEachLeaf} = hpsdf;" + script, *arguments)
 
 
 def complaints(browser: Any) -> list[str]:

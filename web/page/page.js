@@ -5,10 +5,12 @@ import { Controls } from "./panels/controls.js";
 import { element, setChoices } from "./panels/dom.js";
 import { degreeOf, readField } from "./field/field_file.js";
 import { pickAt } from "./drawing/pick.js";
+import { forEachLeaf } from "./field/leaves.js";
 import { inflated } from "./field/payload.js";
 import { showFigures, showLegend, showReadout } from "./panels/panels.js";
 import { Questions } from "./panels/questions.js";
 import { query } from "./field/query.js";
+import { cellErrors } from "./questions/cell_numbers.js";
 import { FaceMeter, Jumps } from "./questions/jumps.js";
 import { sampleLine } from "./questions/line_probe.js";
 import { distanceBetween, thicknessAt } from "./questions/measure.js";
@@ -137,11 +139,11 @@ class Page {
   /** Shows the state of the view, which something has changed. */
   changed() {
     document.body.dataset.state = "changing";
+    this.questions?.viewChanged();
     this.controls?.show();
     showLegend(this.view, this.viewer.painter);
     element("script", HTMLTextAreaElement).value = scriptOf(this.view, this.field);
     for (const viewer of this.viewers) viewer.changed();
-    this.questions?.viewChanged();
   }
 
   painted() {
@@ -266,11 +268,20 @@ class Page {
 
   /**
    * @param {Viewer} viewer
+   * @param {Pick | null} pick
+   */
+  readOut(viewer, pick) {
+    const other = this.tabs.find((tab) => tab.viewer && tab.viewer !== viewer && this.viewers.includes(tab.viewer));
+    showReadout(viewer.field, pick, other?.viewer ? { name: other.name, field: other.viewer.field } : null);
+  }
+
+  /**
+   * @param {Viewer} viewer
    * @param {PointerEvent} event
    */
   move(viewer, event) {
     const before = this.pointers.get(event.pointerId);
-    if (!before) return showReadout(viewer.field, viewer.pick(event.clientX, event.clientY));
+    if (!before) return this.readOut(viewer, viewer.pick(event.clientX, event.clientY));
     const dx = event.clientX - before.x, dy = event.clientY - before.y;
     this.moved += Math.abs(dx) + Math.abs(dy);
     const { clientWidth: width, clientHeight: height } = viewer.canvas;
@@ -301,7 +312,7 @@ class Page {
     this.pointers.delete(event.pointerId);
     const pick = this.moved < 4 ? viewer.pick(event.clientX, event.clientY) : null;
     if (!pick) return;
-    showReadout(viewer.field, pick);
+    this.readOut(viewer, pick);
     this.onPick?.(pick);
   }
 
@@ -420,7 +431,7 @@ async function start() {
   try {
     await page.start();
     // Tests and curious readers find the page here, with functions to ask it.
-    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled, Jumps, FaceMeter, sampleLine, thicknessAt, distanceBetween } });
+    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled, cellErrors, forEachLeaf, Jumps, FaceMeter, sampleLine, thicknessAt, distanceBetween } });
   } catch (error) {
     page.failed(error);
   }

@@ -10,10 +10,12 @@ import { middleOf, movePlaneTo, normalFor, placeOfPlane, placesOfPlane, setPlane
 /** @typedef {import("../drawing/view.js").View} View */
 /** @typedef {import("../drawing/painter.js").Levels} Levels */
 
+/** @type {[Quantity, string][]} */
+const COLORS_OF_CELLS = [["value-jump", "jump of the value"], ["gradient-jump", "jump of the gradient"], ["cell-error", "estimated error"]];
 /** @type {Record<View["kind"], [Quantity, string][]>} */
 const COLORS = {
-  surface: [["normal", "lit"], ["degree", "degree"], ["depth", "depth"], ["value-jump", "jump of the value"], ["gradient-jump", "jump of the gradient"]],
-  slice: [["degree", "degree"], ["depth", "depth"], ["distance", "distance"], ["value-jump", "jump of the value"], ["gradient-jump", "jump of the gradient"]],
+  surface: [["normal", "lit"], ["degree", "degree"], ["depth", "depth"], ...COLORS_OF_CELLS],
+  slice: [["degree", "degree"], ["depth", "depth"], ["distance", "distance"], ...COLORS_OF_CELLS],
 };
 
 /** Which controls are seen with which view. */

@@ -3,6 +3,7 @@
 import { cssColor, divergingColor, orderedColor } from "../drawing/colors.js";
 import { element, setRows, shortNumber } from "./dom.js";
 import { degreeOf, isExact, isLeaf } from "../field/field_file.js";
+import { query } from "../field/query.js";
 import { FaceMeter } from "../questions/jumps.js";
 
 /** @typedef {import("../field/field_file.js").Field} Field */
@@ -21,7 +22,7 @@ const TITLES = {
   distance: "distance",
   "value-jump": "greatest jump of the value",
   "gradient-jump": "greatest jump of the gradient",
-  "cell-error": "bound of the error",
+  "cell-error": "estimated RMS error of the cell",
 };
 
 /**
@@ -33,7 +34,7 @@ export function showLegend(view, painter) {
   const legend = element("legend", HTMLDivElement);
   element("legend-title", HTMLElement).textContent = TITLES[quantity];
   if (quantity === "normal") legend.replaceChildren();
-  else if (quantity === "value-jump" || quantity === "gradient-jump") showScaleOfCells(legend, painter, quantity);
+  else if (quantity === "value-jump" || quantity === "gradient-jump" || quantity === "cell-error") showScaleOfCells(legend, painter, quantity);
   else if (quantity === "distance") legend.replaceChildren(...scaleBar((t) => divergingColor(2 * t - 1), [-painter.range, 0, painter.range].map(shortNumber)));
   else legend.replaceChildren(...levelRows(quantity === "degree" ? painter.degrees : painter.depths));
 }
@@ -123,11 +124,12 @@ function jumpRows(field, point) {
 }
 
 /**
- * Shows what is under the pointer.
+ * Shows what is under the pointer, and what the other field beside it has there.
  * @param {Field} field
  * @param {Pick | null} pick
+ * @param {{name: string, field: Field} | null} other
  */
-export function showReadout(field, pick) {
+export function showReadout(field, pick, other) {
   const list = element("readout", HTMLDListElement);
   if (!pick) return setRows(list, [["", "nothing"]]);
   const { node, depth } = pick.leaf;
@@ -139,5 +141,21 @@ export function showReadout(field, pick) {
     ["degree", isExact(field, node) ? "exact" : String(degreeOf(field, node))],
     ["depth", String(depth)],
     ...jumpRows(field, pick.point),
+    ...(other ? otherRows(pick, other) : []),
   ]);
 }
+
+/**
+ * @param {Pick} pick
+ * @param {{name: string, field: Field}} other
+ * @returns {[string, string][]}
+ */
+function otherRows({ point, value }, { name, field }) {
+  const found = query(field, point);
+  if (!found) return [[`value in ${name}`, "outside"]];
+  return [
+    [`value in ${name}`, shortNumber(found.value)],
+    ["difference", shortNumber(found.value - value)],
+  ];
+}
+

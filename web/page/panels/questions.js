@@ -2,6 +2,7 @@
 
 import { axisVector, diagonalOf } from "../drawing/camera.js";
 import { element, setRows, shortNumber } from "./dom.js";
+import { cellErrors, decadesOf } from "../questions/cell_numbers.js";
 import { Jumps } from "../questions/jumps.js";
 import { linePlot } from "../questions/line_plot.js";
 import { sampleLine, scriptOfProbe } from "../questions/line_probe.js";
@@ -67,11 +68,17 @@ class WorstPanel {
     });
   }
 
-  /** Measures the jumps where the colours of the view need them. */
+  /** Measures jumps and errors where the colours of the view need them. */
   measureForColors() {
     const { view, viewers } = this.host;
     const quantity = view.kind === "slice" ? view.sliceColor : view.surfaceColor;
     if (quantity === "value-jump" || quantity === "gradient-jump") viewers.forEach((viewer) => this.measure(viewer));
+    if (quantity !== "cell-error") return;
+    for (const { field, painter } of viewers) {
+      if (painter.cellNumbers.has(quantity)) continue;
+      const errors = cellErrors(field);
+      painter.setCellNumbers(quantity, errors, decadesOf(field, errors));
+    }
   }
 
   /**
@@ -85,7 +92,7 @@ class WorstPanel {
     const portion = () => {
       if (!jumps.run(PORTION)) setTimeout(portion);
       else {
-        for (const kind of JUMP_KINDS) viewer.painter.setCellNumbers(`${kind}-jump`, jumps.ofCells[kind], jumps.decades(kind));
+        for (const kind of JUMP_KINDS) viewer.painter.setCellNumbers(`${kind}-jump`, jumps.ofCells[kind], decadesOf(viewer.field, jumps.ofCells[kind]));
         this.host.changed();
       }
       if (viewer === this.host.viewer) this.show();

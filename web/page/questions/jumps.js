@@ -467,31 +467,6 @@ export class Jumps {
   }
 
   /**
-   * Returns powers of ten at the ends of a scale for colours of cells. The lowest 1 % and the highest 0.1 % of the volume do not count,
-   * and the scale has at most six decades.
-   * @param {JumpKind} kind
-   * @returns {[number, number]}
-   */
-  decades(kind) {
-    /** @type {Map<number, number>} */
-    const volumes = new Map();
-    let total = 0;
-    this.ofCells[kind].forEach((jump, node) => {
-      if (!(jump > 0)) return;
-      const volume = 8 ** -this.depthOfNode[node];
-      const decade = Math.floor(Math.log10(jump));
-      volumes.set(decade, (volumes.get(decade) ?? 0) + volume);
-      total += volume;
-    });
-    const quantile = (/** @type {number} */ share) => {
-      let sum = 0;
-      return [...volumes.keys()].sort((a, b) => a - b).find((decade) => (sum += volumes.get(decade) ?? 0) > share * total) ?? -1;
-    };
-    const top = quantile(0.999) + 1;
-    return [Math.min(Math.max(quantile(0.01), top - 6), top - 1), top];
-  }
-
-  /**
    * @param {number} n
    * @returns {Interface}
    */
