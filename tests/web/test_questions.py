@@ -50,7 +50,7 @@ def at_surface(program: Program, field: pathlib.Path, table: dict[str, Any], fol
 def test_jumps_equal_those_of_the_program(browser: Any, field: pathlib.Path, program: Program, tmp_path: pathlib.Path) -> None:
     opened(browser, field.with_suffix(".html"))
     measured(browser)
-    rows = asked(browser, "return jumps.cells.map((_, n) => { const f = jumps.at(n); return [...f.cells, f.axis, f.value, f.gradient, ...f.worst, +f.isAtSurface, +f.isTorn]; })")
+    rows = asked(browser, "return jumps.axes.map((_, n) => { const f = jumps.at(n); return [...f.cells, f.axis, f.value, f.gradient, ...f.worst, +f.isAtSurface, +f.isTorn]; })")
     ours = numpy.array(rows)
     theirs = interfaces(program, field, tmp_path)
     assert (ours[:, :3] == vectors(theirs, ("cell0", "cell1", "axis"))).all(), "the same interfaces in the same order"

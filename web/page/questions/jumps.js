@@ -399,10 +399,11 @@ export class Jumps {
     this.share = 0; // done so far, from 0 to 1
     /** @type {Record<JumpKind, number[]>} */
     this.jumps = { value: [], gradient: [] };
-    /** @type {[number, number][]} */
-    this.cells = [];
-    /** @type {Vector[]} */
-    this.worstPoints = [];
+    // Plain lists of numbers, because a million small arrays would keep the garbage collector busy.
+    /** @type {number[]} */
+    this.cells = []; // two for each interface
+    /** @type {number[]} */
+    this.worstPoints = []; // three coordinates for each
     /** @type {number[]} */
     this.axes = [];
     /** @type {number[]} */
@@ -416,7 +417,7 @@ export class Jumps {
   }
 
   get count() {
-    return this.cells.length;
+    return this.axes.length;
   }
 
   /**
@@ -453,10 +454,11 @@ export class Jumps {
    */
   append({ small, large, axis, step }, meter) {
     const { value, gradient, worst } = meter;
-    this.cells.push(step > 0 ? [small.node, large.node] : [large.node, small.node]);
+    if (step > 0) this.cells.push(small.node, large.node);
+    else this.cells.push(large.node, small.node);
     this.axes.push(axis);
     this.depths.push(small.depth);
-    this.worstPoints.push(worst);
+    this.worstPoints.push(...worst);
     this.jumps.value.push(value);
     this.jumps.gradient.push(gradient);
     this.values.push(Math.abs(query(this.field, worst)?.value ?? Infinity));
@@ -472,8 +474,10 @@ export class Jumps {
    */
   at(n) {
     const value = this.jumps.value[n];
+    const [lower, upper] = this.cells.slice(2 * n, 2 * n + 2);
+    const worst = /** @type {Vector} */ (this.worstPoints.slice(3 * n, 3 * n + 3));
     return {
-      cells: this.cells[n], axis: this.axes[n], depth: this.depths[n], worst: this.worstPoints[n], value, gradient: this.jumps.gradient[n],
+      cells: [lower, upper], axis: this.axes[n], depth: this.depths[n], worst, value, gradient: this.jumps.gradient[n],
       isAtSurface: this.isAtSurface(n), isTorn: this.values[n] < value,
     };
   }
