@@ -34,6 +34,7 @@ from ._hpsdf import (
     sample,
 )
 from . import _notebook
+from ._pages import Page, show
 from ._pictures import Picture, Session, probe, render, run, verify
 from ._pictures import slice as slice
 
@@ -50,6 +51,7 @@ __all__ = [
     "LimitError",
     "MeshError",
     "OptionError",
+    "Page",
     "Picture",
     "Samples",
     "Session",
@@ -64,6 +66,7 @@ __all__ = [
     "render",
     "run",
     "sample",
+    "show",
     "verify",
 ]
 

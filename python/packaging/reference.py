@@ -18,7 +18,7 @@ GROUPS = {
     "Meshes and exact distances": ["load_mesh", "TriangleMesh", "ExactDistance", "ClosestPoints", "combine", "CombinedDistance"],
     "Fields": ["build", "load", "Field", "jumps", "verify"],
     "Samples": ["sample", "Samples"],
-    "Pictures and scripts": ["render", "slice", "probe", "Picture", "Session", "run"],
+    "Pictures and scripts": ["render", "slice", "probe", "show", "Page", "Picture", "Session", "run"],
     "Errors": ["Error", "OptionError", "FileError", "MeshError", "FieldError", "LimitError", "ExpectationError"],
 }
 
@@ -36,7 +36,7 @@ def text() -> str:
     left = {*hpsdf.__all__, "slice"} - named - {"__version__"}
     if left:
         raise SystemExit(f"reference.py: no group has {', '.join(sorted(left))}")
-    declared = {**_declared("_pictures.py"), **_declared("_hpsdf.pyi"), **_declared("_pictures.py", "Session", "Picture")}
+    declared = {**_declared("_pictures.py"), **_declared("_pages.py"), **_declared("_hpsdf.pyi"), **_declared("_pictures.py", "Session", "Picture")}
     parts = [START]
     for title, names in GROUPS.items():
         parts.append(f"## {title}\n")

@@ -245,5 +245,6 @@ def test_notebooks_show_fields_and_meshes(mesh: hpsdf.TriangleMesh, field: hpsdf
 
 def test_help_lists_the_options() -> None:
     assert "camera: " in str(hpsdf.render.__doc__) and "max_rms: " in str(hpsdf.verify.__doc__)
-    for function in (hpsdf.render, hpsdf.slice, hpsdf.probe, hpsdf.verify):
+    assert "title: " in str(hpsdf.show.__doc__)
+    for function in (hpsdf.render, hpsdf.slice, hpsdf.probe, hpsdf.verify, hpsdf.show):
         assert "\noutput: " not in str(function.__doc__) and "    field: " not in str(function.__doc__)

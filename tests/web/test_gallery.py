@@ -1,5 +1,6 @@
 """Pages of several fields, pictures for browsers that cannot show fields, and the pages of other commands that show fields."""
 
+import html
 import pathlib
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -84,6 +85,18 @@ def test_without_webgl_there_are_pictures(gallery: pathlib.Path) -> None:
 def test_without_scripts_there_are_pictures(browser_without_scripts: Any, gallery: pathlib.Path) -> None:
     browser_without_scripts.get(gallery.as_uri())
     assert seen_pictures(browser_without_scripts) == expected_captions()
+
+
+@pytest.mark.parametrize("sandbox", ["", 'sandbox="allow-scripts"'])
+def test_a_page_works_in_the_frame_of_a_notebook(browser: Any, gallery: pathlib.Path, tmp_path: pathlib.Path, sandbox: str) -> None:
+    text = html.escape(gallery.read_text(encoding="utf-8"))
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f'<!doctype html><meta charset="utf-8"><iframe srcdoc="{text}" {sandbox} width="600" height="400"></iframe>', encoding="utf-8")
+    browser.get(notebook.as_uri())
+    browser.switch_to.frame(browser.find_element("tag name", "iframe"))
+    assert rested(browser) == "sharp"
+    assert source_shown(browser) == "builtin:torus"
+    assert complaints(browser) == []
 
 
 def test_a_report_shows_its_field_live_and_prints_pictures(

@@ -59,10 +59,11 @@ void checkPage(const Arguments& arguments) {
   const std::vector<std::string> names = arguments.texts("name");
   const std::size_t fields = std::max(arguments.texts("field").size(), std::size_t{1});
   if (!names.empty() && names.size() != fields)
-    throw Error(fmt::format("name: given {} times for {}; give one for each field", names.size(),
+    throw Error(ErrorKind::option, "name",
+                fmt::format("given {} times for {}; give one for each field", names.size(),
                             countOf(fields, "field", "fields")));
   if (std::set<std::string>(names.begin(), names.end()).size() < names.size())
-    throw Error("name: two fields have the same; give them different ones");
+    throw Error(ErrorKind::option, "name", "two fields have the same; give them different ones");
 }
 
 void runPage(Session& session, const Arguments& arguments) {
