@@ -1,12 +1,15 @@
 // Tests `hpsdf check` and `hpsdf accept` on small folders: each kind of failure must be found and named.
 #include "check/check.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <string>
@@ -131,24 +134,73 @@ TEST_F(Check, aWrongPictureIsShownWithItsDifference) {
                             HasSubstr("--only looks"), HasSubstr("hpsdf accept")));
 }
 
-TEST_F(Check, thePageNeedsNoOtherFile) {
+TEST_F(Check, thePageHoldsItsPictures) {
   script(kBuild + kLook + "output=$out/a.png\n" + kLook + "output=\"$out/<b>&.png\"\n", "a&b");
   take({"a&b/a.png", "a&b/<b>&.png"});
   script(kBuild + kLook + "offset=0.2 output=$out/a.png\n" + kLook + "offset=0.2 output=\"$out/<b>&.png\"\n", "a&b");
   EXPECT_EQ(check({"--junit", folder_ / "junit.xml", "note=<i>"}).status, 1);
   const std::string html = page();
-  const std::regex image("src=\"([^\"]{0,30})");
+  const std::regex image("<img src=\"([^\"]{0,30})");
   std::size_t images = 0;
   for (std::sregex_iterator at(html.begin(), html.end(), image), end; at != end; ++at, ++images)
     EXPECT_THAT((*at)[1].str(), testing::StartsWith("data:image/png;base64,"));
   EXPECT_EQ(images, 6u) << "baseline, actual and difference, each once";
   EXPECT_THAT(html, AllOf(Not(HasSubstr("http")), Not(HasSubstr("<b>")), Not(HasSubstr("<i>")), Not(HasSubstr("a&b")),
-                          HasSubstr("a&amp;b/&lt;b&gt;&amp;.png: differs")));
+                          HasSubstr("a&amp;b/&lt;b&gt;&amp;.png: differs"),
+                          HasSubstr("<iframe src=\"live/a%26b/%3Cb%3E%26.png.html\"")));
   const std::string png = readFile(results_ / "actual/a&b/a.png");
   EXPECT_EQ(png.substr(1, 3), "PNG");
   EXPECT_THAT(html, HasSubstr("base64,iVBORw0KGgo")) << "how every PNG begins";
   EXPECT_TRUE(isWellFormed(readFile(folder_ / "junit.xml"))) << readFile(folder_ / "junit.xml");
   EXPECT_THAT(readFile(folder_ / "junit.xml"), HasSubstr("name=\"&lt;b&gt;&amp;.png\""));
+}
+
+/// Returns the view that a page of a field shows first.
+std::string firstView(const std::string& page) {
+  const std::size_t begin = page.find("data-view=\"") + std::string_view("data-view=\"").size();
+  return page.substr(begin, page.find('"', begin) - begin);
+}
+
+TEST_F(Check, failedPicturesHaveAPageOfTheirFieldInTheirView) {
+  script(kBuild + kLook + "output=$out/good.png\n" + kLook + "axis=x offset=$at color=depth output=$out/slice.png\n" +
+         kLook + "output=$out/values.csv\n" +
+         "render cpu=true size=96x64 camera=40,20,1.1 clip=y clip-offset=$at output=$out/surface.png\n"
+         "probe from=0,0,0 to=$at,0,0 size=96x64 output=$out/line.png\n"
+         "build analytic:torus target-error=1e-1 grid=2\nshow slice size=160x120 cpu=true\nplane axis=y offset=$at\n"
+         "color slope\nshot output=$out/shot.png\nbuild analytic:box target-error=1e-1 grid=2\n");
+  EXPECT_EQ(check({"at=0.25"}).status, 1);
+  ASSERT_EQ(accept({"looks/good.png", "looks/slice.png", "looks/values.csv", "looks/surface.png", "looks/line.png",
+                    "looks/shot.png"})
+                .status,
+            0);
+  ASSERT_EQ(check({"at=0.25"}).status, 0);
+  EXPECT_FALSE(fs::exists(results_ / "live")) << "no picture failed";
+  EXPECT_THAT(page(), Not(HasSubstr("<iframe")));
+  std::map<std::string, std::string> live;
+  const Json json = Json::parse(check({"at=0.5", "--json"}).out);
+  for (const Json& item : json.at("items"))
+    if (!item.at("live").is_null()) live[item.at("picture")] = readFile(item.at("live").get<std::string>());
+  ASSERT_EQ(live.size(), 3u) << "the line is no view of the field, and the others agree";
+  EXPECT_EQ(firstView(live.at("slice.png")),
+            "show slice\nplane axis=x offset=0.5 zoom=1 target=center\ncolor depth of=slice\n");
+  EXPECT_EQ(firstView(live.at("surface.png")),
+            "show surface\ncamera 40,20,1.1 target=center up=y projection=perspective\n"
+            "surface offset=0 clip=y clip-offset=0.5\ncells none depths=all\ncolor normal of=surface\n");
+  EXPECT_THAT(firstView(live.at("shot.png")),
+              AllOf(HasSubstr("show slice "), HasSubstr("plane axis=y offset=0.5 "), Not(HasSubstr("color slope"))));
+  EXPECT_THAT(live.at("slice.png"), HasSubstr("data-name=\"sphere\""));
+  EXPECT_THAT(live.at("shot.png"), HasSubstr("data-name=\"torus\"")) << "the field may be replaced later";
+  EXPECT_THAT(page(), HasSubstr("<iframe src=\"live/looks/shot.png.html\""));
+  EXPECT_EQ(check({"at=0.25"}).status, 0);
+  EXPECT_FALSE(fs::exists(results_ / "live")) << "results of an earlier check are removed";
+}
+
+TEST_F(Check, noMoreThanFourPagesOfFieldsAScript) {
+  std::string text = kBuild;
+  for (int n = 0; n < 6; ++n) text += kLook + fmt::format("output=$out/{}.png\n", n);
+  script(text);
+  EXPECT_EQ(check().status, 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(results_ / "live/looks"), fs::directory_iterator()), 4);
 }
 
 TEST_F(Check, anotherSizeAndMissingAndOrphanedBaselinesFail) {

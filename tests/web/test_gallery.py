@@ -1,7 +1,9 @@
 """Pages of several fields, pictures for browsers that cannot show fields, and the pages of other commands that show fields."""
 
 import html
+import os
 import pathlib
+import subprocess
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -117,4 +119,24 @@ def test_a_report_shows_its_field_live_and_prints_pictures(
         assert [picture.is_displayed() for picture in browser.find_elements("css selector", "figure img")] == [True] * 5
     finally:
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert complaints(browser) == []
+
+
+def test_a_failed_check_lets_one_look_into_the_field(browser: Any, tmp_path: pathlib.Path) -> None:
+    script = tmp_path / "pictures" / "scripts" / "looks.hps"
+    script.parent.mkdir(parents=True)
+    script.write_text("build builtin:torus target-error=1e-3; slice axis=y offset=0.25 color=depth size=160x120 cpu=true output=$out/a.png")
+    results = tmp_path / "results"
+    checked = subprocess.run([os.environ["HPSDF_PROGRAM"], "check", script.parents[1], "--out", results], capture_output=True)
+    assert checked.returncode == 1, "there is no baseline"
+    browser.get((results / "index.html").as_uri())
+    details = browser.find_element("css selector", "details.live")
+    details.find_element("tag name", "summary").click()
+    browser.execute_script("arguments[0].scrollIntoView()", details)
+    browser.switch_to.frame(details.find_element("tag name", "iframe"))
+    package("selenium.webdriver.support.ui").WebDriverWait(browser, 60).until(lambda page: page.find_elements("id", "script"))
+    assert rested(browser) == "sharp"
+    assert source_shown(browser) == "builtin:torus"
+    lines = browser.find_element("id", "script").get_attribute("value")
+    assert "show slice" in lines and "plane axis=y offset=0.25" in lines and "color depth of=slice" in lines
     assert complaints(browser) == []

@@ -18,6 +18,7 @@
 #include "hpsdf/detail/nearest_name.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/render/compare.h"
+#include "pictures/field_page.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -27,6 +28,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kWorstPixels = 10;
+constexpr int kMostPages = 4;  // of fields that drew failed pictures of a script, because each takes megabytes
 
 void setVerdict(CheckedItem& item, Verdict verdict, const std::string& problem) {
   item.verdict = verdict;
@@ -164,6 +166,7 @@ class ScriptCheck {
     fs::file_time_type time;
     std::string where;
     std::string renderer;
+    fs::path live;
   };
 
   void runCalls(const Registry& registry, const Console& console) {
@@ -194,13 +197,40 @@ class ScriptCheck {
   }
 
   /// Records for each picture or raw-value file which command of the script wrote it.
-  void notePictures(const Session& session, const Call& call) {
+  void notePictures(Session& session, const Call& call) {
     for (const std::string& picture : comparableFiles(actual_)) {
       const auto time = fs::last_write_time(actual_ / picture);
       const auto known = origins_.find(picture);
-      if (known == origins_.end() || known->second.time != time)
-        origins_[picture] = {time, call.where, session.lastRenderer()};
+      if (known != origins_.end() && known->second.time == time) continue;
+      origins_[picture] = {time, call.where, session.lastRenderer(), {}};
+      if (call.command->view && keptPages_ < kMostPages && !agrees(picture))
+        origins_[picture].live = keptField(session, call, picture);
     }
+  }
+
+  CheckedItem itemOf(const std::string& picture) const {
+    return {.script = name_, .picture = picture, .baseline = baselines_ / picture, .actual = actual_ / picture};
+  }
+
+  bool agrees(const std::string& picture) const {
+    CheckedItem item = itemOf(picture);
+    judge(item);
+    return item.verdict == Verdict::passed;
+  }
+
+  /// Writes a page of the current field in the view that the command has drawn, because a later command may replace the
+  /// field. Returns its path within the folder of the results, or "" if pages cannot show the field.
+  fs::path keptField(Session& session, const Call& call, const std::string& picture) {
+    const CurrentField& current = session.current();
+    if (!refusal(current.field).empty()) return {};
+    FieldPage page;
+    page.add(current.field,
+             {.name = plainName(current.name), .view = pageView(call.command->view(session, call.arguments))});
+    const fs::path file = fs::path("live") / name_ / (picture + ".html");
+    fs::create_directories((request_.output / file).parent_path());
+    writeTextFile(request_.output / file, page.html(name_ + "/" + picture));
+    ++keptPages_;
+    return file;
   }
 
   /// Compares the deliberately wrong files that a command has just written with the baselines of the same names.
@@ -231,14 +261,13 @@ class ScriptCheck {
     std::set<std::string> pictures = comparableFiles(actual_);
     if (completed) pictures.merge(comparableFiles(baselines_));
     for (const std::string& picture : pictures) {
-      judged.push_back({.script = name_,
-                        .picture = picture,
-                        .renderer = origins_[picture].renderer,
-                        .where = origins_[picture].where,
-                        .baseline = baselines_ / picture,
-                        .actual = actual_ / picture,
-                        .difference = request_.output / "difference" / name_ / picture});
-      judge(judged.back());
+      CheckedItem item = itemOf(picture);
+      item.renderer = origins_[picture].renderer;
+      item.where = origins_[picture].where;
+      item.live = origins_[picture].live;
+      item.difference = request_.output / "difference" / name_ / picture;
+      judge(item);
+      judged.push_back(item);
     }
     items_.insert(items_.begin(), judged.begin(), judged.end());
     if (items_.empty()) items_.push_back({.script = name_, .where = file_});  // a script without pictures is listed too
@@ -249,6 +278,7 @@ class ScriptCheck {
   std::string file_;
   fs::path baselines_, actual_, wrong_;
   std::map<std::string, Origin> origins_;
+  int keptPages_ = 0;
   std::vector<CheckedItem> items_;
 };
 
@@ -294,7 +324,7 @@ void prepareOutput(const fs::path& path) {
   OutputFolder folder(path);
   folder.requireOwn(kCheckResults);
   folder.startAnew(kCheckResults, [](const std::string& name) {
-    return name == "actual" || name == "difference" || name == "wrong" || name == "index.html";
+    return name == "actual" || name == "difference" || name == "wrong" || name == "live" || name == "index.html";
   });
 }
 

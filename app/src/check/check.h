@@ -53,6 +53,8 @@ struct CheckedItem {
   std::filesystem::path baseline = {};    ///< path of the accepted file, which may be missing
   std::filesystem::path actual = {};      ///< path of the new file, which may be missing
   std::filesystem::path difference = {};  ///< path of a picture of the differences; "" for none
+  /// Page of the field that drew the file, in the same view, relative to the folder of the results; "" for none.
+  std::filesystem::path live = {};
   std::vector<WorstDifference> worst = {};
 
   /// Returns the name of the item: "gallery/degree.png" for a picture, or "gallery" if the item is the script itself.

@@ -26,7 +26,7 @@ std::string folderId(const fs::path& folder) { return fs::weakly_canonical(folde
 
 // The implementation of the command `check`.
 
-Json itemJson(const CheckedItem& item) {
+Json itemJson(const CheckedItem& item, const fs::path& output) {
   return {{"script", item.script},
           {"picture", item.picture},
           {"control_line", item.controlLine == 0 ? Json() : Json(item.controlLine)},
@@ -39,12 +39,13 @@ Json itemJson(const CheckedItem& item) {
           {"budget", item.budget},
           {"renderer", item.renderer},
           {"baseline_renderer", item.baselineRenderer},
-          {"written_by", item.where}};
+          {"written_by", item.where},
+          {"live", item.live.empty() ? Json() : Json((output / item.live).string())}};
 }
 
 Json outcomeJson(const CheckOutcome& outcome, const CheckRequest& request) {
   Json items = Json::array();
-  for (const CheckedItem& item : outcome.items) items.push_back(itemJson(item));
+  for (const CheckedItem& item : outcome.items) items.push_back(itemJson(item, request.output));
   return {{"folder", folderId(request.folder)},
           {"page", (request.output / "index.html").string()},
           {"version", versionText()},

@@ -69,7 +69,11 @@ std::string checkCommand(const CheckRequest& request) {
 std::string failure(const CheckedItem& item, const CheckRequest& request) {
   std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", htmlEscaped(item.title()),
                                  verdictText(item.verdict), htmlEscaped(item.problem));
-  html += pictures(item) + worstDifferences(item);
+  html += pictures(item);
+  if (!item.live.empty())
+    html += "<details class=\"live\">\n<summary>Look into the field that drew the actual picture</summary>\n" +
+            liveFrame(item.live.string()) + "</details>\n";
+  html += worstDifferences(item);
   const std::pair<const char*, std::string> facts[] = {{"Differing", shareText(item)},
                                                        {"Written by", item.where},
                                                        {"Renderer of the baseline", item.baselineRenderer},
@@ -125,7 +129,7 @@ std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request) 
                                    ? fmt::format("All {} comparisons are as they should be", outcome.items.size())
                                    : fmt::format("{} of {} comparisons failed", failures, outcome.items.size());
   std::string html = htmlHead("Check of " + request.folder.string(), subtitle,
-                              std::string(kPictureRowStyle) + std::string(kCheckStyle));
+                              std::string(kPictureRowStyle) + std::string(kLiveStyle) + std::string(kCheckStyle));
   html += "<h2>All comparisons</h2>\n" + overview(outcome);
   html += fmt::format("<code>{}</code>\n", htmlEscaped(checkCommand(request)));
   for (const CheckedItem& item : outcome.items)

@@ -272,6 +272,7 @@ void addFieldAndShotCommands(Registry& registry) {
       .parameters = {{"output", outputFile().as('o').required(), "*.png."}},
       .action = runShot,
       .draw = drawShot,
+      .view = [](Session& session, const Arguments&) { return scriptOf(explorerOf(session).view()); },
       .drawsOnCpuBy = "'show cpu=true'",
   });
 }

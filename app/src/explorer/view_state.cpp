@@ -23,13 +23,6 @@ std::string planeLine(const ViewState& view) {
                             view.sliceTarget ? textOf(*view.sliceTarget) : "center", wordOrNone(view.operands));
 }
 
-std::string cameraLine(const render::OrbitCamera& camera) {
-  return fmt::format("camera {},{},{} target={} up={} projection={}\n", camera.azimuthDegrees, camera.elevationDegrees,
-                     camera.distance, camera.target ? textOf(*camera.target) : "center",
-                     camera.up == render::UpAxis::y ? "y" : "z",
-                     camera.projection == render::Projection::perspective ? "perspective" : "orthographic");
-}
-
 std::string surfaceLine(const ViewState& view) {
   std::string line =
       fmt::format("surface shown={} offset={} cracks={} defects={} clip={}", view.surface, view.surfaceOffset,
@@ -72,13 +65,6 @@ ContourChoice contourChoice(const ViewState& view, const Field& field) {
   const double number = parseNumber(isShare ? text.substr(0, text.size() - 1) : text).value();
   const double tolerance = isShare ? number / 100 * field.domain().sizes().maxCoeff() : number;
   return {view.surfaceOffset, tolerance, view.trianglesSimplified};
-}
-
-std::string levelText(const std::vector<int>& levels) {
-  if (levels.empty()) return "all";
-  std::vector<std::string> names;
-  for (const int level : levels) names.push_back(levelName(level));
-  return fmt::format("{}", fmt::join(names, ","));
 }
 
 render::SlicePicture slicePicture(const ViewState& view, const Field& field) {

@@ -80,9 +80,6 @@ render::SurfacePicture surfacePicture(const ViewState& view, const Field& field)
 /// Returns the choices for the contour whose triangles the explorer shows.
 ContourChoice contourChoice(const ViewState& view, const Field& field);
 
-/// Returns a list of degrees or depths as text: "2,4", or "all" for an empty list.
-std::string levelText(const std::vector<int>& levels);
-
 /// Returns a script that sets every part of the explorer's state. Each line of the script ends in a newline.
 std::string scriptOf(const ViewState& view);
 

@@ -53,19 +53,15 @@ std::string levels(const std::string& title, const std::map<int, double>& shares
   return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", htmlEscaped(title), rows);
 }
 
-constexpr std::string_view kLiveStyle = R"(
-.live { margin: 1.6rem 0 0; }
-.live iframe { display: block; width: 100%; aspect-ratio: 16 / 10; min-height: 22rem; border: 1px solid var(--line); border-radius: 4px;
-               box-sizing: border-box; }
-@media print { .live { display: none; } }
-)";
-
-/// Shows another page within this one. It is not printed: pictures show there what it shows.
-std::string liveView(const std::string& page) {
-  return fmt::format(
-      "<div class=\"live\">\n<iframe src=\"{0}\" title=\"the field\" loading=\"lazy\" "
-      "allow=\"clipboard-write\"></iframe>\n<p><a href=\"{0}\">open alone</a></p>\n</div>\n",
-      htmlEscaped(page));
+/// Returns a path as an address in HTML.
+std::string addressOf(const std::string& path) {
+  std::string address;
+  for (const char c : path) {
+    const bool isPlain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                         std::string_view("-._~/").find(c) != std::string_view::npos;
+    address += isPlain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return address;
 }
 
 std::string figure(const ReportPicture& picture) {
@@ -76,6 +72,21 @@ std::string figure(const ReportPicture& picture) {
 }
 
 }  // namespace
+
+const std::string_view kLiveStyle = R"(
+.live { margin: 1.6rem 0; }
+.live summary { cursor: pointer; }
+.live iframe { display: block; width: 100%; aspect-ratio: 16 / 10; min-height: 22rem; margin: .5rem 0; box-sizing: border-box;
+               border: 1px solid var(--line); border-radius: 4px; }
+@media print { .live { display: none; } }
+)";
+
+std::string liveFrame(const std::string& page) {
+  return fmt::format(
+      "<iframe src=\"{0}\" title=\"the field\" loading=\"lazy\" allow=\"clipboard-write\"></iframe>\n"
+      "<a href=\"{0}\">open alone</a>\n",
+      addressOf(page));
+}
 
 const std::string_view kPictureRowStyle = R"(
 .pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(18rem, 1fr)); gap: 0 1rem; }
@@ -189,7 +200,7 @@ std::string htmlFoot(const std::string& footer) {
 
 std::string reportHtml(const ReportPage& page) {
   std::string html = htmlHead(page.title, page.subtitle, kLiveStyle);
-  if (!page.explorer.empty()) html += liveView(page.explorer);
+  if (!page.explorer.empty()) html += "<div class=\"live\">\n" + liveFrame(page.explorer) + "</div>\n";
   html += "<h2>Figures</h2>\n<table>\n";
   for (const auto& [name, value] : page.figures) html += htmlFact(name, value);
   html += "</table>\n";

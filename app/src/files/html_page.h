@@ -42,6 +42,13 @@ std::string htmlFact(const std::string& name, const std::string& value);
 /// CSS and JavaScript of pages with rows of pictures. The script belongs behind the last row.
 extern const std::string_view kPictureRowStyle, kPictureRowScript;
 
+/// CSS of live views: elements of the class `live`, which are not printed.
+extern const std::string_view kLiveStyle;
+
+/// Returns a frame that shows another page, whose path is relative to this page, and a link to it. The other page is
+/// loaded when the frame comes into sight.
+std::string liveFrame(const std::string& page);
+
 /// A picture that a page contains.
 struct PagePicture {
   std::string title;

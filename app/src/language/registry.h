@@ -74,6 +74,9 @@ struct Command {
   /// Draws the picture that `action` writes into the file `output`. It is set for commands whose result is one picture,
   /// and works without `output`.
   std::function<render::Image(Session&, const Arguments&)> draw = {};
+  /// Returns the lines of a script by which the explorer shows what `action` has drawn last. It is set for commands
+  /// that draw one view of the current field.
+  std::function<std::string(Session&, const Arguments&)> view = {};
   /// Throws `Error` if the arguments contradict each other. All commands of a script are checked before its
   /// first command runs.
   std::function<void(const Arguments&)> check = {};

@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <span>
+#include <sstream>
 #include <utility>
 
 #include "files/output_folder.h"
@@ -26,6 +28,12 @@ namespace {
 
 // A browser reads the text of an element up to 512 MiB, and holds it several times while it opens the page.
 constexpr double kMostFieldBytes = 256e6;
+
+constexpr std::array kViewCommands = {"show", "camera", "surface", "plane", "cells", "color", "worst"};
+
+bool contains(std::span<const char* const> words, std::string_view word) {
+  return std::ranges::find(words, word) != words.end();
+}
 
 /// Returns the bytes of the field's file.
 std::string bytesOf(const Field& field) {
@@ -146,13 +154,27 @@ std::vector<std::string> distinctNames(const std::vector<std::string>& files) {
   return names;
 }
 
+std::string pageView(const std::string& script) {
+  constexpr std::array kColors = {"normal", "degree", "depth", "distance", "value-jump", "gradient-jump", "cell-error"};
+  std::istringstream lines(script);
+  std::string view;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string command, value;
+    words >> command >> value;
+    const bool isShown =
+        !(command == "cells" && value == "boxes") && !(command == "color" && !contains(kColors, value));
+    if (isShown && contains(kViewCommands, command)) view += line + "\n";
+  }
+  return view;
+}
+
 void checkView(const Registry& registry, std::string_view view) {
-  constexpr std::array kCommands = {"show", "camera", "surface", "plane", "cells", "color", "worst"};
   for (const Call& call : parseScript(registry, "view", view, {}))
-    if (std::ranges::find(kCommands, call.command->name) == kCommands.end())
+    if (!contains(kViewCommands, call.command->name))
       throw Error(ErrorKind::option, "",
                   fmt::format("{}: {} is no command about a view; these are {}", call.where, call.command->name,
-                              fmt::join(kCommands, ", ")));
+                              fmt::join(kViewCommands, ", ")));
 }
 
 }  // namespace hpsdf::app

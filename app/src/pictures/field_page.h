@@ -45,6 +45,9 @@ std::vector<PagePicture> fallbackPictures(render::Renderer& renderer, const Fiel
 /// folder in which they lie, and the rest numbered.
 std::vector<std::string> distinctNames(const std::vector<std::string>& files);
 
+/// Returns those lines of a view's script that pages understand.
+std::string pageView(const std::string& script);
+
 /// Throws `Error` unless the text consists of commands of scripts that describe a view.
 void checkView(const Registry& registry, std::string_view view);
 

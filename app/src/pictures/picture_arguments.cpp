@@ -55,6 +55,18 @@ render::AxisPlane axisPlane(const Arguments& arguments, const char* axisName, co
   return {axis, arguments.given(offsetName) ? arguments.number(offsetName) : defaultOffset(box, axis)};
 }
 
+/// Formats the coordinates of v with the fewest digits that are read back as the same numbers.
+std::string textOf(const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
+
+std::string targetText(const std::optional<Vector3>& target) { return target ? textOf(*target) : "center"; }
+
+std::string planeText(const render::Plane& plane) {
+  if (const auto* free = std::get_if<render::FreePlane>(&plane))
+    return fmt::format("through={},{}", textOf(free->point), textOf(free->normal));
+  const auto& axis = std::get<render::AxisPlane>(plane);
+  return fmt::format("axis={} offset={}", "xyz"[axis.axis], axis.offset);
+}
+
 /// Sets the size of a picture and its number of samples per pixel.
 template <typename Picture>
 void setPixels(Picture& picture, const Arguments& arguments) {
@@ -128,6 +140,32 @@ render::CellStyle cellStyle(std::string_view name) {
 
 std::string cellStyleName(render::CellStyle style) {
   return style == render::CellStyle::lines ? "lines" : style == render::CellStyle::boxes ? "boxes" : "none";
+}
+
+std::string levelText(const std::vector<int>& levels) {
+  if (levels.empty()) return "all";
+  std::vector<std::string> names;
+  for (const int level : levels) names.push_back(levelName(level));
+  return fmt::format("{}", fmt::join(names, ","));
+}
+
+std::string cameraLine(const render::OrbitCamera& camera) {
+  return fmt::format("camera {},{},{} target={} up={} projection={}\n", camera.azimuthDegrees, camera.elevationDegrees,
+                     camera.distance, targetText(camera.target), camera.up == render::UpAxis::y ? "y" : "z",
+                     camera.projection == render::Projection::perspective ? "perspective" : "orthographic");
+}
+
+std::string viewScript(const render::SlicePicture& picture) {
+  return fmt::format("show slice\nplane {} zoom={} target={}\ncolor {} of=slice\n", planeText(picture.plane),
+                     picture.zoom, targetText(picture.target), colorName(picture.color));
+}
+
+std::string viewScript(const render::SurfacePicture& picture) {
+  std::string script = "show surface\n" + cameraLine(picture.camera) + fmt::format("surface offset={}", picture.offset);
+  if (picture.clip) script += fmt::format(" clip={} clip-offset={}", "xyz"[picture.clip->axis], picture.clip->offset);
+  if (picture.plane) script += fmt::format("\nplane {} in-space=true", planeText(*picture.plane));
+  return script + fmt::format("\ncells {} depths={}\ncolor {} of=surface\n", cellStyleName(picture.cells.style),
+                              levelText(picture.cells.depths), colorName(picture.color));
 }
 
 std::vector<int> levelList(const std::string& text, const char* name, int most) {

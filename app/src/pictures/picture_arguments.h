@@ -40,6 +40,15 @@ std::string cellStyleName(render::CellStyle style);
 /// degrees may contain the word "exact". Returns an empty list
 /// for "". Throws `Error` naming the parameter `name` for any other text.
 std::vector<int> levelList(const std::string& text, const char* name, int most);
+/// Returns a list of degrees or depths as text: "2,4", or "all" for an empty list.
+std::string levelText(const std::vector<int>& levels);
+
+/// Returns the line of a script that places the explorer's camera.
+std::string cameraLine(const render::OrbitCamera& camera);
+
+/// Returns the lines of a script by which the explorer shows what a picture shows, as far as pages can show it.
+std::string viewScript(const render::SlicePicture& picture);
+std::string viewScript(const render::SurfacePicture& picture);
 
 /// Returns the value of a parameter of three numbers as a point. The parameter must have a value.
 Vector3 pointOf(const Arguments& arguments, const char* name);

@@ -265,6 +265,10 @@ cell is the word exact in a .csv and the number 31 in a .pfm.)"),
            backendParameters()}),
       .action = runSlice,
       .draw = slicedImage,
+      .view =
+          [](Session& session, const Arguments& arguments) {
+            return viewScript(slicePicture(arguments, shownBox(session.current().field)));
+          },
       .check = checkSlice,
   };
 }
@@ -298,6 +302,10 @@ Command renderCommand() {
            backendParameters()}),
       .action = runRender,
       .draw = renderedImage,
+      .view =
+          [](Session& session, const Arguments& arguments) {
+            return viewScript(surfacePicture(arguments, shownBox(session.current().field)));
+          },
   };
 }
 
