@@ -3,6 +3,7 @@
 import html
 import os
 import pathlib
+import re
 import subprocess
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -122,21 +123,52 @@ def test_a_report_shows_its_field_live_and_prints_pictures(
     assert complaints(browser) == []
 
 
-def test_a_failed_check_lets_one_look_into_the_field(browser: Any, tmp_path: pathlib.Path) -> None:
+@pytest.fixture
+def failed_check(tmp_path: pathlib.Path) -> pathlib.Path:
+    """The page of a check in which a slice fails, because its plane lies elsewhere than that of its baseline."""
     script = tmp_path / "pictures" / "scripts" / "looks.hps"
     script.parent.mkdir(parents=True)
-    script.write_text("build builtin:torus target-error=1e-3; slice axis=y offset=0.25 color=depth size=160x120 cpu=true output=$out/a.png")
-    results = tmp_path / "results"
-    checked = subprocess.run([os.environ["HPSDF_PROGRAM"], "check", script.parents[1], "--out", results], capture_output=True)
-    assert checked.returncode == 1, "there is no baseline"
-    browser.get((results / "index.html").as_uri())
+    script.write_text("build builtin:torus target-error=1e-3; slice axis=y offset=$at color=depth size=160x120 cpu=true output=$out/a.png")
+
+    def run(status: int, *words: object) -> None:
+        made = subprocess.run([os.environ["HPSDF_PROGRAM"], *map(str, words)], capture_output=True, cwd=tmp_path)
+        assert made.returncode == status
+
+    run(1, "check", "pictures", "at=0.125")
+    run(0, "accept", "pictures", "looks/a.png")
+    run(1, "check", "pictures", "at=0.25")
+    return tmp_path / "check-results" / "index.html"
+
+
+def test_a_failed_check_lets_one_look_into_the_field(browser: Any, failed_check: pathlib.Path) -> None:
+    browser.get(failed_check.as_uri())
     details = browser.find_element("css selector", "details.live")
+    assert browser.find_elements("tag name", "iframe") == [], "nothing is loaded before it is asked for"
     details.find_element("tag name", "summary").click()
+    frame = package("selenium.webdriver.support.ui").WebDriverWait(browser, 60).until(lambda page: page.find_element("css selector", "details.live iframe"))
     browser.execute_script("arguments[0].scrollIntoView()", details)
-    browser.switch_to.frame(details.find_element("tag name", "iframe"))
-    package("selenium.webdriver.support.ui").WebDriverWait(browser, 60).until(lambda page: page.find_elements("id", "script"))
+    browser.switch_to.frame(frame)
     assert rested(browser) == "sharp"
     assert source_shown(browser) == "builtin:torus"
     lines = browser.find_element("id", "script").get_attribute("value")
     assert "show slice" in lines and "plane axis=y offset=0.25" in lines and "color depth of=slice" in lines
+    assert complaints(browser) == []
+
+
+def test_a_lens_shows_the_pixels_of_a_failed_check(browser: Any, failed_check: pathlib.Path) -> None:
+    browser.get(failed_check.as_uri())
+    row = browser.find_element("xpath", "//tr[th[starts-with(., 'The worst')]]/following-sibling::tr[1]")
+    place, baseline, actual, _ = [cell.text for cell in row.find_elements("tag name", "td")]
+    x, y = (int(word) for word in re.findall(r"\d+", place))
+    image = browser.find_elements("css selector", ".pictures img")[1]
+    image.click()  # shows it as wide as the page, so that a pixel of it is several of the window
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", image)
+    size = image.size
+    across = (x + 0.5) / 160 * (size["width"] - 2) + 1 - size["width"] / 2
+    down = (y + 0.5) / 120 * (size["height"] - 2) + 1 - size["height"] / 2
+    package("selenium.webdriver.common.action_chains").ActionChains(browser).move_to_element_with_offset(image, round(across), round(down)).perform()
+    lens = browser.find_element("class name", "lens")
+    assert lens.text.split()[:4] == ["x", str(x), "y", str(y)]
+    assert [caption.text for caption in lens.find_elements("tag name", "figcaption")][:2] == [baseline, actual]
+    assert baseline != actual
     assert complaints(browser) == []

@@ -19,6 +19,71 @@ td.number { text-align: right; }
 h2.failure { margin-top: 3.5rem; padding-top: 1rem; border-top: 3px solid var(--bar); overflow-wrap: anywhere; }
 i.color { display: inline-block; width: 1em; height: 1em; margin-right: .4em; border: 1px solid var(--line);
           vertical-align: -.15em; }
+.lens { position: fixed; z-index: 1; display: flex; gap: .8rem; padding: .6rem; pointer-events: none; white-space: pre;
+        background: var(--paper); border: 1px solid var(--line); border-radius: 4px;
+        font: 13px/1.4 "DejaVu Sans Mono", monospace; }
+.lens[hidden] { display: none; }
+.lens figure { position: relative; margin: 0; }
+.lens canvas { display: block; width: 136px; height: 136px; image-rendering: pixelated; }
+.lens figure::after { content: ""; position: absolute; top: 64px; left: 64px; width: 8px; height: 8px;
+                      outline: 1px solid #f0f; }
+)";
+
+// Shows the pixels about the pointer eight times as large, at the same place of all pictures of a row, with the colour
+// of each picture's pixel there.
+constexpr std::string_view kLensScript = R"(<script>
+const lens = document.createElement('div');
+lens.className = 'lens';
+lens.hidden = true;
+document.body.append(lens);
+const reach = 8;
+function magnified(image, x, y) {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 2 * reach + 1;
+  const context = canvas.getContext('2d');
+  context.drawImage(image, reach - x, reach - y);
+  const color = [...context.getImageData(reach, reach, 1, 1).data.slice(0, 3)];
+  const caption = document.createElement('figcaption');
+  caption.textContent = '#' + color.map((c) => c.toString(16).padStart(2, '0')).join('');
+  const figure = document.createElement('figure');
+  figure.append(canvas, caption);
+  return figure;
+}
+function place(event) {
+  const { width, height } = lens.getBoundingClientRect();
+  const isLow = event.clientY + height + 20 > innerHeight;
+  lens.style.left = Math.max(0, Math.min(event.clientX + 20, innerWidth - width)) + 'px';
+  lens.style.top = event.clientY + (isLow ? -height - 20 : 20) + 'px';
+}
+for (const row of document.querySelectorAll('.pictures')) {
+  const images = [...row.querySelectorAll('img')];
+  row.addEventListener('pointermove', (event) => {
+    const image = event.target;
+    lens.hidden = !images.includes(image);
+    if (lens.hidden) return;
+    const box = image.getBoundingClientRect();
+    const x = Math.floor((event.clientX - box.left - image.clientLeft) * image.naturalWidth / image.clientWidth);
+    const y = Math.floor((event.clientY - box.top - image.clientTop) * image.naturalHeight / image.clientHeight);
+    lens.replaceChildren(`x ${x}\ny ${y}`, ...images.map((other) => magnified(other, x, y)));
+    place(event);
+  });
+  row.addEventListener('pointerleave', () => { lens.hidden = true; });
+}
+</script>
+)";
+
+// Loads a live view when a reader opens it: a browser has room for few at a time.
+constexpr std::string_view kLiveScript = R"(<script>
+for (const details of document.querySelectorAll('details.live'))
+  details.addEventListener('toggle', () => {
+    const link = details.querySelector('a');
+    const frame = document.createElement('iframe');
+    frame.src = link.href;
+    frame.title = 'the field';
+    frame.allow = 'clipboard-write';
+    link.before(frame);
+  }, { once: true });
+</script>
 )";
 
 bool isPicture(const fs::path& file) { return lowerExtension(file) == ".png" && fs::exists(file); }
@@ -72,7 +137,7 @@ std::string failure(const CheckedItem& item, const CheckRequest& request) {
   html += pictures(item);
   if (!item.live.empty())
     html += "<details class=\"live\">\n<summary>Look into the field that drew the actual picture</summary>\n" +
-            liveFrame(item.live.string()) + "</details>\n";
+            liveLink(item.live.string()) + "</details>\n";
   html += worstDifferences(item);
   const std::pair<const char*, std::string> facts[] = {{"Differing", shareText(item)},
                                                        {"Written by", item.where},
@@ -134,7 +199,8 @@ std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request) 
   html += fmt::format("<code>{}</code>\n", htmlEscaped(checkCommand(request)));
   for (const CheckedItem& item : outcome.items)
     if (item.verdict != Verdict::passed) html += failure(item, request);
-  return html + std::string(kPictureRowScript) + htmlFoot(versionText());
+  return html + std::string(kPictureRowScript) + std::string(kLensScript) + std::string(kLiveScript) +
+         htmlFoot(versionText());
 }
 
 std::string junitXml(const CheckOutcome& outcome) {

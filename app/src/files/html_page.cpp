@@ -76,16 +76,13 @@ std::string figure(const ReportPicture& picture) {
 const std::string_view kLiveStyle = R"(
 .live { margin: 1.6rem 0; }
 .live summary { cursor: pointer; }
-.live iframe { display: block; width: 100%; aspect-ratio: 16 / 10; min-height: 22rem; margin: .5rem 0; box-sizing: border-box;
-               border: 1px solid var(--line); border-radius: 4px; }
+.live iframe { display: block; width: 100%; aspect-ratio: 16 / 10; min-height: 22rem; margin: .5rem 0;
+               box-sizing: border-box; border: 1px solid var(--line); border-radius: 4px; }
 @media print { .live { display: none; } }
 )";
 
-std::string liveFrame(const std::string& page) {
-  return fmt::format(
-      "<iframe src=\"{0}\" title=\"the field\" loading=\"lazy\" allow=\"clipboard-write\"></iframe>\n"
-      "<a href=\"{0}\">open alone</a>\n",
-      addressOf(page));
+std::string liveLink(const std::string& page) {
+  return fmt::format("<a href=\"{}\">open alone</a>\n", addressOf(page));
 }
 
 const std::string_view kPictureRowStyle = R"(
@@ -200,7 +197,11 @@ std::string htmlFoot(const std::string& footer) {
 
 std::string reportHtml(const ReportPage& page) {
   std::string html = htmlHead(page.title, page.subtitle, kLiveStyle);
-  if (!page.explorer.empty()) html += "<div class=\"live\">\n" + liveFrame(page.explorer) + "</div>\n";
+  if (!page.explorer.empty())
+    html += fmt::format(
+        "<div class=\"live\">\n<iframe src=\"{}\" title=\"the field\" loading=\"lazy\" "
+        "allow=\"clipboard-write\"></iframe>\n{}</div>\n",
+        addressOf(page.explorer), liveLink(page.explorer));
   html += "<h2>Figures</h2>\n<table>\n";
   for (const auto& [name, value] : page.figures) html += htmlFact(name, value);
   html += "</table>\n";

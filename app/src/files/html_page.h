@@ -45,9 +45,8 @@ extern const std::string_view kPictureRowStyle, kPictureRowScript;
 /// CSS of live views: elements of the class `live`, which are not printed.
 extern const std::string_view kLiveStyle;
 
-/// Returns a frame that shows another page, whose path is relative to this page, and a link to it. The other page is
-/// loaded when the frame comes into sight.
-std::string liveFrame(const std::string& page);
+/// Returns a link to a page that shows a field live. Its path is relative to the page with the link.
+std::string liveLink(const std::string& page);
 
 /// A picture that a page contains.
 struct PagePicture {
