@@ -8,11 +8,11 @@
 #include "compare_buffers.h"
 #include "cpu/trace.h"
 #include "hpsdf/continuity.h"
+#include "hpsdf/render/blend_zone_bounds.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
 #include "support/random_field.h"
 #include "support/require_gl.h"
-#include "view/blend_zone_bounds.h"
 #include "view/surface_bounds.h"
 
 namespace hpsdf::render {

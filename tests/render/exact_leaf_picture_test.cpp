@@ -16,12 +16,12 @@
 #include "hpsdf/detail/triangle_list.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/mesh_file.h"
+#include "hpsdf/render/blend_zone_bounds.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
 #include "support/made_meshes.h"
 #include "support/require_gl.h"
 #include "support/test_mesh.h"
-#include "view/blend_zone_bounds.h"
 #include "view/exact_leaf.h"
 #include "view/surface_bounds.h"
 

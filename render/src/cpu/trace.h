@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "hpsdf/field.h"
-#include "view/blend_zone_bounds.h"
+#include "hpsdf/render/blend_zone_bounds.h"
 #include "view/grid_space.h"
 #include "view/surface_bounds.h"
 

@@ -1,4 +1,4 @@
-#include "view/blend_zone_bounds.h"
+#include "hpsdf/render/blend_zone_bounds.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

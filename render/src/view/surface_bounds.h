@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "hpsdf/field.h"
-#include "view/blend_zone_bounds.h"
+#include "hpsdf/render/blend_zone_bounds.h"
 
 namespace hpsdf::render {
 
