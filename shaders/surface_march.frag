@@ -91,18 +91,25 @@ March startMarch(Ray ray, MarchRay marchRay) {
   march.lastLeaf = kNoCell;
   march.lastHeight = 0.0;
   march.longestStep = 0.0;
+  march.kind = kUnderWay;
+  march.bracket = vec4(0.0);
   if (resume) {
     uvec4 before = texelFetch(stateIntegers, ivec2(gl_FragCoord.xy), 0);
-    if (before.x != kUnderWay) discard;
     vec4 last = texelFetch(stateFloats, ivec2(gl_FragCoord.xy), 0);
+#ifdef HPSDF_WEB
+    // WebGL does not let a pass read what it draws into. The state of a march that has ended is copied.
+    march.kind = before.x;
+    march.bracket = last;
+#else
+    if (before.x != kUnderWay) discard;
+#endif
     march.t = uintBitsToFloat(before.y);
     march.side = uintBitsToFloat(before.z);
     march.lastLeaf = before.w;
     march.lastHeight = last.x;
     march.longestStep = last.y;
   }
-  march.kind = march.t <= marchRay.length ? kUnderWay : kMiss;
-  march.bracket = vec4(0.0);
+  if (march.kind == kUnderWay && !(march.t <= marchRay.length)) march.kind = kMiss;
   march.steps = 0;
   march.zoneLeaf = kNoCell;
   march.zoneStep = 0.0;

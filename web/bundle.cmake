@@ -5,11 +5,11 @@
 # out too.
 
 # In an order in which classes come before their use while the script is read.
-set(modules field/vector field/field_file field/payload field/exact_leaf field/leaves field/query
+set(modules field/vector field/field_file field/payload field/exact_leaf field/leaves field/blend field/query
   drawing/camera drawing/bounds drawing/blocks drawing/shaders drawing/colors drawing/view drawing/renderer drawing/cell_lines
   drawing/painter drawing/pick drawing/viewer panels/dom questions/cell_numbers questions/jumps questions/line_probe questions/line_plot questions/measure
   panels/panels panels/questions panels/controls page)
-set(shaders field.glsl full_screen.vert leaves_alone.glsl leaves_exact.glsl leaves_polynomial.glsl slice.frag
+set(shaders field.glsl full_screen.vert leaves_alone.glsl leaves_blended.glsl leaves_exact.glsl leaves_polynomial.glsl slice.frag
   surface.glsl surface.vert surface_hit.frag surface_march.frag)
 set(page_shaders drawing/cells.frag drawing/cells.vert drawing/picture.frag drawing/section.frag)
 

@@ -42,7 +42,6 @@ const std::map<std::string, std::string> kExempt = {
     {"include", "is replaced by lines of a script"},
     {"help", "explains commands"},
     {"docs", "explains commands"},
-    {"page", "refuses blended fields; tests/web tries it with exact cells"},
 };
 
 /// For each command, lines of a script that use the command on the current field. The variables are $field, the file of
@@ -118,6 +117,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"shot", "show slice; shot output=$out/shot.png; pick 60,50"},
     {"ui", "show slice size=480x360; panel all=true; ui hover canvas; ui wheel canvas 1; shot output=$out/shot.png"},
     {"report", "report samples=1 cpu=$cpu output=$out/report"},
+    {"page", "page output=$out/page.html"},
     {"study",
      "study table builtin:box strategy=hpx target-error=1e-2 grid=3 points=100 cpu=$cpu output=$out/table; "
      "study continuity builtin:box strategy=hpx target-error=1e-2 grid=3 points=100 weights=1 output=$out/continuity; "

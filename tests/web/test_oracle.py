@@ -21,6 +21,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "dragon": ("paper/dragon_80k.obj", "--target-error", "1e-5"),
     "open": ("broken/bun_zipper.ply", "--target-error", "1e-5"),
     "exact": ("builtin:gear", "--target-error", "1e-4"),
+    "blended": ("builtin:torus", "--strategy", "hp", "--target-error", "1e-5", "--grid", "3", "--continuity", "exact"),
 }
 
 VIEWS = {

@@ -17,6 +17,7 @@
 #include "files/text_file.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/render/blend_zone_bounds.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/web/page_template.h"
 #include "language/script.h"
@@ -41,6 +42,16 @@ std::string bytesOf(const Field& field) {
   const std::filesystem::path file = folder.path() / "field.hpsdf";
   save(field, file);
   return readWholeFile(file.string());
+}
+
+/// Returns the bytes of the field that a page holds: those of its file and, if it is blended, the blend zone bounds of
+/// each node, which a browser would compute for a long time.
+std::string payloadOf(const Field& field) {
+  std::string bytes = bytesOf(field);
+  for (const render::BlendZoneBounds& zone : render::blendZoneBounds(field))
+    for (const float bound : {zone.valueDifference, zone.gradientDifference, zone.extent})
+      bytes.append(reinterpret_cast<const char*>(&bound), sizeof bound);
+  return bytes;
 }
 
 /// Compresses bytes by zlib, which browsers can undo.
@@ -96,7 +107,6 @@ void nameUnique(std::vector<std::string>& names, const std::vector<std::string>&
 }  // namespace
 
 std::string refusal(const Field& field) {
-  if (field.data().blend > 0) return "is blended, which pages cannot show yet; build it without continuity exact";
   if (double(field.bytes()) > kMostFieldBytes)
     return fmt::format("takes {}, more than the {} that a page holds; build it with a greater target error",
                        bytesText(double(field.bytes())), bytesText(kMostFieldBytes));
@@ -114,7 +124,7 @@ void FieldPage::add(const Field& field, const FieldInPage& described, const Prog
   const std::string view = described.view.empty() ? "" : fmt::format(" data-view=\"{}\"", htmlEscaped(described.view));
   fields_ += fmt::format("<script type=\"application/octet-stream\" class=\"field\" data-name=\"{}\"{}>",
                          htmlEscaped(described.name), view);
-  fields_ += base64(compressed(bytesOf(field), progress));
+  fields_ += base64(compressed(payloadOf(field), progress));
   fields_ += "</script>\n";
   for (const PagePicture& picture : described.pictures) pictures_ += figure(picture);
 }

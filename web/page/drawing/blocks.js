@@ -9,7 +9,7 @@ import { gridPoint } from "../field/query.js";
 /** @typedef {import("./bounds.js").Bounds} Bounds */
 /** @typedef {import("./camera.js").Rays} Rays */
 
-const BLOCK = 8; // pixels along each side of a block
+export const BLOCK = 8; // pixels along each side of a block
 
 /**
  * Returns the inverse of a matrix with these columns, by rows.

@@ -1,6 +1,7 @@
 // Bounds of the field in every node of the octree, by which rays step (docs/rendering.md, "Tracing").
 
 import { coefficientCount, coefficientIndex, degreeOf, isExact, isLeaf } from "../field/field_file.js";
+import { blendDifference } from "../field/blend.js";
 import { evaluateExact } from "../field/exact_leaf.js";
 import { forEachLeaf } from "../field/leaves.js";
 import { worldPoint } from "../field/query.js";
@@ -36,6 +37,8 @@ export function boundsOf(field) {
   forEachLeaf(field, (node, depth, cell) => {
     if (isExact(field, node)) setExactBounds(field, node, depth, cell, bounds);
     else setPolynomialBounds(field, node, bounds);
+    bounds.low[node] -= blendDifference(field, node);
+    bounds.high[node] += blendDifference(field, node);
   });
   for (let n = count; n-- > 0; ) {
     // children follow their parents
@@ -137,7 +140,7 @@ function setExactBounds(field, node, depth, cell, bounds) {
   const edge = 2 ** -depth;
   const half = field.size.map((x, a) => (0.5 * x * edge) / field.grid[a]);
   const centre = worldPoint(field, /** @type {Vector} */ (cell.map((x) => (x + 0.5) * edge)));
-  const central = evaluateExact(field, node, centre).value;
+  const central = evaluateExact(field, node, [0, 0, 0], centre).value;
   const range = Math.hypot(...half) * (1 + ROUNDING) + ROUNDING * (Math.abs(central) + Math.hypot(...field.size));
   bounds.linear[4 * node + 3] = central;
   bounds.low[node] = central - range;

@@ -2,9 +2,10 @@
 
 import { degreeOf, isExact, isLeaf, coefficientCount, coefficientIndex } from "../field/field_file.js";
 import { boundsOf } from "./bounds.js";
-import { surfaceBlocks } from "./blocks.js";
+import { BLOCK, surfaceBlocks } from "./blocks.js";
 import { gridPoint } from "../field/query.js";
 import { axisVector, diagonalOf, gridPointOfPixel } from "./camera.js";
+import { blendExtents } from "../field/blend.js";
 import { cornersOf, signRule } from "../field/exact_leaf.js";
 import { cross, dot, normalized, scaled, subtract } from "../field/vector.js";
 import { ROW, webShader } from "./shaders.js";
@@ -17,12 +18,41 @@ import { ROW, webShader } from "./shaders.js";
 
 const LOW_DEGREE = 4; // as kLowDegree in field.glsl
 const OFFSET_BITS = 27;
-const MOST_STEPS = 4096;
+const MOST_STEPS = 1024; // of a ray in one pass, so that a pass is short
+const STEPS_IN_ALL = 1 << 16; // as in the program
+const BLENDED_STEPS = 16; // an evaluation in a blend zone counts as so many steps: it evaluates at most so many leaves
 const MOST_REFINEMENTS = 24;
 
+// Draws one pixel if the march of any ray in the blocks has not ended.
+const UNDER_WAY_VERTEX = `#version 300 es
+precision highp usampler2D;
+layout(location = 0) in vec3 block;
+uniform usampler2D stateIntegers;
+const uint kUnderWay = 1u;
+void main() {
+  bool isAny = false;
+  ivec2 last = textureSize(stateIntegers, 0) - 1;
+  for (int n = 0; n < ${BLOCK * BLOCK}; ++n) {
+    ivec2 pixel = ivec2(block.xy) + ivec2(n % ${BLOCK}, n / ${BLOCK});
+    isAny = isAny || texelFetch(stateIntegers, min(pixel, last), 0).x == kUnderWay;
+  }
+  gl_Position = vec4(isAny ? 0.0 : 2.0, 0.0, 0.0, 1.0);
+  gl_PointSize = 1.0;
+}`;
+const UNDER_WAY_FRAGMENT = `#version 300 es
+precision highp float;
+out vec4 color;
+void main() { color = vec4(1.0); }`;
+
 /**
- * Drawing that is done in portions, so that nothing waits long for it.
- * @typedef {{kind: string, hits: Target, size: number, draw: (first: number, count: number) => void}} Job
+ * Drawing that is done in portions, so that nothing waits long for it. Rays may need more than one pass for a portion: `resume` draws
+ * another one and returns true, or returns false if all rays have ended.
+ * @typedef {object} Job
+ * @property {string} kind
+ * @property {Target} hits
+ * @property {number} size  number of rows or blocks
+ * @property {(first: number, count: number) => void} draw
+ * @property {(first: number, count: number) => boolean} [resume]
  */
 
 /**
@@ -37,6 +67,7 @@ const CLIP_NUDGE = 1e-6; // rays start so far behind a cut, as a share of the do
  */
 function whole(job) {
   if (job.size > 0) job.draw(0, job.size);
+  while (job.resume?.(0, job.size));
   return job.hits;
 }
 
@@ -190,6 +221,21 @@ function cornerTexels(field) {
   return texels;
 }
 
+/**
+ * A texel for each node: its blend extents, and the bits of its three bounds.
+ * @param {Field} field
+ * @param {Float32Array} zones
+ */
+function zoneTexels(field, zones) {
+  const bits = new Uint32Array(zones.buffer);
+  const texels = new Uint32Array(4 * field.low.length);
+  blendExtents(field).forEach((extents, node) => {
+    texels[4 * node] = extents;
+    texels.set(bits.subarray(3 * node, 3 * node + 3), 4 * node + 1);
+  });
+  return texels;
+}
+
 /** A field on the graphics card, and the programs that draw it. */
 export class FieldRenderer {
   /**
@@ -209,15 +255,18 @@ export class FieldRenderer {
       coefficients: this.texture(gl.R32F, coefficients, 1),
       coefficientQuads: this.texture(gl.RGBA32F, coefficients, 4),
       linearParts: this.texture(gl.RGBA32F, this.bounds.linear, 4),
+      zones: this.texture(gl.RGBA32UI, field.zones ? zoneTexels(field, field.zones) : new Uint32Array(4), 4),
       exactLists: this.texture(gl.R32UI, hasExact ? field.exact.lists : new Uint32Array(1), 1),
       exactCorners: this.texture(gl.RGBA32F, hasExact ? cornerTexels(field) : new Float32Array(4), 4),
     };
-    const leaves = hasExact ? "leaves_exact.glsl" : "leaves_polynomial.glsl";
+    const leaves = ["field.glsl", hasExact ? "leaves_exact.glsl" : "leaves_polynomial.glsl", field.blend > 0 ? "leaves_blended.glsl" : "leaves_alone.glsl"];
     const of = (/** @type {string[]} */ ...names) => webShader(names.map((name) => sources[name]));
-    this.slicing = this.program(of("full_screen.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "slice.frag"));
-    this.marching = this.program(of("surface.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "surface_march.frag"));
-    this.hitting = this.program(of("surface.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "surface_hit.frag"));
-    this.sectioning = this.program(of("full_screen.vert"), of("field.glsl", leaves, "leaves_alone.glsl", "surface.glsl", "section.frag"));
+    this.slicing = this.program(of("full_screen.vert"), of(...leaves, "slice.frag"));
+    this.marching = this.program(of("surface.vert"), of(...leaves, "surface.glsl", "surface_march.frag"));
+    this.hitting = this.program(of("surface.vert"), of(...leaves, "surface.glsl", "surface_hit.frag"));
+    this.sectioning = this.program(of("full_screen.vert"), of(...leaves, "surface.glsl", "section.frag"));
+    this.asking = this.program(UNDER_WAY_VERTEX, UNDER_WAY_FRAGMENT);
+    this.answer = new ColorTarget(this, 1, 1);
     /** @type {Map<WebGLProgram, Map<string, WebGLUniformLocation | null>>} */
     this.locations = new Map();
     this.empty = gl.createVertexArray();
@@ -295,6 +344,7 @@ export class FieldRenderer {
     gl.uniform3ui(this.at(program, "grid"), ...field.grid);
     gl.uniform3f(this.at(program, "baseCell"), ...this.cellSize());
     gl.uniform1f(this.at(program, "exactOffset"), field.exact.offset);
+    gl.uniform1f(this.at(program, "blend"), field.blend);
   }
 
   /**
@@ -442,20 +492,57 @@ export class FieldRenderer {
     const found = surfaceBlocks(field, this.bounds, rays, width, height, offset);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.blocks);
     gl.bufferData(gl.ARRAY_BUFFER, found.blocks, gl.STREAM_DRAW);
-    const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
+    /** @type {(program: WebGLProgram, target: Target, from: Target, first: number, count: number) => void} */
+    const pass = (program, target, from, first, count) => {
+      target.bind([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+      this.use(program);
+      this.setRays(program, rays, width, height, offset, clip);
+      gl.uniform1f(this.at(program, "startSide"), found.side);
+      gl.uniform1i(this.at(program, "atTriangles"), offset === -field.exact.offset ? 1 : 0);
+      gl.uniform1i(this.at(program, "resume"), steps > MOST_STEPS ? 1 : 0);
+      this.bind(program, "stateIntegers", 0, from.integers);
+      this.bind(program, "stateFloats", 1, from.floats);
       gl.bindVertexArray(buffers.blockArray);
-      for (const [program, target, other] of /** @type {[WebGLProgram, Target, Target][]} */ ([[this.marching, state, hits], [this.hitting, hits, state]])) {
-        target.bind([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
-        this.use(program);
-        this.setRays(program, rays, width, height, offset, clip);
-        gl.uniform1f(this.at(program, "startSide"), found.side);
-        gl.uniform1i(this.at(program, "atTriangles"), offset === -field.exact.offset ? 1 : 0);
-        this.bind(program, "stateIntegers", 0, other.integers); // the march declares these textures too, but does not read them
-        this.bind(program, "stateFloats", 1, other.floats);
-        gl.drawArrays(gl.POINTS, first, count);
-      }
+      gl.drawArrays(gl.POINTS, first, count);
     };
-    return { kind: "surface", hits, size: found.blocks.length / 3, draw };
+    let latest = state;
+    let steps = 0;
+    const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
+      latest = state;
+      steps = MOST_STEPS;
+      pass(this.marching, state, hits, first, count); // the first march declares the textures of a state, but does not read them
+      pass(this.hitting, hits, state, first, count);
+    };
+    const resume = (/** @type {number} */ first, /** @type {number} */ count) => {
+      if (steps >= STEPS_IN_ALL || !this.isAnyUnderWay(buffers, latest, first, count)) return false;
+      const next = latest === state ? buffers.targetOf("spare", width, height) : state;
+      steps += MOST_STEPS;
+      pass(this.marching, next, latest, first, count);
+      pass(this.hitting, hits, next, first, count);
+      latest = next;
+      return true;
+    };
+    return { kind: "surface", hits, size: found.blocks.length / 3, draw, resume };
+  }
+
+  /**
+   * Returns true if the march of any ray in these blocks has not ended.
+   * @param {Buffers} buffers
+   * @param {Target} state
+   * @param {number} first
+   * @param {number} count
+   */
+  isAnyUnderWay(buffers, state, first, count) {
+    const { gl } = this;
+    this.answer.bind();
+    gl.clearBufferfv(gl.COLOR, 0, new Float32Array(4));
+    this.use(this.asking);
+    this.bind(this.asking, "stateIntegers", 0, state.integers);
+    gl.bindVertexArray(buffers.blockArray);
+    gl.drawArrays(gl.POINTS, first, count);
+    const pixel = new Uint8Array(4);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    return pixel[0] > 0;
   }
 
   /**
@@ -526,8 +613,8 @@ export class FieldRenderer {
     set("shownHi", shownHi);
     gl.uniform1i(this.at(program, "parallel"), rays.parallel ? 1 : 0);
     gl.uniform1i(this.at(program, "mostSteps"), MOST_STEPS);
+    gl.uniform1i(this.at(program, "blendedSteps"), BLENDED_STEPS);
     gl.uniform1i(this.at(program, "mostRefinements"), MOST_REFINEMENTS);
-    gl.uniform1i(this.at(program, "resume"), 0);
   }
 }
 
@@ -539,8 +626,8 @@ export class Buffers {
   constructor(renderer) {
     const { gl } = renderer;
     this.renderer = renderer;
-    /** @type {{state: Target | null, hits: Target | null, section: Target | null}} */
-    this.targets = { state: null, hits: null, section: null };
+    /** @type {{state: Target | null, spare: Target | null, hits: Target | null, section: Target | null}} */
+    this.targets = { state: null, spare: null, hits: null, section: null };
     /** @type {ColorTarget | null} */
     this.colors = null;
     /** @type {{wholes: WebGLTexture, fractions: WebGLTexture} | null} */
@@ -560,12 +647,23 @@ export class Buffers {
    * @param {number} height
    */
   resize(name, width, height) {
-    let target = this.targets[name];
-    if (!target || target.width !== width || target.height !== height) {
-      target?.remove();
-      target = this.targets[name] = new Target(this.renderer, width, height);
-    }
+    const target = this.targetOf(name, width, height);
     target.clear();
+    return target;
+  }
+
+  /**
+   * Returns a target of this size. The target "spare" holds the state of rays besides "state", since no pass reads what it draws into.
+   * @param {"state" | "spare" | "hits" | "section"} name
+   * @param {number} width
+   * @param {number} height
+   */
+  targetOf(name, width, height) {
+    const before = this.targets[name];
+    if (before?.width === width && before.height === height) return before;
+    before?.remove();
+    const target = new Target(this.renderer, width, height);
+    this.targets[name] = target;
     return target;
   }
 

@@ -2,7 +2,7 @@
 // precision nor ldexp.
 
 /** The textures that are buffer textures in OpenGL 4.5. Here their texels stand in rows of ROW. */
-const BUFFERS = ["nodes", "coefficients", "coefficientQuads", "linearParts", "exactLists", "exactCorners"];
+const BUFFERS = ["nodes", "coefficients", "coefficientQuads", "linearParts", "zones", "exactLists", "exactCorners"];
 export const ROW_BITS = 11;
 export const ROW = 1 << ROW_BITS;
 
@@ -14,8 +14,8 @@ precision highp usampler2D;
 precision highp isampler2D;
 #define HPSDF_WEB
 ivec2 texelOf(int index) { return ivec2(index & ${ROW - 1}, index >> ${ROW_BITS}); }
-float ldexp(float x, int e) { return x * exp2(float(e)); }
-vec3 ldexp(vec3 x, ivec3 e) { return x * exp2(vec3(e)); }
+float ldexp(float x, int e) { return x * uintBitsToFloat(uint(e + 127) << 23); }
+vec3 ldexp(vec3 x, ivec3 e) { return x * uintBitsToFloat(uvec3(e + 127) << 23); }
 `;
 
 /**

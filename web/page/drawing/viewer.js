@@ -115,13 +115,14 @@ export class Viewer {
   /**
    * @param {Job} job
    */
-  async drawInPortions({ kind, size, draw }) {
+  async drawInPortions({ kind, size, draw, resume }) {
     for (let at = 0; at < size && !this.isStale; ) {
       const share = this.shares.get(kind) ?? FIRST_SHARE;
       const count = Math.max(Math.min(Math.round(share * size), size - at), 1);
       const begin = performance.now();
       draw(at, count);
       await this.done();
+      while (!this.isStale && resume?.(at, count)) await this.done();
       at += count;
       const faster = PORTION_TIME / Math.max(performance.now() - begin, 1);
       this.shares.set(kind, Math.min(Math.max(share * Math.min(faster, 1.5), 1e-3), MOST_SHARE));

@@ -21,20 +21,21 @@ export function signRule(field, leaf) {
 }
 
 /**
- * Calls `visit` with the index of each triangle of a leaf's list. Returns the index of the word behind the list's runs.
+ * Calls `visit` with the index of each triangle of a leaf's list and its place in the list. Returns the index of the word behind the
+ * list's runs.
  * @param {Field} field
  * @param {number} leaf
- * @param {(triangle: number) => void} visit
+ * @param {(triangle: number, place: number) => void} visit
  */
 export function forEachTriangle(field, leaf, visit) {
   const { lists } = field.exact;
   const count = lists[field.low[leaf]] & ~HAS_REFERENCE;
   let at = field.low[leaf] + 1 + ((count + 3) >> 2);
-  for (;;) {
+  for (let place = 0; ; ) {
     const run = lists[at++];
     const first = run & 0x7ffffff;
     const last = first + ((run >>> 27) & 15);
-    for (let triangle = first; triangle <= last; ++triangle) visit(triangle);
+    for (let triangle = first; triangle <= last; ++triangle) visit(triangle, place++);
     if (run & LAST_RUN) return at;
   }
 }
@@ -69,13 +70,16 @@ export function cornersOf(exact, triangle) {
  */
 
 /**
+ * Returns the nearest feature of the triangles that count in one octant of a leaf.
  * @param {Field} field
  * @param {number} leaf
+ * @param {number} octant
  * @param {Vector} x
  * @returns {Feature}
  */
-function nearestFeature(field, leaf, x) {
+function nearestFeature(field, leaf, octant, x) {
   const { exact } = field;
+  const octants = new Uint8Array(exact.lists.buffer, exact.lists.byteOffset + 4 * (field.low[leaf] + 1));
   /** @type {Feature} */
   let best = { squared: Infinity, difference: [0, 0, 0], vertices: [], normal: [0, 0, 0], height: 0 };
   /**
@@ -102,7 +106,8 @@ function nearestFeature(field, leaf, x) {
     else if (t >= squaredLength) tryPoint(subtract(x, vertexAt(exact, to)), [to]);
     else tryPoint(subtract(difference, scaled(along, t / squaredLength)), [from, to]);
   };
-  forEachTriangle(field, leaf, (triangle) => {
+  forEachTriangle(field, leaf, (triangle, place) => {
+    if (((octants[place] >> octant) & 1) === 0) return;
     const corners = cornersOf(exact, triangle);
     const normal = cross(subtract(corners[1], corners[0]), subtract(corners[2], corners[0]));
     const squaredNormal = dot(normal, normal);
@@ -204,11 +209,13 @@ function crossing([a, b, c], p, q) {
  * Returns the signed distance of a point of an exact leaf, with its gradient.
  * @param {Field} field
  * @param {number} leaf
- * @param {Vector} x  in the field's units
+ * @param {Vector} local  the point in the leaf's local coordinates
+ * @param {Vector} x  the point in the field's units
  * @returns {{value: number, gradient: Vector}}
  */
-export function evaluateExact(field, leaf, x) {
-  const nearest = nearestFeature(field, leaf, x);
+export function evaluateExact(field, leaf, local, x) {
+  const octant = local.reduce((bits, u, axis) => bits | (u >= 0 ? 1 << axis : 0), 0);
+  const nearest = nearestFeature(field, leaf, octant, x);
   const distance = Math.sqrt(nearest.squared);
   const isFace = nearest.vertices.length === 0;
   const rule = signRule(field, leaf);

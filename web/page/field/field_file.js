@@ -23,6 +23,7 @@
  * @property {number} targetError
  * @property {number} tolerance
  * @property {number} blend  width of the blended zones as a part of a cell's edges; 0: none
+ * @property {Float32Array | null} zones  of a blended field: the three BlendZoneBounds of each node
  * @property {{near: number, nearRms: number, nearMax: number, rms: number, max: number} | null} measured
  * @property {Uint32Array} low  the low halves of the nodes
  * @property {Uint32Array} high  the high halves of the nodes
@@ -40,6 +41,7 @@ const OLDEST_VERSION = 10;
 const NEWEST_VERSION = 11;
 const MOST_DEGREES = 30;
 const MOST_LEVELS = 20;
+const MOST_BLEND = 0.25;
 export const EXACT_DEGREE = 31;
 
 /**
@@ -163,15 +165,17 @@ export function readField(bytes) {
     lists: cursor.words(header.lists),
     offset: header.offset,
   };
+  cursor.skip(8); // checksum, in place of which the zlib stream has its own
+  const bytesOfFile = cursor.at;
+  const zones = header.blend > 0 ? readZones(cursor, header) : null;
   const first = new Uint32Array(low.length);
   const { name, grid, lower, upper, targetError, tolerance, blend, measured } = header;
   const size = /** @type {Vector} */ (upper.map((x, axis) => x - lower[axis]));
   /** @type {Field} */
   const field = {
-    name, grid, lower, upper, size, box: withinDomain(header.box, lower, upper), targetError, tolerance, blend, measured, low, high, first,
-    coefficients: new Float32Array(0), exact, bytes: bytes.length,
+    name, grid, lower, upper, size, box: withinDomain(header.box, lower, upper), targetError, tolerance, blend, zones, measured, low, high, first,
+    coefficients: new Float32Array(0), exact, bytes: bytesOfFile,
   };
-  if (blend > 0) throw new FieldError("it is blended, which this page cannot draw");
   checkTree(field);
   field.coefficients = isQuantized ? dequantized(field, quantized, header.step, header.meanBits) : placed(field, plain);
   return field;
@@ -188,6 +192,18 @@ function withinDomain(box, lower, upper) {
   const low = /** @type {Vector} */ (box[0].map((x, a) => Math.max(x, lower[a])));
   const high = /** @type {Vector} */ (box[1].map((x, a) => Math.min(x, upper[a])));
   return low.every((x, a) => x <= high[a]) ? [low, high] : [lower, upper];
+}
+
+/**
+ * Reads the bounds of blend zones, which the program writes behind the file.
+ * @param {Cursor} cursor
+ * @param {{nodes: number, blend: number}} header
+ */
+function readZones(cursor, { nodes, blend }) {
+  if (blend > MOST_BLEND) throw new FieldError("the field is damaged: its blended zones are too wide");
+  const zones = new Float32Array(cursor.block(3 * 4 * nodes));
+  if (!zones.every((bound) => bound >= 0)) throw new FieldError("the field is damaged: a bound of its blended zones is no number");
+  return zones;
 }
 
 /**

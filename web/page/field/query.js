@@ -1,6 +1,7 @@
 // Values and gradients of a field at points, in double precision.
 
 import { degreeOf, isExact, isLeaf } from "./field_file.js";
+import { evaluateBlended, isInBlendZone } from "./blend.js";
 import { evaluateExact } from "./exact_leaf.js";
 
 /** @typedef {import("./field_file.js").Field} Field */
@@ -12,7 +13,7 @@ import { evaluateExact } from "./exact_leaf.js";
  * @property {number} node
  * @property {number} depth
  * @property {Vector} cell  integer coordinates of the cell, in units of its edges from the domain's lower corner
- * @property {Vector} local  the point in [−1, 1]³
+ * @property {Vector} local  the point, in [−1, 1]³ if the leaf contains it
  */
 
 /** @typedef {{value: number, gradient: Vector}} ValueAndGradient */
@@ -92,33 +93,44 @@ export function query(field, point) {
  */
 export function queryGrid(field, grid) {
   const leaf = leafAt(field, grid);
-  if (!leaf) return null;
-  return { ...evaluateLeaf(field, grid, leaf), leaf };
+  return leaf && { ...evaluateInLeaf(field, grid, leaf), leaf };
 }
 
 /**
- * Evaluates one leaf at a point.
+ * Evaluates the field at a point of a leaf. On a face of the leaf, the result is the limit from within the leaf.
+ * @param {Field} field
+ * @param {Vector} grid  grid coordinates of the point
+ * @param {LeafPoint} leaf
+ * @returns {ValueAndGradient}
+ */
+function evaluateInLeaf(field, grid, leaf) {
+  if (isInBlendZone(field, leaf)) return evaluateBlended(field, grid, (near) => evaluateLeaf(field, grid, near));
+  return evaluateLeaf(field, grid, leaf);
+}
+
+/**
+ * Evaluates the function of one leaf at a point, which may lie beyond the leaf's faces.
  * @param {Field} field
  * @param {Vector} grid  grid coordinates of the point
  * @param {LeafPoint} leaf  the leaf, with the point's local coordinates in it
  * @returns {ValueAndGradient}
  */
-export function evaluateLeaf(field, grid, leaf) {
-  if (isExact(field, leaf.node)) return evaluateExact(field, leaf.node, worldPoint(field, grid));
+function evaluateLeaf(field, grid, leaf) {
+  if (isExact(field, leaf.node)) return evaluateExact(field, leaf.node, leaf.local, worldPoint(field, grid));
   const { value, gradient } = evaluatePolynomial(field.coefficients, field.first[leaf.node], degreeOf(field, leaf.node), leaf.local);
   const scale = 2 * 2 ** leaf.depth;
   return { value, gradient: /** @type {Vector} */ (gradient.map((g, a) => (g * scale * field.grid[a]) / field.size[a])) };
 }
 
 /**
- * Evaluates the function of a leaf at a point that is not necessarily in it.
+ * Evaluates the field at a point of a leaf, with the limit from within the leaf on its faces.
  * @param {Field} field
  * @param {import("./leaves.js").OctreeNode} leaf
  * @param {Vector} grid  grid coordinates of the point
  */
 export function evaluateIn(field, leaf, grid) {
   const local = /** @type {Vector} */ (grid.map((x, a) => 2 * (x * 2 ** leaf.depth - leaf.cell[a]) - 1));
-  return evaluateLeaf(field, grid, { ...leaf, local });
+  return evaluateInLeaf(field, grid, { ...leaf, local });
 }
 
 const kRow = 32;

@@ -1,5 +1,6 @@
 // Lengths in a field: the distance between two points, and the thickness of the body at a point of its surface.
 
+import { blendDifference } from "../field/blend.js";
 import { isExact } from "../field/field_file.js";
 import { piecesAlong, pointBetween } from "./line_probe.js";
 import { evaluateIn, gridPoint, query } from "../field/query.js";
@@ -14,7 +15,7 @@ import { add, length, normalized, scaled, subtract } from "../field/vector.js";
 const SHORTEST_STEP = 1e-4;
 
 /**
- * Returns a bound of the gradient's length in a leaf, by which steps are safe.
+ * Returns a bound of the length of the gradient of a leaf's function, by which steps are safe.
  * @param {Field} field
  * @param {Bounds} bounds
  * @param {OctreeNode} leaf
@@ -47,6 +48,7 @@ export function thicknessAt(field, bounds, point, offset) {
     const valueAt = (/** @type {number} */ s) => evaluateIn(field, leaf, gridPoint(field, pointBetween(point, end, s / reach))).value - offset;
     const shortest = (SHORTEST_STEP * Math.min(...field.size.map((x, a) => x / field.grid[a]))) / 2 ** leaf.depth;
     const steepest = steepestIn(field, bounds, leaf);
+    const blending = 2 * blendDifference(field, leaf.node); // at both ends of a step
     const last = leave * reach;
     let s = enter * reach;
     let value = valueAt(s);
@@ -56,7 +58,7 @@ export function thicknessAt(field, bounds, point, offset) {
     }
     for (; s < last; value = before) {
       isInside ||= value < 0;
-      const next = Math.min(s + Math.max(Math.abs(value) / steepest, shortest), last);
+      const next = Math.min(s + Math.max((Math.abs(value) - blending) / steepest, shortest), last);
       before = valueAt(next);
       if (isInside && before >= 0) return crossingBetween(valueAt, s, next);
       s = next;
