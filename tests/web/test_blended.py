@@ -11,7 +11,7 @@ import pytest
 
 import test_page
 import test_questions
-from conftest import started
+from conftest import package, started
 from pages import asked, opened, payload, queried, rested
 from test_page import pixels, points_in
 
@@ -60,6 +60,21 @@ def test_values_differ_from_those_of_the_program_by_rounding_alone(
     assert abs(values(browser, points) - expected).max() < 1e-12
     asked(browser, "field.blend *= 1 + 1e-6")
     assert abs(values(browser, points) - expected).max() > 1e-9, "the comparison would notice other blend zones"
+
+
+def test_leaves_that_were_built_without_blending_have_the_values_of_the_program(browser: Any, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
+    """The lists of such exact leaves lack triangles beyond the leaf, so that it matters which are searched."""
+    program("build", "builtin:gear", "--target-error", "1e-3", "--coefficients", "double", "-o", tmp_path / "jumping.hpsdf")
+    field = tmp_path / "wide.hpsdf"
+    program("blend", tmp_path / "jumping.hpsdf", "--width", "0.25", "-o", field)
+    program("page", field, "--pictures=false", "-o", field.with_suffix(".html"))
+    browser.get(field.with_suffix(".html").as_uri())
+    wait = package("selenium.webdriver.support.ui").WebDriverWait(browser, 120)
+    wait.until(lambda page: page.execute_script("return Boolean(window.hpsdf)"))  # its picture takes long
+    points = points_in(browser, 6000)
+    theirs = queried(program, field, points, tmp_path)
+    expected = numpy.stack([theirs[name] for name in ("distance", "gx", "gy", "gz")], axis=1)
+    assert abs(values(browser, points) - expected).max() < 1e-12
 
 
 def test_pictures_show_the_blended_field(browser: Any, field: pathlib.Path) -> None:
