@@ -86,7 +86,7 @@ def test_questions_are_answered_by_the_blended_field(browser: Any, field: pathli
     if field.stem == "exact":
         pytest.skip("one field suffices")
     test_questions.test_lines_equal_those_of_the_program(browser, field, program, tmp_path, "through")
-    greatest = "const all = new hpsdf.Jumps(field); all.run(1e9); return Math.max(...all.cells.map((_, n) => all.at(n).value))"
+    greatest = "const all = new hpsdf.Jumps(field); all.run(1e9); return Math.max(...all.axes.map((_, n) => all.at(n).value))"
     assert asked(browser, greatest) < 1e-12
     thickness = "return hpsdf.thicknessAt(field, page.viewer.painter.renderer.bounds, [1, 0, 0], 0)"
     assert asked(browser, thickness) == pytest.approx(0.6, abs=3 * asked(browser, "return field.measured.nearMax"))
