@@ -75,7 +75,7 @@ def picked(browser: Any, lines: tuple[str, ...], pixels: Any) -> list[Any]:
             browser,
             f"""
             const [width, height] = [{SIZE[0]}, {SIZE[1]}], [lines, pixels] = arguments;
-            const {{renderer}} = page.viewer.painter, view = viewFrom(lines, firstView(field), field);
+            const {{renderer}} = page.viewer.painter, {{view}} = viewFrom(lines, firstView(field), field);
             const rays = raysOf(view.orbit, field, width / height), isSlice = view.kind === 'slice';
             const hits = isSlice ? renderer.slice(planeOf(view, field, width, height), width, height) : renderer.surface(rays, width, height, view.offset);
             const buffer = hits.read();

@@ -46,7 +46,7 @@ def pixels(browser: Any, view: str) -> tuple[Any, Any]:
 @pytest.mark.parametrize("plane", ["axis=x", "axis=y offset=0.1", "axis=z", "through=0.1,0,0,1,2,0.5"])
 def test_slices_show_the_cells_of_the_field(browser: Any, field: pathlib.Path, plane: str) -> None:
     opened(browser, field.with_suffix(".html"))
-    made = f"planeOf(viewFrom('plane {plane} zoom=1.3', firstView(field), field), field, {SIZE[0]}, {SIZE[1]})"
+    made = f"planeOf(viewFrom('plane {plane} zoom=1.3', firstView(field), field).view, field, {SIZE[0]}, {SIZE[1]})"
     integers, floats = pixels(browser, f"slice({made}, width, height)")
     script = f"""
         const plane = {made};
@@ -124,8 +124,8 @@ VIEWS = {
 def test_the_copied_view_is_a_script_of_the_program(browser: Any, field: pathlib.Path, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
     opened(browser, field.with_suffix(".html"))
     for name, given in VIEWS.items():
-        lines = asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", given)
-        assert asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", lines) == lines
+        lines = asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field).view, field)", given)
+        assert asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field).view, field)", lines) == lines
         script = tmp_path / f"{name}.hps"
         script.write_text(f"load {field}\n{lines}\nshow size=320x240\nshot output={tmp_path}/{name}.png\n")
         program("run", script)
@@ -137,7 +137,7 @@ def test_the_page_reads_the_views_that_the_program_copies(browser: Any, field: p
     for name, given in VIEWS.items():
         printed = program("run", "-e", f"load {field}; {given}; copy-view")
         copied = printed[printed.index("\nshow ") :]
-        theirs, ours = (asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field), field)", text) for text in (copied, given))
+        theirs, ours = (asked(browser, "return scriptOf(viewFrom(arguments[0], firstView(field), field).view, field)", text) for text in (copied, given))
         assert theirs == ours, name
 
 
@@ -145,9 +145,13 @@ def test_lines_that_the_page_does_not_understand_are_named(browser: Any, field: 
     if field.stem != "torus":
         pytest.skip("one field suffices")
     opened(browser, field.with_suffix(".html"))
-    for wrong in ("fly 3", "camera 1,2", "plane through=0,0,0,0,0,0", "show nothing", "color slope", "surface clip=w", "camera 1,2,x"):
+    for wrong in ("fly 3", "camera 1,2", "plane through=0,0,0,0,0,0", "show nothing", "color slope", "surface clip=w", "camera 1,2,x", "cells lines depths=x", "cells boxes"):
         browser.execute_script("hpsdf.page.apply(arguments[0])", wrong)
         assert wrong in browser.find_element("id", "message").text
+    browser.execute_script("hpsdf.page.apply('color slope; camera 11,12,1.3; cells lines depths=0-2')")
+    assert "color slope" in browser.find_element("id", "message").text
+    lines = browser.find_element("id", "script").get_attribute("value")
+    assert "camera 11,12,1.3" in lines and "depths=0,1,2" in lines, "the other lines are shown"
 
 
 def test_cuts_planes_and_cells_stand_in_the_picture_of_a_surface(browser: Any, field: pathlib.Path) -> None:

@@ -224,12 +224,9 @@ class Page {
    * @param {string} lines
    */
   apply(lines) {
-    try {
-      this.theView = viewFrom(lines, this.view, this.field);
-    } catch (error) {
-      return this.say(error instanceof Error ? error.message : String(error));
-    }
-    this.say("");
+    const { view, problems } = viewFrom(lines, this.view, this.field);
+    this.theView = view;
+    this.say(problems.join(" "));
     for (const viewer of this.viewers) viewer.view = this.view;
     this.changed();
   }

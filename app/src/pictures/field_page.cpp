@@ -165,16 +165,13 @@ std::vector<std::string> distinctNames(const std::vector<std::string>& files) {
 }
 
 std::string pageView(const std::string& script) {
-  constexpr std::array kColors = {"normal", "degree", "depth", "distance", "value-jump", "gradient-jump", "cell-error"};
   std::istringstream lines(script);
   std::string view;
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
-    std::string command, value;
-    words >> command >> value;
-    const bool isShown =
-        !(command == "cells" && value == "boxes") && !(command == "color" && !contains(kColors, value));
-    if (isShown && contains(kViewCommands, command)) view += line + "\n";
+    std::string command;
+    words >> command;
+    if (contains(kViewCommands, command)) view += line + "\n";
   }
   return view;
 }

@@ -9,15 +9,16 @@ import { forEachLeaf } from "../field/leaves.js";
  * Returns the edges of leaves, in the field's units: for each of its two ends x, y, z and the length of the edge. An edge that cells of one
  * depth share is there once.
  * @param {Field} field
- * @param {"all" | number} depths
+ * @param {string} depths  all, or depths with commas between them
  */
 export function cellLines(field, depths) {
   /** @type {number[]} */
   const numbers = [];
   /** @type {Map<number, Set<number>>} */
   const known = new Map();
+  const chosen = depths === "all" ? null : new Set(depths.split(",").map(Number));
   forEachLeaf(field, (_, depth, cell) => {
-    if (depths !== "all" && depth !== depths) return;
+    if (chosen && !chosen.has(depth)) return;
     const [nx, ny] = field.grid.map((x) => x * 2 ** depth + 1);
     for (let edge = 0; edge < 12; ++edge) {
       // Edges 0 to 3 run along x, 4 to 7 along y, 8 to 11 along z. The two low bits choose the sides along the other axes.

@@ -83,8 +83,8 @@ export class Painter {
     this.field = field;
     this.renderer = new FieldRenderer(gl, field, sources);
     const vertex = "#version 300 es\n" + sources["full_screen.vert"];
-    this.coloring = this.renderer.program(vertex, sources["picture.frag"]);
-    this.lining = this.renderer.program(sources["cells.vert"], sources["cells.frag"]);
+    this.renderer.shaders.coloring = () => [vertex, sources["picture.frag"]];
+    this.renderer.shaders.lining = () => [sources["cells.vert"], sources["cells.frag"]];
     this.lineArray = gl.createVertexArray();
     this.lineBuffer = gl.createBuffer();
     gl.bindVertexArray(this.lineArray);
@@ -192,12 +192,13 @@ export class Painter {
    * @returns {Job}
    */
   colorJob({ view, rays, hits, section, colors }) {
-    const { gl, renderer, coloring } = this;
+    const { gl, renderer } = this;
     const isSlice = view.kind === "slice";
     const quantity = isSlice ? view.sliceColor : view.surfaceColor;
     const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
       const { mode, texture, range, ofCells } = this.coloringOf(quantity);
       colors.bind();
+      const coloring = renderer.program("coloring");
       renderer.checkLinked(coloring);
       gl.useProgram(coloring);
       const at = (/** @type {string} */ name) => renderer.at(coloring, name);
@@ -212,7 +213,7 @@ export class Painter {
       gl.uniform1i(at("outlines"), quantity === "distance" || quantity === "normal" ? 0 : 1);
       renderer.drawRows(first, count, hits.width);
     };
-    return { kind: "colors", hits, size: hits.height, draw };
+    return { kind: "colors", programs: ["coloring"], hits, size: hits.height, draw };
   }
 
   /**
@@ -278,7 +279,8 @@ export class Painter {
    * @param {Target | null} section
    */
   paintCells(view, scale, rays, hits, section) {
-    const { gl, canvas, renderer, field, lining } = this;
+    const { gl, canvas, renderer, field } = this;
+    const lining = renderer.program("lining");
     renderer.checkLinked(lining);
     gl.useProgram(lining);
     const at = (/** @type {string} */ name) => renderer.at(lining, name);

@@ -49,6 +49,7 @@ void main() { color = vec4(1.0); }`;
  * another one and returns true, or returns false if all rays have ended.
  * @typedef {object} Job
  * @property {string} kind
+ * @property {string[]} programs  of the renderer, which it uses
  * @property {Target} hits
  * @property {number} size  number of rows or blocks
  * @property {(first: number, count: number) => void} draw
@@ -261,11 +262,17 @@ export class FieldRenderer {
     };
     const leaves = ["field.glsl", hasExact ? "leaves_exact.glsl" : "leaves_polynomial.glsl", field.blend > 0 ? "leaves_blended.glsl" : "leaves_alone.glsl"];
     const of = (/** @type {string[]} */ ...names) => webShader(names.map((name) => sources[name]));
-    this.slicing = this.program(of("full_screen.vert"), of(...leaves, "slice.frag"));
-    this.marching = this.program(of("surface.vert"), of(...leaves, "surface.glsl", "surface_march.frag"));
-    this.hitting = this.program(of("surface.vert"), of(...leaves, "surface.glsl", "surface_hit.frag"));
-    this.sectioning = this.program(of("full_screen.vert"), of(...leaves, "surface.glsl", "section.frag"));
-    this.asking = this.program(UNDER_WAY_VERTEX, UNDER_WAY_FRAGMENT);
+    /** @type {Record<string, () => [string, string]>} */
+    this.shaders = {
+      slicing: () => [of("full_screen.vert"), of(...leaves, "slice.frag")],
+      marching: () => [of("surface.vert"), of(...leaves, "surface.glsl", "surface_march.frag")],
+      hitting: () => [of("surface.vert"), of(...leaves, "surface.glsl", "surface_hit.frag")],
+      sectioning: () => [of("full_screen.vert"), of(...leaves, "surface.glsl", "section.frag")],
+      asking: () => [UNDER_WAY_VERTEX, UNDER_WAY_FRAGMENT],
+    };
+    /** @type {Map<string, WebGLProgram>} */
+    this.programs = new Map();
+    this.parallelCompile = gl.getExtension("KHR_parallel_shader_compile");
     this.answer = new ColorTarget(this, 1, 1);
     /** @type {Map<WebGLProgram, Map<string, WebGLUniformLocation | null>>} */
     this.locations = new Map();
@@ -310,10 +317,30 @@ export class FieldRenderer {
   }
 
   /**
+   * Returns the program with one of the names in `shaders`. It is made when it is first asked for, because a picture needs few of them.
+   * @param {string} name
+   */
+  program(name) {
+    const program = this.programs.get(name) ?? this.compiled(...this.shaders[name]());
+    this.programs.set(name, program);
+    return program;
+  }
+
+  /**
+   * Returns false while the graphics card compiles one of these programs. Using one before makes the page wait.
+   * @param {string[]} names
+   */
+  areCompiled(names) {
+    const { gl, parallelCompile } = this;
+    const programs = names.map((name) => this.program(name));
+    return !parallelCompile || programs.every((program) => gl.getProgramParameter(program, parallelCompile.COMPLETION_STATUS_KHR));
+  }
+
+  /**
    * @param {string} vertex
    * @param {string} fragment
    */
-  program(vertex, fragment) {
+  compiled(vertex, fragment) {
     const { gl } = this;
     const program = gl.createProgram();
     if (!program) throw new GraphicsError("the graphics card was lost");
@@ -406,12 +433,13 @@ export class FieldRenderer {
     const { wholes, fractions } = buffers.setPositions(this.positions(plane, width, height));
     const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
       hits.bind([gl.COLOR_ATTACHMENT0, gl.NONE]);
-      this.use(this.slicing);
-      this.bind(this.slicing, "wholes", 0, wholes);
-      this.bind(this.slicing, "fractions", 1, fractions);
+      const slicing = this.program("slicing");
+      this.use(slicing);
+      this.bind(slicing, "wholes", 0, wholes);
+      this.bind(slicing, "fractions", 1, fractions);
       this.drawRows(first, count, width);
     };
-    return { kind: "slice", hits, size: height, draw };
+    return { kind: "slice", programs: ["slicing"], hits, size: height, draw };
   }
 
   /**
@@ -492,8 +520,9 @@ export class FieldRenderer {
     const found = surfaceBlocks(field, this.bounds, rays, width, height, offset);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.blocks);
     gl.bufferData(gl.ARRAY_BUFFER, found.blocks, gl.STREAM_DRAW);
-    /** @type {(program: WebGLProgram, target: Target, from: Target, first: number, count: number) => void} */
-    const pass = (program, target, from, first, count) => {
+    /** @type {(name: string, target: Target, from: Target, first: number, count: number) => void} */
+    const pass = (name, target, from, first, count) => {
+      const program = this.program(name);
       target.bind([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
       this.use(program);
       this.setRays(program, rays, width, height, offset, clip);
@@ -510,19 +539,19 @@ export class FieldRenderer {
     const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
       latest = state;
       steps = MOST_STEPS;
-      pass(this.marching, state, hits, first, count); // the first march declares the textures of a state, but does not read them
-      pass(this.hitting, hits, state, first, count);
+      pass("marching", state, hits, first, count); // the first march declares the textures of a state, but does not read them
+      pass("hitting", hits, state, first, count);
     };
     const resume = (/** @type {number} */ first, /** @type {number} */ count) => {
       if (steps >= STEPS_IN_ALL || !this.isAnyUnderWay(buffers, latest, first, count)) return false;
       const next = latest === state ? buffers.targetOf("spare", width, height) : state;
       steps += MOST_STEPS;
-      pass(this.marching, next, latest, first, count);
-      pass(this.hitting, hits, next, first, count);
+      pass("marching", next, latest, first, count);
+      pass("hitting", hits, next, first, count);
       latest = next;
       return true;
     };
-    return { kind: "surface", hits, size: found.blocks.length / 3, draw, resume };
+    return { kind: "surface", programs: ["marching", "hitting", "asking"], hits, size: found.blocks.length / 3, draw, resume };
   }
 
   /**
@@ -536,8 +565,9 @@ export class FieldRenderer {
     const { gl } = this;
     this.answer.bind();
     gl.clearBufferfv(gl.COLOR, 0, new Float32Array(4));
-    this.use(this.asking);
-    this.bind(this.asking, "stateIntegers", 0, state.integers);
+    const asking = this.program("asking");
+    this.use(asking);
+    this.bind(asking, "stateIntegers", 0, state.integers);
     gl.bindVertexArray(buffers.blockArray);
     gl.drawArrays(gl.POINTS, first, count);
     const pixel = new Uint8Array(4);
@@ -570,19 +600,20 @@ export class FieldRenderer {
    * @returns {Job}
    */
   sectionJob(buffers, rays, width, height, offset, clip, plane) {
-    const { gl, field, sectioning } = this;
+    const { gl, field } = this;
     const hits = buffers.resize("section", width, height);
     const cut = clip ? gridPlane(field, clipPoint(field, clip), axisVector(clip.axis)) : [0, 0, 0, 0];
     const shown = plane ? gridPlane(field, plane.point, plane.normal) : [0, 0, 0, 0];
     const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
       hits.bind([gl.COLOR_ATTACHMENT0, gl.NONE]);
+      const sectioning = this.program("sectioning");
       this.use(sectioning);
       this.setRays(sectioning, rays, width, height, offset, clip);
       gl.uniform4fv(this.at(sectioning, "planes"), [...cut, ...shown]);
       gl.uniform3f(this.at(sectioning, "nudge"), ...(clip ? scaled(axisVector(clip.axis), (isEyeAbove(rays, clip) ? -CLIP_NUDGE : CLIP_NUDGE) * field.grid[clip.axis]) : axisVector(-1)));
       this.drawRows(first, count, width);
     };
-    return { kind: "section", hits, size: height, draw };
+    return { kind: "section", programs: ["sectioning"], hits, size: height, draw };
   }
 
   /**

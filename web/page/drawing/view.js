@@ -22,7 +22,7 @@ import { add, dot, normalized, scaled, subtract } from "../field/vector.js";
  * @property {boolean} planeInSpace  whether the plane stands in the picture of the surface too
  * @property {Vector | null} target  the point in the middle of a slice; null: the middle of the section
  * @property {number} zoom  of the slice
- * @property {"none" | "all" | number} cells  whose edges stand in the picture of the surface; a number: those of this depth
+ * @property {string} cells  whose edges stand in the picture of the surface: none, all, or depths with commas between them
  * @property {Quantity} surfaceColor
  * @property {Quantity} sliceColor
  * @property {Vector | null} mark  a point to which the picture points
@@ -211,6 +211,19 @@ class Words {
   }
 
   /**
+   * Returns the levels that a list of numbers and ranges such as 0-3,5 names, in rising order.
+   * @param {string} text
+   */
+  levels(text) {
+    const levels = text.split(",").flatMap((part) => {
+      const [first, last] = /^\d+(-\d+)?$/.test(part) ? part.split("-").map(Number) : [NaN];
+      if (!(first >= 0 && (last ?? first) - first <= 30)) throw new ViewError(`“${this.line}”: “${part}” is no depth and no range of depths`);
+      return Array.from({ length: Math.max((last ?? first) - first + 1, 0) }, (_, n) => first + n);
+    });
+    return [...new Set(levels)].sort((a, b) => a - b);
+  }
+
+  /**
    * Calls `set` with the numbers of a name if it is given, or with null if it has the word `none`.
    * @param {string} name
    * @param {number} count
@@ -284,7 +297,7 @@ const COMMANDS = {
   cells(words, view) {
     const depths = words.named.get("depths") ?? "all";
     if (words.plain[0] === "none") view.cells = "none";
-    else if (words.plain[0] === "lines" || words.plain.length === 0) view.cells = depths === "all" ? "all" : words.numbers(depths, 1)[0];
+    else if (words.plain[0] === "lines" || words.plain.length === 0) view.cells = depths === "all" ? "all" : words.levels(depths).join(",");
     else throw new ViewError(`“${words.line}”: the page draws cells by lines`);
   },
   color(words, view) {
@@ -329,20 +342,29 @@ export function normalFor(choice, view) {
 }
 
 /**
- * Returns the view that lines of a script show, from another view for what they do not tell.
+ * Returns the view that lines of a script show, from another view for what they do not tell, with a sentence about each line that the
+ * page does not understand.
  * @param {string} text
  * @param {View} before
  * @param {Field} field
- * @returns {View}
+ * @returns {{view: View, problems: string[]}}
  */
 export function viewFrom(text, before, field) {
   const view = structuredClone(before);
+  const problems = [];
   for (const line of text.split(/[;\n]/)) {
     const words = new Words(line.replace(/#.*/, ""));
     if (words.command === "" || IGNORED.includes(words.command)) continue;
-    const command = COMMANDS[words.command];
-    if (!command) throw new ViewError(`“${words.line}”: the page does not know “${words.command}”`);
-    command(words, view, field);
+    const attempt = structuredClone(view);
+    try {
+      const command = COMMANDS[words.command];
+      if (!command) throw new ViewError(`“${words.line}”: the page does not know “${words.command}”`);
+      command(words, attempt, field);
+      Object.assign(view, attempt);
+    } catch (error) {
+      if (!(error instanceof ViewError)) throw error;
+      problems.push(error.message);
+    }
   }
-  return view;
+  return { view, problems };
 }

@@ -15,6 +15,7 @@ import { planeOf } from "./view.js";
 /** @typedef {import("./view.js").View} View */
 
 const FRAME_TIME = 45; // milliseconds that a coarse picture may take
+const LEAST_SCALE = 0.1;
 const PORTION_TIME = 50; // milliseconds that a portion of the sharp picture may take
 const FIRST_SHARE = 0.02; // of a job, at first
 const MOST_SHARE = 0.25;
@@ -45,7 +46,7 @@ export class Viewer {
     this.painter = new Painter(canvas, field, sources);
     this.coarse = new Buffers(this.painter.renderer);
     this.sharp = new Buffers(this.painter.renderer);
-    this.scale = 0.2; // pixels of the buffers for each of the canvas while the view changes
+    this.scale = 2 * LEAST_SCALE; // pixels of the buffers for each of the canvas while the view changes
     /** @type {Map<string, number>} */
     this.shares = new Map(); // what part of a job of each kind is done at a time
     this.isStale = false;
@@ -93,13 +94,16 @@ export class Viewer {
   }
 
   async drawCoarse() {
-    const begin = performance.now();
     const drawing = this.painter.drawing(this.view, this.scale, this.coarse);
+    const programs = drawing.jobs.flatMap((job) => job.programs);
+    while (!this.painter.renderer.areCompiled(programs)) await pause(5);
+    const begin = performance.now();
+    const isFirst = !this.shown; // it takes longer, because programs are made ready
     for (const { draw, size } of drawing.jobs) if (size > 0) draw(0, size);
     this.show(drawing);
     await this.done();
     const taken = performance.now() - begin;
-    this.scale = Math.min(Math.max(this.scale * Math.sqrt(FRAME_TIME / Math.max(taken, 1)), 0.08), 1);
+    if (!isFirst) this.scale = Math.min(Math.max(this.scale * Math.sqrt(FRAME_TIME / Math.max(taken, 1)), LEAST_SCALE), 1);
   }
 
   async drawSharp() {

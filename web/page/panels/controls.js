@@ -50,7 +50,7 @@ export class Controls {
       const axis = "xyz".indexOf(value);
       view.clip = axis < 0 ? null : { axis, at: middleOf(field)[axis] };
     });
-    this.onSelect("cells", (view, _, value) => (view.cells = value === "none" || value === "all" ? value : Number(value)));
+    this.onSelect("cells", (view, _, value) => (view.cells = value));
     this.onInput("offset", (view, _, value) => (view.offset = value));
     this.onInput("place", (view, field, value) => movePlaneTo(view, field, value));
     this.onInput("cut-place", (view, _, value) => view.clip && (view.clip.at = value));
@@ -101,7 +101,8 @@ export class Controls {
     setChoices(element("cut", HTMLSelectElement), [["none", "none"], ["x", "x"], ["y", "y"], ["z", "z"]], view.clip ? "xyz"[view.clip.axis] : "none");
     /** @type {[string, string][]} */
     const levels = depths.map(({ level }) => [String(level), `depth ${level}`]);
-    setChoices(element("cells", HTMLSelectElement), [["none", "none"], ["all", "all"], ...levels], String(view.cells));
+    if (![...levels.map(([level]) => level), "none", "all"].includes(view.cells)) levels.push([view.cells, `depths ${view.cells}`]);
+    setChoices(element("cells", HTMLSelectElement), [["none", "none"], ["all", "all"], ...levels], view.cells);
     element("in-space", HTMLInputElement).checked = view.planeInSpace;
     element("normal", HTMLInputElement).value = view.normal.map(shortNumber).join(", ").replaceAll("−", "-");
     const reach = 0.25 * Math.min(...field.size);
