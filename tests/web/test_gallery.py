@@ -1,5 +1,6 @@
 """Pages of several fields, pictures for browsers that cannot show fields, and the pages of other commands that show fields."""
 
+import base64
 import html
 import os
 import pathlib
@@ -11,7 +12,7 @@ from typing import Any
 import pytest
 
 from conftest import package, started
-from pages import complaints, opened, rested
+from pages import applied, complaints, opened, rested
 
 NAMES = ("torus", "box")
 
@@ -172,3 +173,49 @@ def test_a_lens_shows_the_pixels_of_a_failed_check(browser: Any, failed_check: p
     assert [caption.text for caption in lens.find_elements("tag name", "figcaption")][:2] == [baseline, actual]
     assert baseline != actual
     assert complaints(browser) == []
+
+
+BUNNY = pathlib.Path("/usr/share/glmark2/models/bunny.obj")
+PICTURE = pathlib.Path(__file__).parents[2] / "docs" / "page.png"
+
+
+def difference(browser: Any, one: bytes, other: bytes) -> float:
+    """Returns the mean difference of two pictures of one size, from 0 to 255, after averaging squares of 8 × 8 pixels."""
+    script = """
+        const [one, other, done] = arguments;
+        const pixels = async (text) => {
+          const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${text}`)).blob());
+          const canvas = new OffscreenCanvas(Math.ceil(image.width / 8), Math.ceil(image.height / 8)), context = canvas.getContext("2d");
+          context.imageSmoothingQuality = "high";
+          context.drawImage(image, 0, 0, canvas.width, canvas.height);
+          return [`${image.width} ${image.height}`, context.getImageData(0, 0, canvas.width, canvas.height).data];
+        };
+        Promise.all([pixels(one), pixels(other)]).then(([[size, a], [otherSize, b]]) =>
+          done(size === otherSize ? a.reduce((sum, x, n) => sum + Math.abs(x - b[n]), 0) / a.length : 255));
+    """
+    browser.get("about:blank")
+    return float(browser.execute_async_script(script, base64.b64encode(one).decode(), base64.b64encode(other).decode()))
+
+
+def test_the_manuals_picture_is_that_of_the_page(program: Callable[..., str], tmp_path: pathlib.Path) -> None:
+    """HPSDF_UPDATE=1 writes the picture anew. Browsers differ in their letters, so that the comparison is loose."""
+    if not BUNNY.exists():
+        pytest.skip("glmark2-data is not installed")
+    program("build", BUNNY, "-o", tmp_path / "bunny.hpsdf")
+    program("page", tmp_path / "bunny.hpsdf", "-o", tmp_path / "bunny.html", "--pictures=false")
+    browser = started("--window-size=1180,760")
+    try:
+        opened(browser, tmp_path / "bunny.html")
+        applied(browser, "show surface; camera 24,14,0.95; surface clip=z clip-offset=0.05; color degree")
+        canvas = browser.find_element("tag name", "canvas")
+        package("selenium.webdriver.common.action_chains").ActionChains(browser).move_to_element_with_offset(canvas, -40, 60).perform()
+        made = browser.get_screenshot_as_png()
+        applied(browser, "color depth")
+        wrong = browser.get_screenshot_as_png()
+        if os.environ.get("HPSDF_UPDATE") == "1":
+            PICTURE.write_bytes(made)
+        kept = PICTURE.read_bytes()
+        assert difference(browser, kept, made) < 4
+        assert difference(browser, kept, wrong) > 4, "the comparison would notice other colours"
+    finally:
+        browser.quit()
