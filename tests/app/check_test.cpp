@@ -186,8 +186,7 @@ TEST_F(Check, failedPicturesHaveAPageOfTheirFieldInTheirView) {
   EXPECT_EQ(firstView(live.at("surface.png")),
             "show surface\ncamera 40,20,1.1 target=center up=y projection=perspective\n"
             "surface offset=0 clip=y clip-offset=0.5\ncells none depths=all\ncolor normal of=surface\n");
-  EXPECT_THAT(firstView(live.at("shot.png")),
-              AllOf(HasSubstr("show slice "), HasSubstr("plane axis=y offset=0.5 ")));
+  EXPECT_THAT(firstView(live.at("shot.png")), AllOf(HasSubstr("show slice "), HasSubstr("plane axis=y offset=0.5 ")));
   EXPECT_THAT(live.at("slice.png"), HasSubstr("data-name=\"sphere\""));
   EXPECT_THAT(live.at("shot.png"), HasSubstr("data-name=\"torus\"")) << "the field may be replaced later";
   EXPECT_THAT(page(), HasSubstr("<a href=\"live/looks/shot.png.html\""));
