@@ -4,7 +4,7 @@ import { degreeOf, isLeaf } from "../field/field_file.js";
 import { forEachLeaf } from "../field/leaves.js";
 import { divergingColor, exactColor, orderedColor } from "./colors.js";
 import { FieldRenderer, shownBox } from "./renderer.js";
-import { cellLines } from "./cell_lines.js";
+import { CellLines } from "./cell_lines.js";
 import { worldPoint } from "../field/query.js";
 import { planeOf } from "./view.js";
 import { raysOf } from "./camera.js";
@@ -91,8 +91,10 @@ export class Painter {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.lineBuffer);
     gl.enableVertexAttribArray(0);
     gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 0, 0);
-    /** @type {{cells: View["cells"], ends: number}} */
-    this.shownLines = { cells: "none", ends: 0 };
+    this.linesOf = "none"; // the cells whose edges are on the graphics card
+    this.edges = 0;
+    /** @type {{cells: string, lines: CellLines} | null} */
+    this.collected = null; // edges that are being collected
     /** @type {Map<Quantity, {texture: WebGLTexture, decades: [number, number]}>} */
     this.cellNumbers = new Map(); // quantities of which each cell has one number
     /** @type {Color} */
@@ -220,7 +222,7 @@ export class Painter {
    * Brings a drawing whose jobs are done to the canvas.
    * @param {Drawing} drawing
    */
-  paint({ view, scale, rays, hits, section, colors }) {
+  paint({ scale, colors }) {
     const { gl, canvas } = this;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, colors.frame);
     gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
@@ -228,7 +230,6 @@ export class Painter {
     gl.blitFramebuffer(0, 0, colors.width, colors.height, 0, canvas.height, canvas.width, 0, gl.COLOR_BUFFER_BIT, scale === 1 ? gl.NEAREST : gl.LINEAR);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
-    if (view.kind === "surface" && view.cells !== "none") this.paintCells(view, scale, rays, hits, section);
   }
 
   /**
@@ -271,47 +272,55 @@ export class Painter {
   }
 
   /**
-   * Paints the edges of cells over the picture of a surface.
-   * @param {View} view
-   * @param {number} scale
-   * @param {Rays} rays
-   * @param {Target} hits
-   * @param {Target | null} section
+   * Draws the edges of cells over the picture of a surface that is on the canvas. The portions are edges, which `prepareLines` has
+   * brought to the graphics card.
+   * @param {Drawing} drawing
+   * @returns {Job}
    */
-  paintCells(view, scale, rays, hits, section) {
+  lineJob({ view, scale, rays, hits, section }) {
     const { gl, canvas, renderer, field } = this;
-    const lining = renderer.program("lining");
-    renderer.checkLinked(lining);
-    gl.useProgram(lining);
-    const at = (/** @type {string} */ name) => renderer.at(lining, name);
-    this.bindTextures(lining, { integers: hits.integers, section: (section ?? hits).integers });
-    gl.uniform1i(at("hasSection"), section ? 1 : 0);
-    gl.uniform1f(at("scaleOfBuffers"), scale);
-    gl.uniform1f(at("height"), canvas.height);
-    gl.uniform3f(at("eye"), ...rays.eye);
-    gl.uniform3f(at("ink"), ...this.ink);
-    const [lower, upper] = shownBox(field, rays, view.clip);
-    gl.uniform3f(at("shownLo"), ...worldPoint(field, lower));
-    gl.uniform3f(at("shownHi"), ...worldPoint(field, upper));
-    this.setCamera(lining, rays);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    gl.bindVertexArray(this.lineArray);
-    gl.drawArrays(gl.LINES, 0, this.setLines(view.cells));
-    gl.disable(gl.BLEND);
+    const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
+      const lining = renderer.program("lining");
+      renderer.checkLinked(lining);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+      gl.viewport(0, 0, canvas.width, canvas.height);
+      gl.useProgram(lining);
+      const at = (/** @type {string} */ name) => renderer.at(lining, name);
+      this.bindTextures(lining, { integers: hits.integers, section: (section ?? hits).integers });
+      gl.uniform1i(at("hasSection"), section ? 1 : 0);
+      gl.uniform1f(at("scaleOfBuffers"), scale);
+      gl.uniform1f(at("height"), canvas.height);
+      gl.uniform3f(at("eye"), ...rays.eye);
+      gl.uniform3f(at("ink"), ...this.ink);
+      const [lower, upper] = shownBox(field, rays, view.clip);
+      gl.uniform3f(at("shownLo"), ...worldPoint(field, lower));
+      gl.uniform3f(at("shownHi"), ...worldPoint(field, upper));
+      this.setCamera(lining, rays);
+      gl.enable(gl.BLEND);
+      gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+      gl.bindVertexArray(this.lineArray);
+      gl.drawArrays(gl.LINES, 2 * first, 2 * count);
+      gl.disable(gl.BLEND);
+    };
+    return { kind: "lines", programs: ["lining"], hits, size: this.edges, draw };
   }
 
   /**
-   * Brings the edges of these cells to the graphics card, and returns the number of their ends.
-   * @param {View["cells"]} cells
+   * Collects the edges of these cells for some milliseconds. Returns true when they are on the graphics card.
+   * @param {string} cells  as in a view
+   * @param {number} milliseconds
    */
-  setLines(cells) {
+  prepareLines(cells, milliseconds) {
     const { gl } = this;
-    if (cells === this.shownLines.cells || cells === "none") return this.shownLines.ends;
-    const lines = cellLines(this.field, cells);
+    if (cells === this.linesOf) return true;
+    if (!this.collected || this.collected.cells !== cells) this.collected = { cells, lines: new CellLines(this.field, cells) };
+    const { lines } = this.collected;
+    if (!lines.run(milliseconds)) return false;
     gl.bindBuffer(gl.ARRAY_BUFFER, this.lineBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, lines, gl.STATIC_DRAW);
-    this.shownLines = { cells, ends: lines.length / 4 };
-    return this.shownLines.ends;
+    gl.bufferData(gl.ARRAY_BUFFER, lines.numbers.subarray(0, lines.count), gl.STATIC_DRAW);
+    this.edges = lines.ends / 2;
+    this.linesOf = cells;
+    this.collected = null;
+    return true;
   }
 }

@@ -19,6 +19,8 @@ const LEAST_SCALE = 0.1;
 const PORTION_TIME = 50; // milliseconds that a portion of the sharp picture may take
 const FIRST_SHARE = 0.02; // of a job, at first
 const MOST_SHARE = 0.25;
+const COLLECTING_TIME = 10; // milliseconds that the edges of cells are collected at a time
+const FEW_EDGES = 30_000; // that a coarse picture shows
 const REST = 150; // milliseconds without a change until the sharp picture is begun
 
 /**
@@ -101,19 +103,34 @@ export class Viewer {
     const isFirst = !this.shown; // it takes longer, because programs are made ready
     for (const { draw, size } of drawing.jobs) if (size > 0) draw(0, size);
     this.show(drawing);
+    this.drawFewLines(drawing);
     await this.done();
     const taken = performance.now() - begin;
     if (!isFirst) this.scale = Math.min(Math.max(this.scale * Math.sqrt(FRAME_TIME / Math.max(taken, 1)), LEAST_SCALE), 1);
   }
 
+  /**
+   * Draws the edges of cells over a coarse picture, if there are few.
+   * @param {Drawing} drawing
+   */
+  drawFewLines(drawing) {
+    const { painter } = this;
+    const { kind, cells } = drawing.view;
+    if (kind === "surface" && cells !== "none" && cells === painter.linesOf && painter.edges <= FEW_EDGES) painter.lineJob(drawing).draw(0, painter.edges);
+  }
+
   async drawSharp() {
-    if (this.shown?.scale !== 1) {
-      const drawing = this.painter.drawing(this.view, 1, this.sharp);
+    const { painter, view } = this;
+    const hasLines = view.kind === "surface" && view.cells !== "none";
+    while (hasLines && !this.isStale && !painter.prepareLines(view.cells, COLLECTING_TIME)) await pause(0);
+    if (hasLines || this.shown?.scale !== 1) {
+      const drawing = painter.drawing(view, 1, this.sharp);
       for (const job of drawing.jobs) await this.drawInPortions(job);
       if (this.isStale) return;
       this.show(drawing);
+      if (hasLines) await this.drawInPortions(painter.lineJob(drawing));
     }
-    this.isSharp = true;
+    this.isSharp = !this.isStale;
   }
 
   /**
