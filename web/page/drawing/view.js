@@ -357,7 +357,7 @@ export function viewFrom(text, before, field) {
     if (words.command === "" || IGNORED.includes(words.command)) continue;
     const attempt = structuredClone(view);
     try {
-      const command = COMMANDS[words.command];
+      const command = Object.hasOwn(COMMANDS, words.command) && COMMANDS[words.command];
       if (!command) throw new ViewError(`“${words.line}”: the page does not know “${words.command}”`);
       command(words, attempt, field);
       Object.assign(view, attempt);
