@@ -100,7 +100,7 @@ Writes a page that holds the field and all that is needed to draw it by WebGL 2.
 mailed, attached to a report, or opened from a disk. The field in it is the one that is stored, and its values are computed in
 double precision. Several fields stand in one page, each under a tab of its own.
 
-Use it to show a field to somebody who has no hpsdf. The page takes about 0.06 MB besides the field, and the field a third more than
+Use it to show a field to somebody who has no hpsdf. The page takes about 0.09 MB besides the field, and the field a third more than
 its file. Two small pictures of each field take another 0.1 MB: they are what a browser without WebGL shows, and are drawn by the CPU
 where there is no OpenGL.
 
