@@ -90,6 +90,15 @@ TEST_F(Pages, areOfTheCurrentFieldInScripts) {
   EXPECT_THAT(fieldNames(readFile(at("page.html"))), ElementsAre("torus"));
 }
 
+TEST_F(Pages, takeTheViewThatTheExplorerCopies) {
+  const Outcome copied = run({{"run", "-e", "load " + field() + "; show slice; plane axis=x; arrows 40; copy-view"}});
+  ASSERT_EQ(copied.status, 0) << copied.err;
+  const std::string view = copied.out.substr(copied.out.find("\nshow ") + 1);
+  ASSERT_THAT(view, AllOf(HasSubstr("panel "), HasSubstr("arrows 40"), HasSubstr("triangles ")));
+  const std::string html = page({field(), "--view", view, "--pictures=false"});
+  EXPECT_THAT(found(html, "data-view=\"([^\"]*)\""), ElementsAre(HasSubstr("plane axis=x ")));
+}
+
 TEST_F(Pages, refuseWhatTheyCannotShow) {
   const std::string good = copyOfField("good.hpsdf");
   writeFile(at("cut.hpsdf"), readFile(field()).substr(0, 2000));

@@ -31,6 +31,8 @@ namespace {
 constexpr double kMostFieldBytes = 256e6;
 
 constexpr std::array kViewCommands = {"show", "camera", "surface", "plane", "cells", "color", "worst"};
+/// Commands that `copy-view` writes besides, about what pages do not have. A page passes over them.
+constexpr std::array kOtherViewCommands = {"triangles", "arrows", "beside", "panel"};
 
 bool contains(std::span<const char* const> words, std::string_view word) {
   return std::ranges::find(words, word) != words.end();
@@ -178,7 +180,7 @@ std::string pageView(const std::string& script) {
 
 void checkView(const Registry& registry, std::string_view view) {
   for (const Call& call : parseScript(registry, "view", view, {}))
-    if (!contains(kViewCommands, call.command->name))
+    if (!contains(kViewCommands, call.command->name) && !contains(kOtherViewCommands, call.command->name))
       throw Error(ErrorKind::option, "",
                   fmt::format("{}: {} is no command about a view; these are {}", call.where, call.command->name,
                               fmt::join(kViewCommands, ", ")));
