@@ -9,18 +9,16 @@
 namespace hpsdf::app {
 namespace {
 
-/// Formats the coordinates of v with the fewest digits that are read back as the same numbers.
-std::string textOf(const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
-
 std::string planeLine(const ViewState& view) {
   std::string line = "plane ";
   if (view.plane)
-    line += fmt::format("through={},{}", textOf(view.plane->point), textOf(view.plane->normal));
+    line += fmt::format("through={},{}", coordinatesText(view.plane->point), coordinatesText(view.plane->normal));
   else
     line += fmt::format("axis={} offset={}", "xyz"[view.axis],
                         view.planeOffset ? fmt::format("{}", *view.planeOffset) : "auto");
   return line + fmt::format(" in-space={} zoom={} target={} operands={}\n", view.planeInSpace, view.zoom,
-                            view.sliceTarget ? textOf(*view.sliceTarget) : "center", wordOrNone(view.operands));
+                            view.sliceTarget ? coordinatesText(*view.sliceTarget) : "center",
+                            wordOrNone(view.operands));
 }
 
 std::string surfaceLine(const ViewState& view) {
@@ -103,7 +101,7 @@ std::string scriptOf(const ViewState& view) {
          colorLine(view.sliceColors, "slice") + fmt::format("beside {}\n", wordOrNone(view.beside)) +
          fmt::format("worst by={} on={} page={} mark={}\n", view.worstBy == JumpKind::value ? "value" : "gradient",
                      view.worstOnSurface ? "surface" : "all", view.worstPage + 1,
-                     view.mark ? textOf(*view.mark) : "none") +
+                     view.mark ? coordinatesText(*view.mark) : "none") +
          panelLine(view);
 }
 

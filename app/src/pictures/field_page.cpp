@@ -178,7 +178,7 @@ std::string pageView(const std::string& script) {
   return view;
 }
 
-void checkView(const Registry& registry, std::string_view view) {
+void checkPageView(const Registry& registry, std::string_view view) {
   for (const Call& call : parseScript(registry, "view", view, {}))
     if (!contains(kViewCommands, call.command->name) && !contains(kOtherViewCommands, call.command->name))
       throw Error(ErrorKind::option, "",

@@ -49,6 +49,6 @@ std::vector<std::string> distinctNames(const std::vector<std::string>& files);
 std::string pageView(const std::string& script);
 
 /// Throws `Error` unless the text consists of commands of scripts that describe a view.
-void checkView(const Registry& registry, std::string_view view);
+void checkPageView(const Registry& registry, std::string_view view);
 
 }  // namespace hpsdf::app

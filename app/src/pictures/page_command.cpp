@@ -69,7 +69,7 @@ void checkPage(const Arguments& arguments) {
 void runPage(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   checkWritable(file);
-  checkView(session.registry(), arguments.textOr("view", ""));
+  checkPageView(session.registry(), arguments.textOr("view", ""));
   const std::vector<std::string> files = arguments.texts("field");
   for (const std::string& field : files)
     if (!isFieldFile(field)) load(field);  // throws `Error` before the work on other fields begins

@@ -55,14 +55,11 @@ render::AxisPlane axisPlane(const Arguments& arguments, const char* axisName, co
   return {axis, arguments.given(offsetName) ? arguments.number(offsetName) : defaultOffset(box, axis)};
 }
 
-/// Formats the coordinates of v with the fewest digits that are read back as the same numbers.
-std::string textOf(const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
-
-std::string targetText(const std::optional<Vector3>& target) { return target ? textOf(*target) : "center"; }
+std::string targetText(const std::optional<Vector3>& target) { return target ? coordinatesText(*target) : "center"; }
 
 std::string planeText(const render::Plane& plane) {
   if (const auto* free = std::get_if<render::FreePlane>(&plane))
-    return fmt::format("through={},{}", textOf(free->point), textOf(free->normal));
+    return fmt::format("through={},{}", coordinatesText(free->point), coordinatesText(free->normal));
   const auto& axis = std::get<render::AxisPlane>(plane);
   return fmt::format("axis={} offset={}", "xyz"[axis.axis], axis.offset);
 }
@@ -301,6 +298,8 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& box
   picture.arrows = arguments.whole("arrows");
   return picture;
 }
+
+std::string coordinatesText(const Vector3& v) { return fmt::format("{},{},{}", v.x(), v.y(), v.z()); }
 
 Box shownBox(const Field& field) {
   const Box surface = field.domain().intersection(field.metadata().source.box);

@@ -91,6 +91,9 @@ render::ReferenceData referenceDataFor(Session& session, const Arguments& argume
 render::ReferenceData referenceDataFor(Session& session, const Arguments& arguments,
                                        const render::SurfacePicture& picture);
 
+/// Formats the coordinates of v with the fewest digits that are read back as the same numbers.
+std::string coordinatesText(const Vector3& v);
+
 /// Returns the part of the domain that holds the surface. Returns the domain if the field does not know the surface's
 /// box.
 Box shownBox(const Field& field);
