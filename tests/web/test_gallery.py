@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from conftest import package, started
-from pages import applied, complaints, opened, rested
+from pages import applied, complaints, opened, payload, rested
 
 NAMES = ("torus", "box")
 
@@ -219,3 +219,71 @@ def test_the_manuals_picture_is_that_of_the_page(program: Callable[..., str], tm
         assert difference(browser, kept, wrong) > 4, "the comparison would notice other colours"
     finally:
         browser.quit()
+
+
+def pressed(browser: Any, name: str) -> str:
+    """Shows a field by its tab, waits until its picture is sharp or it has failed, and returns the page's state."""
+    browser.execute_script("document.body.dataset.state = 'asked'")
+    next(tab for tab in browser.find_elements("css selector", "nav button") if tab.text == name).click()
+    return rested(browser)
+
+
+def test_there_may_be_more_fields_than_graphics_contexts(browser: Any, fields: list[pathlib.Path], program: Callable[..., str]) -> None:
+    names = [f"number {n}" for n in range(8)]
+    page = fields[0].with_name("many.html")
+    given = [word for name in names for word in ("--name", name)]
+    program("page", *[fields[1]] * len(names), *given, "-o", page, "--pictures=false")
+    opened(browser, page)
+    assert [pressed(browser, name) for name in [*names, names[0]]] == ["sharp"] * (len(names) + 1)
+    assert browser.execute_script("return document.querySelectorAll('canvas').length") <= 6
+    assert complaints(browser) == []
+
+
+def test_a_damaged_field_leaves_the_others(browser: Any, gallery: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    text = gallery.read_text(encoding="utf-8")
+    begin, _ = payload(text)
+    page = tmp_path / "damaged.html"
+    page.write_text(text[: begin + 200] + "!" + text[begin + 201 :], encoding="utf-8")
+    opened(browser, page)
+    assert "cannot be shown: its text is damaged" in browser.find_element("id", "message").text
+    assert seen_pictures(browser) == expected_captions()
+    assert pressed(browser, "box") == "sharp"
+    assert browser.find_element("id", "message").text == "" and seen_pictures(browser) == []
+    assert pressed(browser, "torus") == "failed"
+    assert "cannot be shown: its text is damaged" in browser.find_element("id", "message").text
+
+
+def test_an_incomplete_page_says_so(browser: Any, gallery: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    text = gallery.read_text(encoding="utf-8")
+    page = tmp_path / "cut.html"
+    page.write_text(text[: payload(text)[0] + 500], encoding="utf-8")
+    browser.get(page.as_uri())
+    assert "the page is incomplete" in browser.find_element("id", "message").text
+    assert seen_pictures(browser) == expected_captions()
+    assert not browser.find_element("id", "kind").is_displayed()
+
+
+def test_pictures_beside_each_other_share_their_colours(browser: Any, gallery: pathlib.Path) -> None:
+    opened(browser, gallery)
+    package("selenium.webdriver.support.ui").Select(browser.find_element("id", "beside")).select_by_visible_text("box")
+    wait = package("selenium.webdriver.support.ui").WebDriverWait(browser, 60)
+    wait.until(lambda page: page.execute_script("return hpsdf.page.viewers.length === 2 && document.body.dataset.state === 'sharp'"))
+    ours, others = browser.execute_script("return hpsdf.page.viewers.map(({painter}) => [painter.degrees, painter.depths].map(all => all.map(({level, color}) => [level, color])))")
+    assert ours == others and len(ours[0]) > 1
+    own = browser.execute_script("return hpsdf.page.viewers.map(({painter}) => [...painter.shares.degree.keys()])")
+    assert set(own[0]) != set(own[1]), "these fields would have other colours alone"
+
+
+def test_fields_at_other_places_stand_in_the_middle(browser: Any, fields: list[pathlib.Path], program: Callable[..., str], tmp_path: pathlib.Path) -> None:
+    program("combine", f"move({fields[0]}, 10, 0, 0)", "-o", tmp_path / "far.hpsdf", "--target-error", "1e-3")
+    program("page", fields[0], tmp_path / "far.hpsdf", "-o", tmp_path / "places.html", "--pictures=false")
+    opened(browser, tmp_path / "places.html")
+    hits = "const {hits} = hpsdf.page.viewer.shown, cells = hits.read(); return cells.filter((x, n) => n % 4 === 0 && x !== 0xffffffff).length / (cells.length / 4)"
+    shares = []
+    for lines in ("show surface", "show slice; plane axis=x offset=0.3"):
+        applied(browser, lines)
+        here = browser.execute_script(hits)
+        assert pressed(browser, "far") == "sharp"
+        shares.append((here, browser.execute_script(hits)))
+        assert pressed(browser, "torus") == "sharp"
+    assert all(there == pytest.approx(here, rel=0.05) and here > 0.05 for here, there in shares), shares

@@ -14,14 +14,16 @@ import { cellErrors } from "./questions/cell_numbers.js";
 import { FaceMeter, Jumps } from "./questions/jumps.js";
 import { sampleLine } from "./questions/line_probe.js";
 import { distanceBetween, thicknessAt } from "./questions/measure.js";
-import { add, dot, scaled } from "./field/vector.js";
-import { firstView, movePlaneTo, placeOfPlane, planeOf, scriptOf, setPlane, viewFrom } from "./drawing/view.js";
+import { add, dot, scaled, subtract } from "./field/vector.js";
+import { DISTANCES, ZOOMS, firstView, fitPlanes, movePlaneTo, placeOfPlane, planeOf, scriptOf, setPlane, viewFrom, within } from "./drawing/view.js";
 import { Viewer } from "./drawing/viewer.js";
 
 /** @typedef {import("./field/field_file.js").Field} Field */
 /** @typedef {import("./field/field_file.js").Vector} Vector */
 /** @typedef {import("./drawing/pick.js").Pick} Pick */
 /** @typedef {import("./drawing/view.js").View} View */
+
+const MOST_VIEWERS = 6; // browsers give a page few graphics contexts
 
 /** A field of the page, which is read when it is first shown. */
 class Tab {
@@ -31,8 +33,23 @@ class Tab {
   constructor(script) {
     this.script = script;
     this.name = script.dataset.name ?? "field";
+    /** @type {Promise<void> | null} */
+    this.reading = null;
+    /** @type {Field | null} */
+    this.field = null;
     /** @type {Viewer | null} */
     this.viewer = null;
+    this.failure = ""; // why the field cannot be shown
+    this.shownAt = 0; // when it was last shown, to know which viewer is needed least
+  }
+
+  /** Reads the field. A second call waits for the first. */
+  read() {
+    this.reading ??= (async () => {
+      this.field = readField(await inflated(this.script.textContent ?? ""));
+      this.script.textContent = ""; // its memory is needed no more
+    })();
+    return this.reading;
   }
 }
 
@@ -74,61 +91,117 @@ class Page {
   }
 
   async start() {
-    if (this.tabs.length === 0) throw new Error("the page holds no field");
-    await this.open(this.tab);
-    this.controls = new Controls(() => ({ view: this.view, field: this.field, depths: this.viewer.painter.depths }), () => this.changed());
-    this.questions = new Questions(this);
+    if (this.tabs.length === 0) return this.showFailure("the page holds no field");
     this.listen();
-    this.showTabs();
-    const lines = this.tab.script.dataset.view;
-    if (lines) this.apply(lines);
-    this.arrange();
-    new ResizeObserver(() => this.viewers.forEach((viewer) => viewer.resize())).observe(element("stage", HTMLDivElement));
-    const dark = matchMedia("(prefers-color-scheme: dark)");
-    dark.addEventListener("change", () => this.setPaper());
+    await this.choose(this.tab, null);
+    new ResizeObserver(() => this.shownViewers().forEach((viewer) => viewer.resize())).observe(element("stage", HTMLDivElement));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.tab.viewer && this.arrange());
+  }
+
+  /** The viewers on the page, if the chosen field can be shown. */
+  shownViewers() {
+    return this.tab.viewer ? this.viewers : [];
   }
 
   /**
-   * Reads the field of a tab if that has not been done.
+   * Shows the tab's field, and the one beside it.
+   * @param {Tab} tab
+   * @param {Tab | null} beside
+   */
+  async choose(tab, beside) {
+    const choice = (this.choice = {});
+    for (const one of beside ? [tab, beside] : [tab]) await this.open(one);
+    if (this.choice !== choice) return; // another one was chosen meanwhile
+    this.tab = tab;
+    this.beside = beside === tab || beside?.failure ? null : beside;
+    this.removeOldViewers();
+    this.showTabs();
+    if (tab.failure) return this.showFailure(tab.failure);
+    this.say(beside?.failure ? `${beside.name} cannot be shown: ${beside.failure}` : "");
+    this.arrange();
+  }
+
+  /**
+   * Makes a tab's viewer if it has none, or says in the tab why it has none.
    * @param {Tab} tab
    */
   async open(tab) {
+    tab.shownAt = performance.now();
     if (tab.viewer) return;
-    const field = readField(await inflated(tab.script.textContent ?? ""));
-    tab.script.textContent = ""; // its memory is needed no more
+    try {
+      await tab.read();
+      if (tab.field) this.makeViewer(tab, tab.field);
+      tab.failure = "";
+    } catch (error) {
+      tab.failure = error instanceof Error ? error.message : String(error);
+    }
+  }
+
+  /**
+   * @param {Tab} tab
+   * @param {Field} field
+   */
+  makeViewer(tab, field) {
+    if (tab.viewer) return;
     this.theView ??= firstView(field);
     const canvas = document.createElement("canvas");
     canvas.tabIndex = 0;
     canvas.setAttribute("aria-label", tab.name);
     canvas.hidden = true;
+    const viewer = new Viewer(canvas, field, this.sources, this.view, {
+      changed: () => (document.body.dataset.state = "changing"),
+      painted: () => this.painted(),
+      rested: () => this.rested(),
+      failed: (error) => this.viewerFailed(tab, error),
+    });
     element("stage", HTMLDivElement).prepend(canvas);
-    tab.viewer = new Viewer(canvas, field, this.sources, this.view, { painted: () => this.painted(), rested: () => this.rested(), failed: (error) => this.failed(error) });
-    this.listenTo(tab.viewer);
-    this.setPaper();
+    tab.viewer = viewer;
+    this.listenTo(viewer);
   }
 
-  /** Shows the tab's field, and the one beside it. */
-  async choose(/** @type {Tab} */ tab, /** @type {Tab | null} */ beside) {
-    try {
-      await this.open(tab);
-      if (beside) await this.open(beside);
-    } catch (error) {
-      return this.say(`${tab.name} cannot be shown: ${error instanceof Error ? error.message : error}`);
-    }
-    this.tab = tab;
-    this.beside = beside === tab ? null : beside;
-    this.showTabs();
-    this.arrange();
+  /** Removes the viewers that were shown longest ago, but for as many as browsers allow; their fields stay. */
+  removeOldViewers() {
+    const made = this.tabs.filter((tab) => tab.viewer).sort((a, b) => b.shownAt - a.shownAt);
+    for (const tab of made.slice(MOST_VIEWERS)) this.removeViewer(tab);
+  }
+
+  /**
+   * @param {Tab} tab
+   */
+  removeViewer(tab) {
+    tab.viewer?.remove();
+    tab.viewer = null;
+  }
+
+  /**
+   * @param {Tab} tab
+   * @param {unknown} error
+   */
+  viewerFailed(tab, error) {
+    tab.failure = error instanceof Error ? error.message : String(error);
+    this.removeViewer(tab);
+    if (tab === this.beside) this.choose(this.tab, null);
+    if (tab === this.tab) this.showFailure(tab.failure);
   }
 
   /** Gives the shown viewers their places on the page. */
   arrange() {
     const shown = this.viewers;
+    if (!this.controls) {
+      this.controls = new Controls(() => ({ view: this.view, field: this.field, depths: this.viewer.painter.depths }), () => this.changed());
+      this.questions = new Questions(this);
+      const lines = this.tab.script.dataset.view;
+      if (lines) this.apply(lines);
+    }
     for (const { viewer } of this.tabs) if (viewer) viewer.canvas.hidden = !shown.includes(viewer);
+    fitPlanes(this.view, this.field);
+    this.setPaper();
     shown.forEach((viewer, place) => {
       viewer.view = this.view;
+      viewer.painter.shareScales(shown.map(({ painter }) => painter));
       viewer.canvas.style.left = `${(100 * place) / shown.length}%`;
       viewer.canvas.style.width = `${100 / shown.length}%`;
+      viewer.canvas.classList.toggle("second", place === 1);
       viewer.resize();
     });
     showFigures(this.field);
@@ -138,7 +211,6 @@ class Page {
 
   /** Shows the state of the view, which something has changed. */
   changed() {
-    document.body.dataset.state = "changing";
     this.questions?.viewChanged();
     this.controls?.show();
     showLegend(this.view, this.viewer.painter);
@@ -147,25 +219,28 @@ class Page {
   }
 
   painted() {
+    element("pictures", HTMLDivElement).hidden = true;
     if (performance.getEntriesByName("first picture").length === 0) performance.mark("first picture");
     this.placeMark();
   }
 
   rested() {
-    if (!this.viewers.every((viewer) => viewer.isSharp)) return;
+    const shown = this.shownViewers();
+    if (shown.length === 0 || !shown.every((viewer) => viewer.isSharp)) return;
     performance.mark("sharp picture");
     document.body.dataset.state = "sharp";
   }
 
   /**
    * Shows pictures in place of the field, and the reason.
-   * @param {unknown} error
+   * @param {string} reason
    */
-  failed(error) {
+  showFailure(reason) {
     document.body.dataset.state = "failed";
     for (const { viewer } of this.tabs) if (viewer) viewer.canvas.hidden = true;
     element("pictures", HTMLDivElement).hidden = false;
-    this.say(`The field cannot be shown: ${error instanceof Error ? error.message : error}`);
+    this.placeMark();
+    this.say(`The field cannot be shown: ${reason}`);
   }
 
   /**
@@ -175,14 +250,12 @@ class Page {
     element("message", HTMLParagraphElement).textContent = text;
   }
 
-  /** The canvas has the colour of the page's paper, in light and in dark. */
+  /** Gives the shown pictures the colour of the page's paper, in light and in dark. */
   setPaper() {
     const isDark = matchMedia("(prefers-color-scheme: dark)").matches;
-    for (const { viewer } of this.tabs) {
-      if (!viewer) continue;
-      viewer.painter.paper = isDark ? [0.0109, 0.0123, 0.0152] : [0.9559734, 0.9559734, 0.9386857];
-      viewer.painter.ink = isDark ? [0.85, 0.86, 0.88] : [0.08, 0.09, 0.13];
-      viewer.changed();
+    for (const { painter } of this.shownViewers()) {
+      painter.paper = isDark ? [0.0109, 0.0123, 0.0152] : [0.9559734, 0.9559734, 0.9386857];
+      painter.ink = isDark ? [0.85, 0.86, 0.88] : [0.08, 0.09, 0.13];
     }
   }
 
@@ -205,18 +278,20 @@ class Page {
     setChoices(element("beside", HTMLSelectElement), [["none", "none"], ...others], this.beside ? String(this.tabs.indexOf(this.beside)) : "none");
   }
 
-  /** Points to the marked place in each picture. */
+  /** Points to the marked place in each picture that shows it. */
   placeMark() {
-    for (const viewer of this.viewers) {
-      const id = `mark-${this.viewers.indexOf(viewer)}`;
-      const mark = document.getElementById(id) ?? element("stage", HTMLDivElement).appendChild(Object.assign(document.createElement("i"), { id, className: "mark" }));
-      const place = this.view.mark && viewer.project(this.view.mark);
-      mark.hidden = !place;
+    for (const mark of document.querySelectorAll(".mark")) mark.remove();
+    for (const viewer of this.shownViewers()) {
+      const { canvas, field } = viewer;
+      const { mark, kind, normal, point } = this.view;
+      if (!mark || (kind === "slice" && Math.abs(dot(normal, subtract(mark, point))) > 1e-4 * diagonalOf(field))) continue;
+      const place = viewer.project(mark);
       if (!place) continue;
-      mark.style.left = `${viewer.canvas.offsetLeft + place[0]}px`;
-      mark.style.top = `${viewer.canvas.offsetTop + place[1]}px`;
+      const ring = Object.assign(document.createElement("i"), { className: "mark" });
+      ring.style.left = `${canvas.offsetLeft + place[0]}px`;
+      ring.style.top = `${canvas.offsetTop + place[1]}px`;
+      element("stage", HTMLDivElement).append(ring);
     }
-    if (this.viewers.length === 1) document.getElementById("mark-1")?.remove();
   }
 
   /**
@@ -227,6 +302,7 @@ class Page {
     const { view, problems } = viewFrom(lines, this.view, this.field);
     this.theView = view;
     this.say(problems.join(" "));
+    fitPlanes(view, this.field);
     for (const viewer of this.viewers) viewer.view = this.view;
     this.changed();
   }
@@ -248,6 +324,7 @@ class Page {
   listenTo(viewer) {
     const { canvas } = viewer;
     canvas.addEventListener("pointerdown", (event) => {
+      if (!this.onPick) this.say("");
       canvas.setPointerCapture(event.pointerId);
       if (this.pointers.size === 0) this.moved = 0;
       this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
@@ -320,7 +397,7 @@ class Page {
   turnView(azimuth, elevation) {
     const { orbit } = this.view;
     orbit.azimuth += azimuth;
-    orbit.elevation = Math.min(Math.max(orbit.elevation + elevation, -90), 90);
+    orbit.elevation = within(orbit.elevation + elevation, [-90, 90]);
   }
 
   /**
@@ -328,8 +405,8 @@ class Page {
    */
   zoomView(factor) {
     const { view } = this;
-    if (view.kind === "slice") view.zoom = Math.min(Math.max(view.zoom / factor, 0.5), 1e5);
-    else view.orbit.distance = Math.min(Math.max(view.orbit.distance * factor, 0.01), 20);
+    if (view.kind === "slice") view.zoom = within(view.zoom / factor, ZOOMS);
+    else view.orbit.distance = within(view.orbit.distance * factor, DISTANCES);
   }
 
   /**
@@ -349,7 +426,7 @@ class Page {
     const length = share * diagonalOf(field);
     if (view.kind === "surface" && view.clip && !view.planeInSpace) {
       const { axis, at } = view.clip;
-      view.clip.at = Math.min(Math.max(at + length, field.lower[axis]), field.upper[axis]);
+      view.clip.at = within(at + length, [field.lower[axis], field.upper[axis]]);
     } else {
       movePlaneTo(view, field, placeOfPlane(view, field) + length);
     }
@@ -393,6 +470,11 @@ class Page {
       x: place(0),
       y: place(1),
       z: place(2),
+      Escape: () => {
+        this.onPick = null;
+        view.mark = null;
+        this.say("");
+      },
       Home: () => Object.assign(view, firstView(this.field), { kind: view.kind }),
     };
     const action = event.ctrlKey || event.metaKey ? undefined : actions[event.key];
@@ -425,13 +507,10 @@ class Page {
 
 async function start() {
   const page = new Page();
-  try {
-    await page.start();
-    // Tests and curious readers find the page here, with functions to ask it.
-    Object.assign(window, { hpsdf: { page, field: page.field, query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled, cellErrors, forEachLeaf, Jumps, FaceMeter, sampleLine, thicknessAt, distanceBetween } });
-  } catch (error) {
-    page.failed(error);
-  }
+  await page.start();
+  // Tests and curious readers find the page here, with functions to ask it.
+  const functions = { query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled, cellErrors, forEachLeaf, Jumps, FaceMeter, sampleLine, thicknessAt, distanceBetween };
+  Object.assign(window, { hpsdf: { page, field: page.tab.field, ...functions } });
 }
 
 start();

@@ -12,7 +12,7 @@ import { add, cross, dot, normalized, scaled, subtract } from "../field/vector.j
  * @property {number} azimuth  degrees
  * @property {number} elevation  degrees
  * @property {number} distance  in domain diagonals
- * @property {Vector} target  in the field's units
+ * @property {Vector | null} target  in the field's units; null: the middle of the domain
  * @property {boolean} parallel
  * @property {boolean} upZ
  */
@@ -60,11 +60,12 @@ export function raysOf(orbit, field, aspect) {
   const towardsEye = add(scaled(outward, Math.cos(elevation)), scaled(vertical, Math.sin(elevation)));
   const above = subtract(scaled(vertical, Math.cos(elevation)), scaled(outward, Math.sin(elevation)));
   const distance = orbit.distance * diagonalOf(field);
+  const target = orbit.target ?? centreOf(field);
   const reach = HALF_FIELD_OF_VIEW * (orbit.parallel ? distance : 1);
-  let eye = add(orbit.target, scaled(towardsEye, distance));
+  let eye = add(target, scaled(towardsEye, distance));
   if (orbit.parallel) {
-    const toCorner = dot(subtract(centreOf(field), orbit.target), towardsEye) + 0.5 * dot(field.size, /** @type {Vector} */ (towardsEye.map(Math.abs)));
-    eye = add(orbit.target, scaled(towardsEye, toCorner + RAY_MARGIN * diagonalOf(field)));
+    const toCorner = dot(subtract(centreOf(field), target), towardsEye) + 0.5 * dot(field.size, /** @type {Vector} */ (towardsEye.map(Math.abs)));
+    eye = add(target, scaled(towardsEye, toCorner + RAY_MARGIN * diagonalOf(field)));
   }
   return { eye, forward: scaled(towardsEye, -1), right: scaled(side, reach * aspect), up: scaled(above, reach), parallel: orbit.parallel };
 }

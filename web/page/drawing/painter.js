@@ -1,9 +1,9 @@
 // Turns the buffers of a view into colours on a canvas.
 
-import { degreeOf, isLeaf } from "../field/field_file.js";
+import { EXACT_DEGREE, degreeOf, isLeaf } from "../field/field_file.js";
 import { forEachLeaf } from "../field/leaves.js";
 import { divergingColor, exactColor, orderedColor } from "./colors.js";
-import { FieldRenderer, shownBox } from "./renderer.js";
+import { FieldRenderer, NO_CELL, shownBox } from "./renderer.js";
 import { CellLines } from "./cell_lines.js";
 import { worldPoint } from "../field/query.js";
 import { planeOf } from "./view.js";
@@ -27,22 +27,32 @@ const STEPS = 256; // of a continuous scale
  */
 
 /**
+ * Returns the share of the volume of each level that occurs.
  * @param {Field} field
  * @param {(node: number, depth: number) => number} levelOf
- * @returns {Levels}
+ * @returns {Map<number, number>}
  */
-function levelsOf(field, levelOf) {
+function sharesOf(field, levelOf) {
   const shares = new Map();
   const bases = field.grid[0] * field.grid[1] * field.grid[2];
   forEachLeaf(field, (node, depth) => {
     const level = levelOf(node, depth);
     shares.set(level, (shares.get(level) ?? 0) + 8 ** -depth / bases);
   });
-  const levels = [...shares.keys()].sort((a, b) => a - b);
-  const ordered = levels.filter((level) => level !== 31);
+  return shares;
+}
+
+/**
+ * Returns the levels that occur in any of some fields, with their shares in the first one.
+ * @param {Map<number, number>[]} shares
+ * @returns {Levels}
+ */
+function levelsOf(shares) {
+  const levels = [...new Set(shares.flatMap((own) => [...own.keys()]))].sort((a, b) => a - b);
+  const ordered = levels.filter((level) => level !== EXACT_DEGREE);
   return levels.map((level) => {
     const at = ordered.length === 1 ? 0.5 : ordered.indexOf(level) / (ordered.length - 1);
-    return { level, share: shares.get(level), color: level === 31 ? exactColor() : orderedColor(at) };
+    return { level, share: shares[0].get(level) ?? 0, color: level === EXACT_DEGREE ? exactColor() : orderedColor(at) };
   });
 }
 
@@ -64,8 +74,8 @@ function levelsOf(field, levelOf) {
  * @param {{cell: number, distance: number}} hit
  */
 export function isSectionShown(section, hit) {
-  if (section.cell === 0xffffffff) return false;
-  return hit.cell === 0xffffffff || section.levels >>> 24 === 1 || section.distance < hit.distance;
+  if (section.cell === NO_CELL) return false;
+  return hit.cell === NO_CELL || section.levels >>> 24 === 1 || section.distance < hit.distance;
 }
 
 /** A field with what is needed to draw it, on one canvas. */
@@ -101,15 +111,48 @@ export class Painter {
     this.paper = [1, 1, 1];
     /** @type {Color} */
     this.ink = [0, 0, 0];
-    this.degrees = levelsOf(field, (node) => degreeOf(field, node));
-    this.depths = levelsOf(field, (_, depth) => depth);
-    this.range = this.rangeOfDistance();
+    this.shares = { degree: sharesOf(field, (node) => degreeOf(field, node)), depth: sharesOf(field, (_, depth) => depth) };
+    this.ownRange = this.rangeOfDistance();
     this.scales = {
-      degree: this.levelScale(this.degrees),
-      depth: this.levelScale(this.depths),
+      degree: this.scaleTexture(new Float32Array(8 * STEPS)),
+      depth: this.scaleTexture(new Float32Array(8 * STEPS)),
       distance: this.continuousScale((t) => divergingColor(2 * t - 1)),
       ordered: this.continuousScale(orderedColor),
     };
+    /** @type {Levels} */
+    this.degrees = [];
+    /** @type {Levels} */
+    this.depths = [];
+    this.range = this.ownRange;
+    /** @type {Painter[]} */
+    this.group = [];
+    this.shareScales([this]);
+  }
+
+  /**
+   * Gives this painter the same scales of colours as others whose pictures stand beside its own.
+   * @param {Painter[]} painters  this one among them
+   */
+  shareScales(painters) {
+    const others = painters.filter((painter) => painter !== this);
+    this.group = [this, ...others];
+    this.degrees = levelsOf(this.group.map(({ shares }) => shares.degree));
+    this.depths = levelsOf(this.group.map(({ shares }) => shares.depth));
+    this.range = Math.max(...this.group.map(({ ownRange }) => ownRange));
+    for (const name of /** @type {const} */ (["degree", "depth"])) {
+      this.gl.deleteTexture(this.scales[name]);
+      this.scales[name] = this.levelScale(name === "degree" ? this.degrees : this.depths);
+    }
+  }
+
+  /**
+   * Returns the powers of ten at the ends of the scale of a quantity of which each cell has one number, or null before it is known.
+   * @param {Quantity} quantity
+   * @returns {[number, number] | null}
+   */
+  decadesOf(quantity) {
+    const known = this.group.flatMap(({ cellNumbers }) => cellNumbers.get(quantity)?.decades ?? []);
+    return this.cellNumbers.has(quantity) ? [Math.min(...known), Math.max(...known)] : null;
   }
 
   /** A bound of the field's magnitude, for colours. */
@@ -124,8 +167,7 @@ export class Painter {
    */
   scaleTexture(texels) {
     const { gl } = this;
-    const texture = this.renderer.plainTexture(gl.RGBA32F, STEPS, 2, gl.RGBA, gl.FLOAT, texels);
-    return texture;
+    return this.renderer.plainTexture(gl.RGBA32F, STEPS, 2, gl.RGBA, gl.FLOAT, texels);
   }
 
   /**
@@ -263,8 +305,8 @@ export class Painter {
    * @returns {{mode: number, texture: WebGLTexture, range: [number, number], ofCells?: WebGLTexture}}
    */
   coloringOf(quantity) {
-    const cells = this.cellNumbers.get(quantity);
-    if (cells) return { mode: 4, texture: this.scales.ordered, range: [cells.decades[0] * Math.LN10, cells.decades[1] * Math.LN10], ofCells: cells.texture };
+    const cells = this.cellNumbers.get(quantity), decades = this.decadesOf(quantity);
+    if (cells && decades) return { mode: 4, texture: this.scales.ordered, range: [decades[0] * Math.LN10, decades[1] * Math.LN10], ofCells: cells.texture };
     const range = /** @type {[number, number]} */ ([-this.range, this.range]);
     if (quantity === "depth") return { mode: 2, texture: this.scales.depth, range };
     if (quantity === "distance") return { mode: 3, texture: this.scales.distance, range };

@@ -2,6 +2,7 @@
 
 import { gridPointOfPixel, rayThrough } from "./camera.js";
 import { isSectionShown } from "./painter.js";
+import { NO_CELL } from "./renderer.js";
 import { query, queryGrid, worldPoint } from "../field/query.js";
 import { add, dot, scaled } from "../field/vector.js";
 import { planeOf } from "./view.js";
@@ -14,7 +15,6 @@ import { planeOf } from "./view.js";
 
 /** @typedef {ValueAndGradient & {point: Vector, leaf: LeafPoint, onSurface: boolean}} Pick */
 
-const NOTHING = 0xffffffff;
 const MOST_REFINEMENTS_OF_PICK = 8;
 
 /**
@@ -41,7 +41,7 @@ export function pickAt(field, drawing, x, y) {
   const cut = drawing.section?.at(column, row) ?? null;
   const ray = rayThrough(drawing.rays, u, v);
   if (cut && isSectionShown(cut, texel)) return pickOf(field, add(ray.start, scaled(ray.direction, cut.distance)), false);
-  if (texel.cell === NOTHING) return null;
+  if (texel.cell === NO_CELL) return null;
   const length = refinedLength(field, ray, texel.distance, view.offset);
   return pickOf(field, add(ray.start, scaled(ray.direction, length)), true);
 }

@@ -50,7 +50,8 @@ vec3 colorOf(uvec4 texel) {
   if (mode == 2) return texelFetch(scale, ivec2(int(depthOf(texel)), 0), 0).rgb;
   if (mode == 3) return continuous((valueOf(texel) - range.x) / (range.y - range.x));
   float number = texelFetch(ofCells, ivec2(int(texel.x) % kRow, int(texel.x) / kRow), 0).x;
-  return continuous((log(max(number, 1e-30)) - range.x) / (range.y - range.x));
+  if (!(number > 0.0)) return vec3(0.3);  // the cell has none
+  return continuous((log(number) - range.x) / (range.y - range.x));
 }
 
 // Position in the camera's frame: x right, y up, z towards the eye.

@@ -16,6 +16,7 @@ import { ROW, webShader } from "./shaders.js";
 /** @typedef {import("./camera.js").Plane} Plane */
 /** @typedef {import("./bounds.js").Bounds} Bounds */
 
+export const NO_CELL = 0xffffffff; // in place of a cell, where nothing is hit
 const LOW_DEGREE = 4; // as kLowDegree in field.glsl
 const OFFSET_BITS = 27;
 const MOST_STEPS = 1024; // of a ray in one pass, so that a pass is short
@@ -788,7 +789,7 @@ export class Target {
   clear() {
     const { gl } = this;
     this.bind([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
-    gl.clearBufferuiv(gl.COLOR, 0, new Uint32Array([0xffffffff, 0, 0, 0]));
+    gl.clearBufferuiv(gl.COLOR, 0, new Uint32Array([NO_CELL, 0, 0, 0]));
     gl.clearBufferfv(gl.COLOR, 1, new Float32Array(4));
   }
 

@@ -1,7 +1,7 @@
 // The view holds what a page shows, as values that the controls change. It is written as lines of a script of the program, and read
 // from such lines.
 
-import { axisAlong, axisVector, centreOf, sectionPlane } from "./camera.js";
+import { axisAlong, axisVector, centreOf, diagonalOf, sectionPlane } from "./camera.js";
 import { add, dot, normalized, scaled, subtract } from "../field/vector.js";
 
 /** @typedef {import("../field/field_file.js").Field} Field */
@@ -56,7 +56,7 @@ export function middleOf(field) {
 export function firstView(field) {
   return {
     kind: "surface",
-    orbit: { azimuth: 30, elevation: 20, distance: 1.1, target: centreOf(field), parallel: false, upZ: false },
+    orbit: { azimuth: 30, elevation: 20, distance: 1.1, target: null, parallel: false, upZ: false },
     offset: 0,
     clip: null,
     point: middleOf(field),
@@ -107,7 +107,7 @@ export function placeOfPlane(view, field) {
  */
 export function movePlaneTo(view, field, place) {
   const [least, greatest] = placesOfPlane(view, field);
-  const at = Math.min(Math.max(place, least), greatest);
+  const at = within(place, [least, greatest]);
   const axis = axisAlong(view.normal);
   view.point = axis >= 0 ? /** @type {Vector} */ (view.point.map((x, a) => (a === axis ? at : x))) : add(centreOf(field), scaled(view.normal, at));
 }
@@ -158,13 +158,11 @@ function surfaceLine({ offset, clip }) {
 
 /**
  * @param {View} view
- * @param {Field} field
  */
-function cameraLine({ orbit }, field) {
+function cameraLine({ orbit }) {
   const { azimuth, elevation, distance, target, parallel, upZ } = orbit;
-  const isCentre = Math.hypot(...subtract(target, centreOf(field))) < 1e-9 * Math.hypot(...field.size);
   const projection = parallel ? "orthographic" : "perspective";
-  return `camera ${vectorText([azimuth, elevation, distance])} target=${isCentre ? "center" : vectorText(target)} up=${upZ ? "z" : "y"} projection=${projection}`;
+  return `camera ${vectorText([azimuth, elevation, distance])} target=${target ? vectorText(target) : "center"} up=${upZ ? "z" : "y"} projection=${projection}`;
 }
 
 /**
@@ -176,7 +174,7 @@ export function scriptOf(view, field) {
   const cells = view.cells === "none" ? "cells none" : `cells lines depths=${view.cells}`;
   return [
     `show ${view.kind}`,
-    cameraLine(view, field),
+    cameraLine(view),
     surfaceLine(view),
     planeLine(view),
     cells,
@@ -249,6 +247,18 @@ class Words {
   }
 }
 
+/** The least and the greatest distance of the eye from its target, in diagonals of the domain, and zoom of a slice. */
+export const DISTANCES = /** @type {const} */ ([0.01, 20]);
+export const ZOOMS = /** @type {const} */ ([0.5, 1e5]);
+
+/**
+ * @param {number} x
+ * @param {readonly [number, number]} range
+ */
+export function within(x, [least, greatest]) {
+  return Math.min(Math.max(x, least), greatest);
+}
+
 const AXES = ["x", "y", "z"];
 const QUANTITIES = ["normal", "degree", "depth", "distance", "value-jump", "gradient-jump", "cell-error"];
 /** Commands of scripts about views that mean nothing to the page. */
@@ -264,20 +274,22 @@ const COMMANDS = {
     if (kind !== "surface" && kind !== "slice") throw new ViewError(`“${words.line}”: show surface or slice`);
     view.kind = kind;
   },
-  camera(words, view, field) {
+  camera(words, view) {
     const { orbit } = view;
     if (words.plain.length > 0) [orbit.azimuth, orbit.elevation, orbit.distance] = words.numbers(words.plain[0], 3);
-    words.whenNumbers("target", 3, "center", (target) => (orbit.target = /** @type {Vector} */ (target ?? centreOf(field))));
+    orbit.elevation = within(orbit.elevation, [-90, 90]);
+    orbit.distance = within(orbit.distance, DISTANCES);
+    words.whenNumbers("target", 3, "center", (target) => (orbit.target = /** @type {Vector | null} */ (target)));
     words.whenWord("up", ["y", "z"], (word) => (orbit.upZ = word === "z"));
     words.whenWord("projection", ["perspective", "orthographic"], (word) => (orbit.parallel = word === "orthographic"));
   },
   surface(words, view, field) {
-    words.whenNumbers("offset", 1, "", (offset) => (view.offset = offset ? offset[0] : 0));
+    words.whenNumbers("offset", 1, "", (offset) => (view.offset = within(offset ? offset[0] : 0, [-diagonalOf(field), diagonalOf(field)])));
     words.whenWord("clip", ["none", ...AXES], (word) => {
       const axis = AXES.indexOf(word);
       view.clip = axis < 0 ? null : { axis, at: middleOf(field)[axis] };
     });
-    words.whenNumbers("clip-offset", 1, "", (at) => view.clip && at && (view.clip.at = at[0]));
+    words.whenNumbers("clip-offset", 1, "", (at) => view.clip && at && (view.clip.at = within(at[0], [field.lower[view.clip.axis], field.upper[view.clip.axis]])));
   },
   plane(words, view, field) {
     words.whenWord("axis", AXES, (word) => {
@@ -291,7 +303,7 @@ const COMMANDS = {
       setPlane(view, field, [x, y, z], /** @type {Vector} */ (normal));
     });
     words.whenWord("in-space", ["true", "false"], (word) => (view.planeInSpace = word === "true"));
-    words.whenNumbers("zoom", 1, "", (zoom) => (view.zoom = Math.max(zoom ? zoom[0] : 1, 1e-3)));
+    words.whenNumbers("zoom", 1, "", (zoom) => (view.zoom = within(zoom ? zoom[0] : 1, ZOOMS)));
     words.whenNumbers("target", 3, "center", (target) => (view.target = /** @type {Vector | null} */ (target)));
   },
   cells(words, view) {
@@ -304,6 +316,7 @@ const COMMANDS = {
     const [quantity] = words.plain;
     if (!QUANTITIES.includes(quantity)) throw new ViewError(`“${words.line}”: the page colours by ${QUANTITIES.join(", ")}`);
     const of = words.named.get("of") ?? view.kind;
+    if (quantity === (of === "slice" ? "normal" : "distance")) throw new ViewError(`“${words.line}”: normal is for surfaces, distance for slices`);
     if (of === "slice") view.sliceColor = /** @type {Quantity} */ (quantity);
     else view.surfaceColor = /** @type {Quantity} */ (quantity);
   },
@@ -339,6 +352,20 @@ export function normalFor(choice, view) {
   if (axis >= 0) return axisVector(axis);
   const own = axisAlong(view.normal);
   return own < 0 ? view.normal : normalized(/** @type {Vector} */ ([0, 1, 2].map((a) => (a === own ? 1 : a === (own + 1) % 3 ? 0.5 : 0.25))));
+}
+
+/**
+ * Brings the planes of a view into the domain of another field than the one that it was made for.
+ * @param {View} view
+ * @param {Field} field
+ */
+export function fitPlanes(view, field) {
+  const [least, greatest] = placesOfPlane(view, field);
+  const place = placeOfPlane(view, field);
+  if (!(place >= least && place <= greatest)) view.point = middleOf(field);
+  if (!view.clip) return;
+  const { axis, at } = view.clip;
+  if (!(at >= field.lower[axis] && at <= field.upper[axis])) view.clip.at = middleOf(field)[axis];
 }
 
 /**

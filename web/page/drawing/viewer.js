@@ -1,7 +1,7 @@
 // Shows a field on a canvas: a coarse picture while the view changes, the sharp one when it rests. Nothing waits for the graphics card:
 // it gets so much to do at a time that it is done soon, and a change of the view ends what is under way.
 
-import { raysOf, diagonalOf } from "./camera.js";
+import { centreOf, diagonalOf, raysOf } from "./camera.js";
 import { pickAt } from "./pick.js";
 import { Painter } from "./painter.js";
 import { Buffers } from "./renderer.js";
@@ -38,7 +38,7 @@ export class Viewer {
    * @param {Field} field
    * @param {Record<string, string>} sources
    * @param {View} view  which others may change; they call `changed` then
-   * @param {{painted: (viewer: Viewer) => void, rested: () => void, failed: (error: unknown) => void}} listener
+   * @param {{changed: () => void, painted: (viewer: Viewer) => void, rested: () => void, failed: (error: unknown) => void}} listener
    */
   constructor(canvas, field, sources, view, listener) {
     this.canvas = canvas;
@@ -57,7 +57,22 @@ export class Viewer {
     this.longest = 0; // milliseconds of the longest wait for the graphics card, for tests
     /** @type {Drawing | null} */
     this.shown = null;
-    canvas.addEventListener("webglcontextlost", () => listener.failed(new Error("the graphics card was lost; load the page again")));
+    this.isRemoved = false;
+    canvas.addEventListener("webglcontextlost", () => this.fail(new Error("the graphics card was lost; load the page again")));
+  }
+
+  /** Gives the canvas and what the graphics card holds back. */
+  remove() {
+    this.isRemoved = true;
+    this.canvas.remove();
+    this.painter.gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
+  /**
+   * @param {unknown} error
+   */
+  fail(error) {
+    if (!this.isRemoved) this.listener.failed(error);
   }
 
   /** Fits the canvas to its place on the page. */
@@ -75,23 +90,25 @@ export class Viewer {
   changed() {
     this.isStale = true;
     this.isSharp = false;
+    this.listener.changed();
     if (!this.isRunning) this.run();
   }
 
   async run() {
     this.isRunning = true;
     try {
-      while (this.isStale) {
+      while (this.isStale && !this.isRemoved) {
         await new Promise((resolve) => requestAnimationFrame(resolve));
         this.isStale = false;
         await this.drawCoarse();
         for (let waited = 0; waited < REST && !this.isStale; waited += 15) await pause(15);
         if (!this.isStale) await this.drawSharp();
       }
-      this.isRunning = false;
       this.listener.rested();
     } catch (error) {
-      this.listener.failed(error);
+      this.fail(error);
+    } finally {
+      this.isRunning = false;
     }
   }
 
@@ -214,7 +231,7 @@ export class Viewer {
     } else {
       const rays = raysOf(view.orbit, field, canvas.width / canvas.height);
       const reach = rays.parallel ? 1 : view.orbit.distance * diagonalOf(field);
-      view.orbit.target = add(view.orbit.target, add(scaled(rays.right, -2 * x * reach), scaled(rays.up, 2 * y * reach)));
+      view.orbit.target = add(view.orbit.target ?? centreOf(field), add(scaled(rays.right, -2 * x * reach), scaled(rays.up, 2 * y * reach)));
     }
   }
 }

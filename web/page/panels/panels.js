@@ -2,7 +2,7 @@
 
 import { cssColor, divergingColor, orderedColor } from "../drawing/colors.js";
 import { element, setRows, shortNumber } from "./dom.js";
-import { degreeOf, isExact, isLeaf } from "../field/field_file.js";
+import { EXACT_DEGREE, degreeOf, isExact, isLeaf } from "../field/field_file.js";
 import { query } from "../field/query.js";
 import { FaceMeter } from "../questions/jumps.js";
 
@@ -66,10 +66,12 @@ export function scaleBar(colorAt, numbers) {
  * @param {Quantity} quantity
  */
 function showScaleOfCells(legend, painter, quantity) {
-  const known = painter.cellNumbers.get(quantity);
-  if (!known) return legend.replaceChildren("being measured …");
-  const [low, high] = known.decades;
-  legend.replaceChildren(...scaleBar(orderedColor, Array.from({ length: high - low + 1 }, (_, n) => `1e${low + n}`.replace("-", "−"))));
+  const decades = painter.decadesOf(quantity);
+  if (!decades) return legend.replaceChildren("being measured …");
+  const [low, high] = decades;
+  const grey = document.createElement("small");
+  grey.textContent = quantity === "cell-error" ? "grey: exact cells, which have none" : "grey: none";
+  legend.replaceChildren(...scaleBar(orderedColor, Array.from({ length: high - low + 1 }, (_, n) => `1e${low + n}`.replace("-", "−"))), grey);
 }
 
 /**
@@ -82,7 +84,7 @@ function levelRows(levels) {
     const row = document.createElement("div");
     row.className = "level";
     const name = document.createElement("b");
-    name.textContent = level === 31 ? "exact" : String(level);
+    name.textContent = level === EXACT_DEGREE ? "exact" : String(level);
     name.style.background = cssColor(color);
     name.style.color = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2] > 0.25 ? "#000" : "#fff";
     const percent = document.createElement("span");
@@ -101,7 +103,7 @@ export function showFigures(field) {
   let leaves = 0;
   for (let n = 0; n < field.low.length; ++n) leaves += isLeaf(field, n) ? 1 : 0;
   /** @type {[string, string][]} */
-  const rows = [["made from", field.name || "a function"], ["cells", leaves.toLocaleString("en")], ["file", `${(field.bytes / 1e6).toFixed(2)} MB`], ["size", field.size.map(shortNumber).join(" × ")]];
+  const rows = [["made from", field.name || "a function"], ["cells", leaves.toLocaleString("en")], ["file", `${(field.bytes / 1e6).toFixed(2)} MB`], ["domain", field.size.map(shortNumber).join(" × ")]];
   if (field.measured)
     rows.push(["RMS error near", shortNumber(field.measured.nearRms)], ["greatest near", shortNumber(field.measured.nearMax)], ["RMS error", shortNumber(field.measured.rms)], ["greatest error", shortNumber(field.measured.max)]);
   setRows(element("figures", HTMLDListElement), rows);

@@ -115,9 +115,10 @@ class WorstPanel {
     const last = this.first + ROWS;
     const worst = jumps.worst(kind, atSurface, last + 1); // one more tells whether there is a next page
     list.start = this.first + 1;
-    list.replaceChildren(...worst.slice(this.first, last).map((n) => this.row(jumps.at(n), kind)));
+    const faces = worst.map((n) => jumps.at(n)).filter((face) => face[kind] > 0);
+    list.replaceChildren(...(faces.length > 0 ? faces.slice(this.first, last).map((face) => this.row(face, kind)) : ["no jumps"]));
     element("worst-previous", HTMLButtonElement).disabled = this.first === 0;
-    element("worst-next", HTMLButtonElement).disabled = worst.length <= last;
+    element("worst-next", HTMLButtonElement).disabled = faces.length <= last;
   }
 
   /**
@@ -159,6 +160,7 @@ export function flyTo(view, field, { worst, axis, depth, isAtSurface }) {
     return;
   }
   view.kind = "slice";
+  if (view.sliceColor === "distance") view.sliceColor = "value-jump"; // whose colours have outlines of the cells
   setPlane(view, field, worst, axisVector(axis === 2 ? 1 : 2));
   view.zoom = Math.max(1, Math.max(...field.size) / (6 * edge));
   view.target = worst;
@@ -233,7 +235,10 @@ class ProbePanel {
     if (!element("probe", HTMLDetailsElement).open) return;
     plot.replaceChildren();
     script.textContent = "";
-    if (!from || !to || length(distanceBetween(from, to).components) === 0) return;
+    if (!from || !to || length(distanceBetween(from, to).components) === 0) {
+      if (["probe-from", "probe-to"].every((id) => element(id, HTMLInputElement).value !== "")) plot.replaceChildren("The ends are three numbers with commas each, and differ.");
+      return;
+    }
     script.textContent = scriptOfProbe(from, to);
     const { field, painter } = host.viewer;
     const line = sampleLine(field, from, to, LINE_SAMPLES);
