@@ -261,6 +261,8 @@ class Page {
 
   showTabs() {
     const tabs = element("tabs", HTMLElement);
+    const title = document.querySelector("header h1");
+    if (title instanceof HTMLElement) title.hidden = this.tabs.length > 1 && title.textContent === this.tabs.map(({ name }) => name).join(", ");
     tabs.hidden = this.tabs.length < 2;
     tabs.replaceChildren(
       ...this.tabs.map((tab) => {
@@ -507,6 +509,8 @@ class Page {
 
 async function start() {
   const page = new Page();
+  window.addEventListener("error", ({ error }) => error && page.say(`An error in the page: ${error}`));
+  window.addEventListener("unhandledrejection", (event) => page.say(`An error in the page: ${event.reason}`));
   await page.start();
   // Tests and curious readers find the page here, with functions to ask it.
   const functions = { query, firstView, planeOf, raysOf, scriptOf, viewFrom, degreeOf, axisAlong, pickAt, add, scaled, cellErrors, forEachLeaf, Jumps, FaceMeter, sampleLine, thicknessAt, distanceBetween };

@@ -136,8 +136,9 @@ function uploadedCount(field, leaf) {
 }
 
 /**
+ * Packs two numbers into one: the upper halves of their bits, rounded away from each other.
  * @param {number} low
- * @param {number} high  packs two numbers into the upper halves of their bits, rounded away from each other
+ * @param {number} high
  */
 function packOutwards(low, high) {
   const bits = new Uint32Array(new Float32Array([low, high]).buffer);
