@@ -148,9 +148,10 @@ class Page {
     canvas.tabIndex = 0;
     canvas.setAttribute("aria-label", tab.name);
     canvas.hidden = true;
+    /** @type {Viewer} */
     const viewer = new Viewer(canvas, field, this.sources, this.view, {
-      changed: () => (document.body.dataset.state = "changing"),
-      painted: () => this.painted(),
+      changed: () => this.shownViewers().includes(viewer) && (document.body.dataset.state = "changing"),
+      painted: () => this.shownViewers().includes(viewer) && this.painted(),
       rested: () => this.rested(),
       failed: (error) => this.viewerFailed(tab, error),
     });

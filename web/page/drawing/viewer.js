@@ -38,7 +38,7 @@ export class Viewer {
    * @param {Field} field
    * @param {Record<string, string>} sources
    * @param {View} view  which others may change; they call `changed` then
-   * @param {{changed: () => void, painted: (viewer: Viewer) => void, rested: () => void, failed: (error: unknown) => void}} listener
+   * @param {{changed: () => unknown, painted: (viewer: Viewer) => unknown, rested: () => void, failed: (error: unknown) => void}} listener
    */
   constructor(canvas, field, sources, view, listener) {
     this.canvas = canvas;

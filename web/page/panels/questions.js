@@ -44,8 +44,8 @@ class WorstPanel {
    */
   constructor(host) {
     this.host = host;
-    /** @type {Map<Viewer, Jumps>} */
-    this.measured = new Map();
+    /** @type {WeakMap<Viewer, Jumps>} */
+    this.measured = new WeakMap();
     this.first = 0; // rank of the first interface in the list, from 0
     for (const id of ["worst-by", "worst-on"])
       element(id, HTMLSelectElement).addEventListener("change", () => {
@@ -90,6 +90,7 @@ class WorstPanel {
     const jumps = new Jumps(viewer.field);
     this.measured.set(viewer, jumps);
     const portion = () => {
+      if (viewer.isRemoved) return;
       if (!jumps.run(PORTION)) setTimeout(portion);
       else {
         for (const kind of JUMP_KINDS) viewer.painter.setCellNumbers(`${kind}-jump`, jumps.ofCells[kind], decadesOf(viewer.field, jumps.ofCells[kind]));
