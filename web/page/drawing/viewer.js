@@ -104,12 +104,12 @@ export class Viewer {
         for (let waited = 0; waited < REST && !this.isStale; waited += 15) await pause(15);
         if (!this.isStale) await this.drawSharp();
       }
-      this.listener.rested();
     } catch (error) {
       this.fail(error);
     } finally {
       this.isRunning = false;
     }
+    this.listener.rested();
   }
 
   async drawCoarse() {
