@@ -11,7 +11,7 @@ import { middleOf, movePlaneTo, normalFor, placeOfPlane, placesOfPlane, setPlane
 /** @typedef {import("../drawing/painter.js").Levels} Levels */
 
 /** @type {[Quantity, string][]} */
-const COLORS_OF_CELLS = [["value-jump", "jump of the value"], ["gradient-jump", "jump of the gradient"], ["cell-error", "estimated error"]];
+const COLORS_OF_CELLS = [["value-jump", "jump of the value"], ["gradient-jump", "jump of the gradient"], ["cell-error", "cell error"]];
 /** @type {Record<View["kind"], [Quantity, string][]>} */
 const COLORS = {
   surface: [["normal", "lit"], ["degree", "degree"], ["depth", "depth"], ...COLORS_OF_CELLS],

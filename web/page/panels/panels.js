@@ -70,7 +70,7 @@ function showScaleOfCells(legend, painter, quantity) {
   if (!decades) return legend.replaceChildren("being measured …");
   const [low, high] = decades;
   const grey = document.createElement("small");
-  grey.textContent = quantity === "cell-error" ? "grey: exact cells, which have none" : "grey: none";
+  grey.textContent = quantity === "cell-error" ? "grey: zero, as in exact cells" : "grey: none";
   legend.replaceChildren(...scaleBar(orderedColor, Array.from({ length: high - low + 1 }, (_, n) => `1e${low + n}`.replace("-", "−"))), grey);
 }
 
