@@ -12,7 +12,7 @@
 
 namespace hpsdf::app {
 
-/// What a page tells of a field besides the field itself.
+/// Describes a field in a page, besides the field itself.
 struct FieldInPage {
   std::string name;       ///< differs from those of the page's other fields
   std::string view = {};  ///< lines of a script that the page shows at first; "" for its own first view

@@ -93,3 +93,11 @@ export function divergingColor(t) {
 export function cssColor(color) {
   return `rgb(${color.map((x) => Math.round(255 * encodeChannel(x))).join(" ")})`;
 }
+
+/**
+ * Returns the colour of letters that can be read on a colour.
+ * @param {Color} color
+ */
+export function letterColor(color) {
+  return 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2] > 0.25 ? "#000" : "#fff";
+}

@@ -241,7 +241,7 @@ export class Painter {
     const quantity = isSlice ? view.sliceColor : view.surfaceColor;
     const draw = (/** @type {number} */ first, /** @type {number} */ count) => {
       const { mode, texture, range, ofCells } = this.coloringOf(quantity);
-      colors.bind();
+      colors.bind([gl.COLOR_ATTACHMENT0]);
       const coloring = renderer.program("coloring");
       renderer.checkLinked(coloring);
       gl.useProgram(coloring);

@@ -124,7 +124,7 @@ function gridPlane(field, point, normal) {
 }
 
 /** An error of the graphics card, in words for the reader of the page. */
-export class GraphicsError extends Error {}
+class GraphicsError extends Error {}
 
 /**
  * @param {Field} field
@@ -565,7 +565,7 @@ export class FieldRenderer {
    */
   isAnyUnderWay(buffers, state, first, count) {
     const { gl } = this;
-    this.answer.bind();
+    this.answer.bind([gl.COLOR_ATTACHMENT0]);
     gl.clearBufferfv(gl.COLOR, 0, new Float32Array(4));
     const asking = this.program("asking");
     this.use(asking);
@@ -724,60 +724,26 @@ export class Buffers {
   }
 }
 
-/** A texture of colours. */
-export class ColorTarget {
+/** Textures of one size into which a pass draws. */
+class Frame {
   /**
    * @param {FieldRenderer} renderer
    * @param {number} width
    * @param {number} height
+   * @param {WebGLTexture[]} textures
    */
-  constructor(renderer, width, height) {
-    const { gl } = renderer;
+  constructor({ gl }, width, height, textures) {
     this.gl = gl;
     this.width = width;
     this.height = height;
-    this.texture = renderer.plainTexture(gl.RGBA8, width, height, gl.RGBA, gl.UNSIGNED_BYTE, null);
+    this.textures = textures;
     this.frame = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.texture, 0);
-  }
-
-  /** Makes the target that of the next pass. */
-  bind() {
-    const { gl } = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
-    gl.viewport(0, 0, this.width, this.height);
-  }
-
-  remove() {
-    this.gl.deleteFramebuffer(this.frame);
-    this.gl.deleteTexture(this.texture);
-  }
-}
-
-/** Two textures into which a pass draws: one of four integers for each pixel, one of four floats. */
-export class Target {
-  /**
-   * @param {FieldRenderer} renderer
-   * @param {number} width
-   * @param {number} height
-   */
-  constructor(renderer, width, height) {
-    const { gl } = renderer;
-    this.gl = gl;
-    this.width = width;
-    this.height = height;
-    this.integers = renderer.plainTexture(gl.RGBA32UI, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, null);
-    this.floats = renderer.plainTexture(gl.RGBA32F, width, height, gl.RGBA, gl.FLOAT, null);
-    this.frame = gl.createFramebuffer();
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.integers, 0);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, gl.TEXTURE_2D, this.floats, 0);
-    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+    textures.forEach((texture, n) => gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0));
   }
 
   /**
-   * Makes the target that of the next pass.
+   * Makes the textures the target of the next pass.
    * @param {number[]} attachments  into which it draws
    */
   bind(attachments) {
@@ -785,6 +751,41 @@ export class Target {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.viewport(0, 0, this.width, this.height);
     gl.drawBuffers(attachments);
+  }
+
+  remove() {
+    this.gl.deleteFramebuffer(this.frame);
+    for (const texture of this.textures) this.gl.deleteTexture(texture);
+  }
+}
+
+/** A texture of colours. */
+export class ColorTarget extends Frame {
+  /**
+   * @param {FieldRenderer} renderer
+   * @param {number} width
+   * @param {number} height
+   */
+  constructor(renderer, width, height) {
+    const { gl } = renderer;
+    super(renderer, width, height, [renderer.plainTexture(gl.RGBA8, width, height, gl.RGBA, gl.UNSIGNED_BYTE, null)]);
+  }
+}
+
+/** Two textures: one of four integers for each pixel, one of four floats. */
+export class Target extends Frame {
+  /**
+   * @param {FieldRenderer} renderer
+   * @param {number} width
+   * @param {number} height
+   */
+  constructor(renderer, width, height) {
+    const { gl } = renderer;
+    const integers = renderer.plainTexture(gl.RGBA32UI, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, null);
+    const floats = renderer.plainTexture(gl.RGBA32F, width, height, gl.RGBA, gl.FLOAT, null);
+    super(renderer, width, height, [integers, floats]);
+    this.integers = integers;
+    this.floats = floats;
   }
 
   clear() {
@@ -816,12 +817,5 @@ export class Target {
     gl.readBuffer(gl.COLOR_ATTACHMENT0);
     gl.readPixels(0, 0, this.width, this.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, pixels);
     return pixels;
-  }
-
-  remove() {
-    const { gl } = this;
-    gl.deleteFramebuffer(this.frame);
-    gl.deleteTexture(this.integers);
-    gl.deleteTexture(this.floats);
   }
 }

@@ -1,6 +1,6 @@
 // The panels beside the picture: the legend, what is under the pointer, figures of the field.
 
-import { cssColor, divergingColor, orderedColor } from "../drawing/colors.js";
+import { cssColor, divergingColor, letterColor, orderedColor } from "../drawing/colors.js";
 import { element, setRows, shortNumber } from "./dom.js";
 import { EXACT_DEGREE, degreeOf, isExact, isLeaf } from "../field/field_file.js";
 import { query } from "../field/query.js";
@@ -86,7 +86,7 @@ function levelRows(levels) {
     const name = document.createElement("b");
     name.textContent = level === EXACT_DEGREE ? "exact" : String(level);
     name.style.background = cssColor(color);
-    name.style.color = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2] > 0.25 ? "#000" : "#fff";
+    name.style.color = letterColor(color);
     const percent = document.createElement("span");
     percent.textContent = `${(100 * share).toFixed(1)} %`;
     const bar = document.createElement("i");

@@ -1,6 +1,6 @@
 // The plot of a field along a line: the value, the gradient's length and its component along the line, the degrees and depths of the cells.
 
-import { cssColor } from "../drawing/colors.js";
+import { cssColor, letterColor } from "../drawing/colors.js";
 import { shortNumber } from "../panels/dom.js";
 import { EXACT_DEGREE, degreeOf } from "../field/field_file.js";
 import { length } from "../field/vector.js";
@@ -206,7 +206,7 @@ class LinePlotter {
       const text = name === "degree" && level === EXACT_DEGREE ? "exact" : String(level);
       if (0.6 * TEXT * text.length + 2 > width) continue;
       const label = shape("text", { x: x + width / 2, y: y + 0.5 * BAND + 4, "text-anchor": "middle" }, text);
-      label.style.fill = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2] > 0.25 ? "#000" : "#fff";
+      label.style.fill = letterColor(color);
       this.svg.append(label);
     }
   }
