@@ -12,7 +12,6 @@
 
 #include "commands/commands.h"
 #include "explorer/exact_outline.h"
-#include "explorer/raster.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
 #include "language/script.h"
@@ -20,6 +19,7 @@
 #include "support/made_meshes.h"
 #include "support/require_gl.h"
 #include "support/temporary_directory.h"
+#include "widgets/raster.h"
 
 namespace hpsdf::app {
 namespace explorer_test {

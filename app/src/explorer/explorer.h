@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "explorer/ui.h"
 #include "explorer/view_state.h"
 #include "pictures/build_preview.h"
 #include "pictures/readout.h"
 #include "session/session.h"
+#include "widgets/ui.h"
 
 namespace hpsdf::app {
 

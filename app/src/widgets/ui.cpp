@@ -1,4 +1,4 @@
-#include "explorer/ui.h"
+#include "widgets/ui.h"
 
 #include <imgui.h>
 #include <imgui_internal.h>
@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "explorer/raster.h"
 #include "hpsdf/render/font.h"
+#include "widgets/raster.h"
 
 namespace hpsdf::app {
 namespace {

@@ -1,4 +1,4 @@
-#include "explorer/raster.h"
+#include "widgets/raster.h"
 
 #include <algorithm>
 #include <array>
