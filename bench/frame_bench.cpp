@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "hpsdf/render/picture.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/view.h"
 #include "scene.h"
@@ -28,6 +29,16 @@ void frame(benchmark::State& state, const Field& field, render::GlChoice choice,
   state.SetLabel(renderer->description());
 }
 
+/// Draws whole pictures of the bunny, with or without the shadows that the field measures.
+void picture(benchmark::State& state, bool shadows) {
+  const auto renderer = rendererOf(bunnyField(), render::GlChoice::software, state);
+  if (!renderer) return;
+  render::SurfacePicture picture;
+  picture.shadows = shadows;
+  render::draw(*renderer, bunnyField(), picture);  // compiles the shaders
+  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(render::draw(*renderer, bunnyField(), picture));
+}
+
 void bunnyFrame(benchmark::State& state) { frame(state, bunnyField(), render::GlChoice::software, 1280, 720); }
 void floatFrame(benchmark::State& state) { frame(state, floatBunnyField(), render::GlChoice::software, 1280, 720); }
 void bunnyFrameByHardware(benchmark::State& state) {
@@ -36,6 +47,8 @@ void bunnyFrameByHardware(benchmark::State& state) {
 
 BENCHMARK(bunnyFrame)->Name("frame/bunny")->UseRealTime()->Unit(benchmark::kSecond);
 BENCHMARK(floatFrame)->Name("frame/float")->UseRealTime()->Unit(benchmark::kSecond);
+BENCHMARK_CAPTURE(picture, shadows, true)->Name("frame/shadows")->UseRealTime()->Unit(benchmark::kSecond);
+BENCHMARK_CAPTURE(picture, plain, false)->Name("frame/plain")->UseRealTime()->Unit(benchmark::kSecond);
 BENCHMARK(bunnyFrameByHardware)
     ->Name("frame_by_hardware/bunny")
     ->Args({1280, 720})

@@ -213,7 +213,7 @@ TEST(Surface, showsTheBackdropWhereARayMisses) {
   ViewBuffers buffers = blank(16, 16);
   std::fill(buffers.cell.begin(), buffers.cell.begin() + 16 * 8, kNoCell);
   const Camera camera = {{0, 0, 3}, {0, 0, -1}, {0.3, 0, 0}, {0, 0.3, 0}};
-  const Image image = colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1});
+  const Image image = colorSurface(buffers, camera, {levelColors(buffers, kMap, ColorBy::normal)}, {1, 1, 1});
   EXPECT_EQ(image.at(3, 2), encodeSrgb(backdropColor(2.5 / 16)));
   EXPECT_GT(lightnessOf(image.at(3, 2)), lightnessOf(image.at(3, 12)));
 }
@@ -228,7 +228,7 @@ TEST(Surface, isLitFromAboveLeftOfTheCameraInAnyDirection) {
       return Vector3(rotation.cast<double>() * Vector3(x, y, z));
     };
     const Camera camera = {turned(0, 0, 3), turned(0, 0, -1), turned(0.3, 0, 0), turned(0, 0.3, 0)};
-    return colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1}).at(0, 0);
+    return colorSurface(buffers, camera, {levelColors(buffers, kMap, ColorBy::normal)}, {1, 1, 1}).at(0, 0);
   };
   const Eigen::Vector3f left = Eigen::Vector3f(-1, 1, 1).normalized(), right = Eigen::Vector3f(1, -1, 1).normalized();
   const Eigen::Matrix3f still = Eigen::Matrix3f::Identity();
@@ -248,7 +248,7 @@ Image groove(double depth, ColorBy color, Projection projection) {
     const bool inGroove = x >= 95 && x < 105;
     buffers.distance[i] = static_cast<float>((inGroove ? 3 + depth : 3) * (parallel ? 1 : ray.norm()));
   });
-  return colorSurface(buffers, camera, levelColors(buffers, kMap, color), {1, 1, 1});
+  return colorSurface(buffers, camera, {levelColors(buffers, kMap, color)}, {1, 1, 1});
 }
 
 TEST(Surface, isDarkerInFoldsThanInTheOpen) {
@@ -272,7 +272,8 @@ TEST(Surface, hasNoBlackSpecksWhereNormalsFaceAway) {
   const auto shaded = [&](const Eigen::Vector3f& normal) {
     ViewBuffers buffers = blank(1, 1);
     buffers.normal[0] = normal.normalized();
-    return lightnessOf(colorSurface(buffers, camera, levelColors(buffers, kMap, ColorBy::normal), {1, 1, 1}).at(0, 0));
+    return lightnessOf(
+        colorSurface(buffers, camera, {levelColors(buffers, kMap, ColorBy::normal)}, {1, 1, 1}).at(0, 0));
   };
   EXPECT_NEAR(shaded({0, -1, -0.6F}), shaded({0, -1, 0}), 0.01);
 }
@@ -287,7 +288,7 @@ TEST(Surface, keepsLevelColorsRecognisableUnderShading) {
       buffers.degree[0] = static_cast<std::uint8_t>(level);
       buffers.normal[0] = Eigen::Vector3f(float(-std::sin(tilt)), 0, float(std::cos(tilt)));
       const Oklab shown = toOklab(
-          decodeSrgb(colorSurface(buffers, camera, levelColors(buffers, map, ColorBy::degree), {1, 1, 1}).at(0, 0)));
+          decodeSrgb(colorSurface(buffers, camera, {levelColors(buffers, map, ColorBy::degree)}, {1, 1, 1}).at(0, 0)));
       int nearest = 0;
       for (int candidate : levels)
         if (nearest == 0 ||

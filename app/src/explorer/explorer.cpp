@@ -499,6 +499,7 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
     picture.samples = shrink > 1 ? 1 : view_.samples;
     picture.bare = true;
     picture.scale = scale;
+    if constexpr (requires { picture.shadows; }) picture.shadows = picture.shadows && shrink == 1;
     return picture;
   };
   // Place the plane and the camera relative to the session's current field, even if `field` is the second field, which

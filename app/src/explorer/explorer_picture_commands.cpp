@@ -58,6 +58,8 @@ void checkCamera(const Arguments& arguments) {
 void changeSurface(ViewState& view, const Arguments& arguments, Session& session) {
   if (arguments.given("offset")) view.surfaceOffset = arguments.number("offset");
   if (arguments.given("shown")) view.surface = arguments.flag("shown");
+  if (arguments.given("shadows")) view.shadows = arguments.flag("shadows");
+  if (arguments.given("edges")) view.edges = arguments.flag("edges");
   if (arguments.given("cracks")) view.cracks = arguments.flag("cracks");
   if (arguments.given("defects")) {
     view.defects = textOrNone(arguments, "defects");
@@ -209,6 +211,10 @@ void addSurfaceCommands(Registry& registry) {
       .parameters =
           {{"shown", flag(""), "Whether it is drawn: without it, planes and cells can be looked at alone."},
            {"offset", number().in("world units"), "The distance whose surface is drawn; 0 at first."},
+           {"shadows", flag("").under(kDrawn).advanced(),
+            "Darken folds, and let the solid throw a soft shadow, once the view rests."},
+           {"edges", flag("").under(kDrawn),
+            "Draw lines where the surface bends by more than 30 degrees, and outlines."},
            {"cracks", flag("").under(kDrawn).advanced(), "Mark where the surface is torn at a face between two cells."},
            {"defects", text("MESH|own|none").under(kDrawn).advanced(),
             "Mark where this mesh has defects, as 'mesh --picture' does; own for the one that the field was "

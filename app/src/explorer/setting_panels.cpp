@@ -37,6 +37,8 @@ void drawCamera(const Controls& controls, const render::OrbitCamera& c) {
 void drawSurface(const Controls& controls, const ViewState& view, const Box& domain) {
   const double span = 0.15 * domain.diagonal().norm();
   controls.slider("view/offset", "offset", view.surfaceOffset, -span, span, "surface offset=");
+  controls.checkbox("view/shadows", "shadows", view.shadows, "surface shadows=");
+  controls.checkbox("view/edges", "edges", view.edges, "surface edges=");
   controls.checkbox("view/cracks", "mark cracks", view.cracks, "surface cracks=");
   controls.choice("view/clip", "cut across", {"none", "x", "y", "z"}, view.clip ? axisName(view.clip->axis) : "none",
                   "surface clip=");

@@ -22,9 +22,9 @@ std::string planeLine(const ViewState& view) {
 }
 
 std::string surfaceLine(const ViewState& view) {
-  std::string line =
-      fmt::format("surface shown={} offset={} cracks={} defects={} clip={}", view.surface, view.surfaceOffset,
-                  view.cracks, wordOrNone(view.defects), view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
+  std::string line = fmt::format("surface shown={} shadows={} edges={} offset={} cracks={} defects={} clip={}",
+                                 view.surface, view.shadows, view.edges, view.surfaceOffset, view.cracks,
+                                 wordOrNone(view.defects), view.clip ? std::string(1, "xyz"[view.clip->axis]) : "none");
   if (view.clip) line += fmt::format(" clip-offset={}", view.clip->offset);
   return line + "\n";
 }
@@ -83,6 +83,8 @@ render::SurfacePicture surfacePicture(const ViewState& view, const Field& field)
   picture.clip = view.clip;
   picture.cracks = view.cracks;
   picture.surface = view.surface;
+  picture.shadows = view.shadows;
+  picture.edges = view.edges;
   if (view.planeInSpace) picture.plane = planeOf(view, field);
   picture.cells = view.cells;
   picture.arrows = view.arrows;

@@ -46,6 +46,8 @@ struct ViewState {
   bool cracks = false;       ///< marks pixels where a ray meets a jump of the field
   std::string defects = {};  ///< mesh whose defects are marked, "own" for the field's own mesh, or empty
   bool surface = true;       ///< draws the surface
+  bool shadows = true;       ///< folds are darker and the solid throws a shadow, in pictures at rest
+  bool edges = false;        ///< draws feature edges and outlines
   render::ShownCells cells;
   bool triangles = false;                                      ///< draws the triangles of the surface's contour
   std::string trianglesTolerance = defaultContourTolerance();  ///< as text, such as "0.002" or "0.1%"

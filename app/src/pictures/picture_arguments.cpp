@@ -291,6 +291,8 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& box
   }
   picture.cracks = arguments.flag("cracks");
   picture.surface = arguments.flag("surface");
+  picture.shadows = arguments.flag("shadows");
+  picture.edges = arguments.flag("edges");
   picture.plane = scenePlane(arguments, box);
   picture.cells = shownCells(arguments);
   picture.color = colorNamed(arguments.text("color"));

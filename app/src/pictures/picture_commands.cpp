@@ -186,6 +186,10 @@ const std::vector<Parameter> kRenderDrawn = {
     {"defects", text("MESH|own").advanced(),
      "Marks the defects of this mesh as 'mesh --picture' does. own is the mesh from which the field was made, where "
      "that is known."},
+    {"shadows", flag("true").advanced(),
+     "Measures by the field how much light reaches the surface: folds are darker, and the solid throws a soft shadow. "
+     "--shadows=false draws about twice as fast."},
+    {"edges", flag(), "Draws lines where the surface bends by more than 30 degrees, and along its outlines."},
     {"surface", flag("true").advanced(), "Draws the surface. --surface=false shows planes and cells alone."},
     {"plane", numbers("x|y|z|PX,PY,PZ,NX,NY,NZ", {6}).orWords({"x", "y", "z"}).in("world units"),
      "Also draws a section of the domain in the colours of the picture, with outlined cells and the surface as a line: "

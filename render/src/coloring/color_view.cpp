@@ -25,6 +25,9 @@ constexpr Color kSurfaceCasing = {16, 14, 34};
 constexpr Color kSection = {238, 222, 205};  // cut through a solid without a colour scale
 constexpr Color kAir = {222, 228, 235};      // part of a plane that lies outside of the solid
 
+// The greatest shares of the light that shadow and occlusion take from the ground.
+constexpr float kGroundShadow = 0.34F, kGroundOcclusion = 0.42F;
+
 constexpr double kOutlineStrength = 0.62;
 constexpr double kIsoStrength = 0.42;
 // The widths of lines are in multiples of a thin line's width.
@@ -223,6 +226,12 @@ class SurfaceLine {
   LinearColor line_ = decodeSrgb(kSurfaceLine), casing_ = decodeSrgb(kSurfaceCasing);
 };
 
+/// The share of the backdrop's light that is left where the ground is in shadow.
+float groundLight(const FieldLight& light, std::size_t i) {
+  if (light.open.empty()) return 1;
+  return (1 - kGroundShadow * (1 - light.lit[i])) * (1 - kGroundOcclusion * (1 - light.open[i]));
+}
+
 }  // namespace
 
 Color paperColor() { return kPaper; }
@@ -276,21 +285,24 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
   });
 }
 
-Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
-                   double offset, const std::vector<float>& lines, std::span<const LinearColor> bodies) {
-  const auto shader = surfaceShader(buffers, camera, color, bodies);
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SurfaceLook& look, const Sampling& sampling,
+                   double offset, const std::vector<float>& lines) {
+  const auto shader = surfaceShader(buffers, camera, look);
   const Contours contours(buffers, offset);
   const SurfaceLine surfaceLine(sampling);
   std::optional<CellOutlines> outlines;
   if (!buffers.shown.empty()) outlines.emplace(buffers, sampling, true);
   const LinearColor outline = decodeSrgb(kOutline), solid = decodeSrgb(kSection), air = decodeSrgb(kAir);
   const auto flatColor = [&](std::size_t i) {
-    return color ? color(i) : buffers.shows(i, Shown::section) || buffers.value[i] < offset ? solid : air;
+    if (look.color) return look.color(i);
+    return buffers.shows(i, Shown::section) || buffers.value[i] < offset ? solid : air;
   };
   std::vector<LinearColor> backdrop;
   for (int y = 0; y < buffers.height; ++y) backdrop.push_back(backdropColor((y + 0.5) / buffers.height));
   return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) {
-    LinearColor sample = !buffers.covered(i) ? backdrop[y] : isFlat(buffers, i) ? flatColor(i) : shader(x, y);
+    LinearColor sample = !buffers.covered(i)  ? backdrop[y] * groundLight(look.light, i)
+                         : isFlat(buffers, i) ? flatColor(i)
+                                              : shader(x, y);
     if (outlines) sample = mix(sample, outline, float(kOutlineStrength) * (*outlines)(x, y));
     if (buffers.shows(i, Shown::plane)) {
       const double slope = contours.slope(x, y, pixelSize(camera, buffers.distance[i], buffers.height));

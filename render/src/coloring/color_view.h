@@ -3,9 +3,9 @@
 // buffers, so that views from OpenGL and from the reference renderer are coloured alike.
 
 #include <functional>
-#include <span>
 #include <vector>
 
+#include "coloring/surface_shader.h"
 #include "hpsdf/render/picture_settings.h"
 #include "hpsdf/render/view.h"
 #include "image/colormap.h"
@@ -37,12 +37,11 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
 /// bold line at distance zero.
 Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
 
-/// Colours a view of a surface in front of the backdrop. The surface and boxes have soft shading and the colours that
-/// `color` returns, or plain materials if `color` is empty. Sections and planes are unlit and show the outlines of
-/// cells. On a plane, the surface f = offset is drawn as a line. `lines` holds the share of each sample, 0 to 1, that
-/// lines along cell edges cover, or is empty. `bodies` holds the colour of each body.
-Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SampleColor& color, const Sampling& sampling,
-                   double offset = 0, const std::vector<float>& lines = {}, std::span<const LinearColor> bodies = {});
+/// Colours a view of a surface in front of the backdrop. The surface and boxes have soft shading and the colours of
+/// `look`. Sections and planes are unlit and show the outlines of cells. On a plane, the surface f = offset is drawn as
+/// a line. `lines` holds the share of each sample, 0 to 1, that lines along edges cover, or is empty.
+Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SurfaceLook& look, const Sampling& sampling,
+                   double offset = 0, const std::vector<float>& lines = {});
 
 /// The background colour of a picture: around the domain in a slice, and behind the legend and the caption.
 Color paperColor();

@@ -1,5 +1,6 @@
 #include "coloring/surface_shader.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -71,6 +72,11 @@ class CameraFrame {
 /// light from the upper left, a cool fill light from the right, a rim light from behind, and light from sky and
 /// ground.
 struct Lights {
+  explicit Lights(double tilt) {
+    const Eigen::Matrix3f turned = Eigen::AngleAxisf(static_cast<float>(tilt), Eigen::Vector3f::UnitX()).matrix();
+    for (Eigen::Vector3f* lamp : {&key, &fill, &rim}) *lamp = turned * *lamp;
+  }
+
   Eigen::Vector3f key = Eigen::Vector3f(-0.55F, 0.62F, 0.56F).normalized();
   Eigen::Vector3f fill = Eigen::Vector3f(0.85F, 0.10F, 0.52F).normalized();
   Eigen::Vector3f rim = Eigen::Vector3f(0.35F, 0.55F, -0.76F).normalized();
@@ -80,19 +86,20 @@ struct Lights {
   LinearColor sky = {0.26F, 0.29F, 0.34F};
   LinearColor ground = {0.10F, 0.08F, 0.07F};
 
-  /// Light that a matt surface with the unit normal n reflects. `open` is the share of ambient light that reaches it.
-  LinearColor diffuse(const Eigen::Vector3f& n, float open) const {
+  /// Light that a matt surface with the unit normal n reflects. `open` is the share of ambient light that reaches it,
+  /// `lit` the share of the key light.
+  LinearColor diffuse(const Eigen::Vector3f& n, float open, float lit) const {
     const float wrapped = std::max(0.0F, (n.dot(key) + 0.12F) / 1.12F);
     const LinearColor lamps =
-        keyColor * wrapped + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim));
+        keyColor * (wrapped * lit) + fillColor * std::max(0.0F, n.dot(fill)) + rimColor * std::max(0.0F, n.dot(rim));
     // Occlusion can remove all ambient light of sky and ground, but only a part of the light of the lamps.
     return lamps * (0.45F + 0.55F * open) + mix(ground, sky, 0.5F + 0.5F * n.y()) * open;
   }
 
   /// Blinn-Phong highlight of the key light, and the sky mirrored at grazing angles (a Fresnel term like Schlick's).
-  LinearColor gloss(const Eigen::Vector3f& n, const Eigen::Vector3f& toEye) const {
+  LinearColor gloss(const Eigen::Vector3f& n, const Eigen::Vector3f& toEye, float lit) const {
     const Eigen::Vector3f half = (key + toEye).normalized();
-    const float highlight = 0.13F * std::pow(std::max(0.0F, n.dot(half)), 36.0F);
+    const float highlight = 0.13F * lit * std::pow(std::max(0.0F, n.dot(half)), 36.0F);
     const float facing = 1 - std::clamp(n.dot(toEye), 0.0F, 1.0F);
     const float fresnel = 0.12F * facing * facing * facing * facing;
     return keyColor * highlight + sky * fresnel;
@@ -101,9 +108,8 @@ struct Lights {
 
 class SurfaceShader {
  public:
-  SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const std::function<LinearColor(std::size_t)>& color,
-                std::span<const LinearColor> bodies)
-      : buffers_(buffers), frame_(buffers, camera), color_(color), bodies_(bodies) {
+  SurfaceShader(const ViewBuffers& buffers, const Camera& camera, const SurfaceLook& look)
+      : buffers_(buffers), frame_(buffers, camera), look_(look), lights_(look.lightTilt) {
     // Arrange the taps (the neighbours of a pixel that ambient occlusion reads) in rings. Each ring is rotated against
     // the next smaller one. All pixels use the same pattern, so that the picture has no noise.
     for (int ring = 1; ring <= kRings; ++ring)
@@ -119,18 +125,31 @@ class SurfaceShader {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
     const Eigen::Vector3f toEye = -frame_.ray(x, y);
     const Eigen::Vector3f n = frame_.normal(x, y, toEye);
-    const float open = openness(x, y, frame_.position(x, y), n);
-    if (!color_ || buffers_.showsBody(i)) {
+    const auto [open, lit] = lightAt(x, y, n);
+    if (!look_.color || buffers_.showsBody(i)) {
       const LinearColor& material = materialAt(i);
-      return material.cwiseProduct(lights_.diffuse(n, open)) + open * lights_.gloss(n, toEye);
+      return material.cwiseProduct(lights_.diffuse(n, open, lit)) + open * lights_.gloss(n, toEye, lit);
     }
     // Colours that show a quantity get soft white light, so that they match the colours of the legend.
-    const float light = 0.50F + 0.58F * std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) - 0.10F * (1 - n.z());
-    return color_(i) * light * (0.35F + 0.65F * open) +
-           LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye).mean());
+    const float wrapped = std::max(0.0F, (n.dot(lights_.key) + 0.5F) / 1.5F) * (0.55F + 0.45F * lit);
+    const float light = 0.50F + 0.58F * wrapped - 0.10F * (1 - n.z());
+    return look_.color(i) * light * (0.35F + 0.65F * open) +
+           LinearColor::Constant(0.4F * open * lights_.gloss(n, toEye, lit).mean());
   }
 
  private:
+  struct Light {
+    float open, lit;
+  };
+
+  /// The shares of the ambient light and of the key light that reach a sample.
+  Light lightAt(int x, int y, const Eigen::Vector3f& normal) const {
+    const std::size_t i = std::size_t(y) * buffers_.width + x;
+    if (look_.light.open.empty() || !buffers_.shows(i, Shown::surface))
+      return {openness(x, y, frame_.position(x, y), normal), 1};
+    return {look_.light.open[i], look_.light.lit[i]};
+  }
+
   /// The share of ambient light that reaches a point: 1 on open ground, close to 0 in a deep fold. It is blocked by
   /// neighbouring samples that rise above the tangent plane at the point. Darker folds and contacts show the shape
   /// better than lamps do.
@@ -152,7 +171,7 @@ class SurfaceShader {
   }
 
   const LinearColor& materialAt(std::size_t i) const {
-    if (buffers_.showsBody(i)) return bodies_[buffers_.body[i]];
+    if (buffers_.showsBody(i)) return look_.bodies[buffers_.body[i]];
     return buffers_.shows(i, Shown::box) ? plainBox_ : clay_;
   }
 
@@ -162,8 +181,7 @@ class SurfaceShader {
 
   const ViewBuffers& buffers_;
   CameraFrame frame_;
-  const std::function<LinearColor(std::size_t)>& color_;
-  std::span<const LinearColor> bodies_;
+  const SurfaceLook& look_;
   std::vector<Tap> taps_;
   Lights lights_;
   LinearColor clay_ = decodeSrgb(kClay), plainBox_ = decodeSrgb(kPlainBox);
@@ -171,10 +189,21 @@ class SurfaceShader {
 
 }  // namespace
 
+double lightTiltOf(double elevationDegrees) {
+  constexpr double kSteepest = 30;  // degrees; lamps of a camera that looks down more steeply stay behind
+  return std::max(0.0, elevationDegrees - kSteepest) * (std::numbers::pi / 180);
+}
+
+Vector3 directionToKey(const Camera& camera, double lightTilt) {
+  const Eigen::Vector3d key = Lights(lightTilt).key.cast<double>();
+  return (key.x() * camera.right.normalized() + key.y() * camera.up.normalized() -
+          key.z() * camera.forward.normalized())
+      .normalized();
+}
+
 std::function<LinearColor(int x, int y)> surfaceShader(const ViewBuffers& buffers, const Camera& camera,
-                                                       const std::function<LinearColor(std::size_t)>& color,
-                                                       std::span<const LinearColor> bodies) {
-  return SurfaceShader(buffers, camera, color, bodies);
+                                                       const SurfaceLook& look) {
+  return SurfaceShader(buffers, camera, look);
 }
 
 Color surfaceColor() { return kClay; }

@@ -331,18 +331,45 @@ void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, cha
   addText(overlay, upward, size, x + 0.5 * (thin - advanceOf(upward, size)), y - length - 0.45 * size, kSoftInk);
 }
 
-void addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
-              std::span<const std::pair<std::string, std::string>> facts) {
-  if (frame.panel.empty()) return;
+double addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
+                std::span<const std::pair<std::string, std::string>> facts) {
+  if (frame.panel.empty()) return frame.panel.y0;
   const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em);
   Column column(overlay, frame, titles);
   for (const auto& [name, value] : facts) {
-    if (column.top + 2.3 * em > column.bottom) return;
+    if (column.top + 2.3 * em > column.bottom) break;
     addText(overlay, fitText(name, small, column.width()), small, column.left, column.top + capHeight(small), kSoftInk);
     addText(overlay, fitText(value, em, column.width()), em, column.left, column.top + 1.25 * small + capHeight(em),
             kInk);
     column.top += 1.25 * small + 1.75 * em;
   }
+  return column.top;
+}
+
+double addShares(Overlay& overlay, const Frame& frame, double top, const std::string& title,
+                 const std::map<int, double>& shares) {
+  const double em = frame.textSize, small = std::max(kSmallestText, 0.8 * em), row = 1.2 * em;
+  const double bottom = top + 1.6 * em + row * double(shares.size());
+  if (frame.panel.empty() || shares.empty() || bottom > frame.panel.y1 - 0.5 * em) return top;
+  const double left = frame.panel.x0 + em, right = frame.panel.x1 - em;
+  addText(overlay, fitText(title, small, right - left), small, left, top + capHeight(small), kSoftInk);
+  double nameWidth = 0, largest = 0;
+  for (const auto& [level, share] : shares) {
+    nameWidth = std::max(nameWidth, advanceOf(levelName(level), small));
+    largest = std::max(largest, share);
+  }
+  const double barLeft = std::round(left + nameWidth + 0.6 * small);
+  const double longest = right - barLeft - 0.5 * small - advanceOf("99.9 %", small);
+  double middle = top + 1.6 * em;
+  for (auto level = shares.rbegin(); level != shares.rend(); ++level, middle += row) {
+    const std::string name = levelName(level->first), share = formatShare(level->second);
+    const double baseline = std::round(middle + capHeight(small) / 2);
+    addText(overlay, name, small, left + nameWidth - advanceOf(name, small), baseline, kInk);
+    const double end = barLeft + std::max(0.0, longest * level->second / largest);
+    overlay.boxes.push_back({barLeft, middle - 0.3 * small, end, middle + 0.3 * small, kShareBar});
+    addText(overlay, share, small, end + 0.5 * small, baseline, kSoftInk);
+  }
+  return bottom + 0.4 * em;
 }
 
 double swatchHeight(const Frame& frame) { return 1.6 * std::max(kSmallestText, 0.8 * frame.textSize); }

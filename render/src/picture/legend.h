@@ -80,9 +80,15 @@ void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::stri
 /// in this corner. A section that is too small gets no arrows.
 void addAxes(Overlay& overlay, const Frame& frame, const PixelRect& section, char right, char up);
 
-/// Adds a row to the panel for each fact, which is a name and a value, as many as fit.
-void addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
-              std::span<const std::pair<std::string, std::string>> facts);
+/// Adds a row to the panel for each fact, which is a name and a value, as many as fit. Returns where the free part of
+/// the panel begins.
+double addFacts(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
+                std::span<const std::pair<std::string, std::string>> facts);
+
+/// Adds a bar to the panel for the share of each level (degree or depth), the highest level on top, from `top` down.
+/// Adds nothing if not all bars fit. Returns where the free part of the panel begins.
+double addShares(Overlay& overlay, const Frame& frame, double top, const std::string& title,
+                 const std::map<int, double>& shares);
 
 /// A row of a legend: a colour with its meaning, and a count, which may be empty.
 struct Swatch {

@@ -144,8 +144,9 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   // Colour the view of the mesh in a picture, and mark the mesh's defects.
   Image image = backdropPicture(picture.width, picture.height, height);
   const Sampling sampling{samples, frame.lineWidth(), 1};
-  const std::array materials = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)};
-  pasteView(image, colorSurface(buffers, camera, {}, sampling, 0, {}, materials));
+  const SurfaceLook look{.bodies = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)},
+                         .lightTilt = lightTiltOf(orbit.elevationDegrees)};
+  pasteView(image, colorSurface(buffers, camera, look, sampling));
   paintDefects(image, camera, buffers, samples, normalized(defects), sampling.lineWidth);
 
   // Add the legend in the panel and the caption.
@@ -170,8 +171,8 @@ DrawView meshView(const MakeBodyRenderer& make, const TriangleMesh& mesh, const 
         startingBefore(renderer->bounds({&body, 1}), cameraOf(normalized(orbit), domain, width, height));
     ViewBuffers buffers = emptyBuffers(width, height, true);
     addBodies(renderer->view(camera, {&body, 1}, width, height), buffers);
-    const LinearColor clay = decodeSrgb(surfaceColor());
-    return colorSurface(buffers, camera, {}, Sampling{}, 0, {}, {&clay, 1});
+    const SurfaceLook look{.bodies = {decodeSrgb(surfaceColor())}, .lightTilt = lightTiltOf(orbit.elevationDegrees)};
+    return colorSurface(buffers, camera, look, Sampling{});
   };
 }
 

@@ -21,6 +21,7 @@
 #include "scene/body_view.h"
 #include "scene/cell_boxes.h"
 #include "scene/cell_lines.h"
+#include "scene/feature_edges.h"
 #include "scene/mesh_lines.h"
 #include "scene/section.h"
 #include "view/view_buffers.h"
@@ -152,7 +153,9 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   if (picture.cells.style != CellStyle::none) cells = chosenCells(field, picture.cells);
   if (picture.cells.style == CellStyle::boxes) addBoxes(field, view, cells, scene.buffers);
   if (bodies.renderer) addBodies(bodies.renderer->view(view.camera, bodies.bodies, width, height), scene.buffers);
-  if (picture.cells.style == CellStyle::lines) scene.lines = cellLines(field, view, cells, scene.buffers, lineWidth);
+  if (picture.edges) scene.lines = featureEdges(view, scene.buffers, lineWidth);
+  if (picture.cells.style == CellStyle::lines)
+    addLines(cellLines(field, view, cells, scene.buffers, lineWidth), scene.lines);
   if (mesh.mesh != nullptr)
     addLines(meshLines(*mesh.mesh, mesh.tolerance, field.domain(), view, scene.buffers, lineWidth), scene.lines);
   return scene;
@@ -161,22 +164,40 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
 /// Adds facts about the field to the panel, in place of the legend of a picture without a colour scale.
 void addFieldFacts(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures) {
   static const std::string titles[] = {"hp distance field", "field"};
-  std::vector<std::pair<std::string, std::string>> facts = {
-      {"cells", formatCount(figures.leaves)},          {"degrees", describeLevels(figures.degreeVolume)},
-      {"depths", describeLevels(figures.depthVolume)}, {"coefficients", formatCount(figures.coefficients)},
-      {"memory", describeBytes(figures.bytes)},
-  };
-  if (const std::optional<Measurement>& m = field.metadata().measurement) {
-    facts.emplace_back("near RMS", formatNumber(m->near.rms, 3));
-    facts.emplace_back("near max", formatNumber(m->near.max, 3));
+  std::vector<std::pair<std::string, std::string>> facts = {{"cells", formatCount(figures.leaves)}};
+  if (!frame.roomy) {  // there are no bars
+    facts.emplace_back("degrees", describeLevels(figures.degreeVolume));
+    facts.emplace_back("depths", describeLevels(figures.depthVolume));
   }
-  addFacts(overlay, frame, titles, facts);
+  facts.emplace_back("coefficients", formatCount(figures.coefficients));
+  facts.emplace_back("memory", describeBytes(figures.bytes));
+  if (const std::optional<Measurement>& m = field.metadata().measurement) {
+    facts.emplace_back(frame.roomy ? "RMS error near surface" : "near RMS", formatNumber(m->near.rms, 3));
+    facts.emplace_back(frame.roomy ? "max error near surface" : "near max", formatNumber(m->near.max, 3));
+  }
+  const double top = addFacts(overlay, frame, titles, facts);
+  if (!frame.roomy) return;
+  const double next = addShares(overlay, frame, top, "degrees by volume", figures.degreeVolume);
+  addShares(overlay, frame, next, "depths by volume", figures.depthVolume);
 }
 
 std::vector<LinearColor> materialsOf(const ShownBodies& shown) {
   std::vector<LinearColor> materials;
   for (const Body& body : shown.bodies) materials.push_back(decodeSrgb(body.color));
   return materials;
+}
+
+/// Returns the materials and the light of a scene.
+SurfaceLook lookOf(const Field& field, const SurfacePicture& picture, const Scene& scene, SampleColor color) {
+  SurfaceLook look{.color = std::move(color),
+                   .bodies = materialsOf(picture.bodies),
+                   .lightTilt = lightTiltOf(picture.camera.elevationDegrees)};
+  if (!picture.shadows || !picture.surface) return look;
+  // What stands or lies beside the surface throws no shadow, so that a shadow on the ground would mislead.
+  const bool isAlone = !picture.plane && picture.cells.style == CellStyle::none && !picture.bodies.renderer;
+  const ShadowCaster caster{field, scene.view, picture.camera.up, isAlone};
+  look.light = fieldLight(caster, scene.buffers, directionToKey(scene.view.camera, look.lightTilt));
+  return look;
 }
 
 /// Adds details to the caption of a surface's picture: about bodies, plane, drawn cells, camera and clipping plane.
@@ -330,8 +351,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
     if (picture.surface) drawn.details.push_back(surface);
   }
   drawn.image = backdropPicture(picture.width, picture.height, frame.view.height());
-  pasteView(drawn.image, colorSurface(buffers, camera, key.color, sampling, picture.offset, scene.lines,
-                                      materialsOf(picture.bodies)));
+  const SurfaceLook look = lookOf(field, picture, scene, std::move(key.color));
+  pasteView(drawn.image, colorSurface(buffers, camera, look, sampling, picture.offset, scene.lines));
 
   // Add the marks of cracks and defects, the arrows and the caption to the picture.
   if (picture.cracks) {

@@ -139,7 +139,11 @@ struct SurfacePicture {
   bool cracks = false;                 ///< marks the cracks of the surface (`ViewBuffers::crack`)
   bool bare = false;                   ///< draws the view alone, without legend and caption
   bool surface = true;                 ///< draws the surface, and the cut by the clipping plane
-  std::optional<Plane> plane = {};     ///< draws the section of the domain with this plane
+  /// Measures by the field how much light reaches the surface: folds are darker, the solid throws a soft shadow on
+  /// itself and, if it is alone in the picture, on the ground below it.
+  bool shadows = true;
+  bool edges = false;  ///< draws lines where the surface bends by more than 30° or ends before something farther away
+  std::optional<Plane> plane = {};  ///< draws the section of the domain with this plane
   ShownCells cells = {};
   int arrows = 0;  ///< spacing of gradient arrows in pixels, 4 to 1000; 0 draws none
   ShownBodies bodies = {};

@@ -1,0 +1,234 @@
+#include "coloring/field_light.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "hpsdf/types.h"
+
+namespace hpsdf::render {
+namespace {
+
+// Lengths are shares of the solid's size, the diagonal of its box.
+constexpr std::array kTaps = {0.009, 0.018, 0.035, 0.065, 0.11};  // distances along the normal for the ambient light
+constexpr double kAmbientStrength = 1.5;
+constexpr double kLift = 0.014;   // height at which the rays to the lamp start, above the steps between cells
+constexpr double kBehind = -0.3;  // cosine from which on a surface is turned away from the lamp
+constexpr double kLeastShadowStep = 0.008, kGreatestShadowStep = 0.12;
+constexpr int kMostShadowSteps = 48;
+constexpr double kAround = 0.1;        // rays to the lamp are followed within this distance of the solid's box
+constexpr double kLampRadius = 0.13;   // tangent of the angle under which half of the lamp is seen
+constexpr double kGroundReach = 1.25;  // the ground is darkened up to this distance from the solid's middle
+constexpr int kRowsTogether = 4;       // rows of samples whose points are evaluated together
+
+/// The distance to the solid that casts shadows, at many points at once.
+class Distances {
+ public:
+  explicit Distances(const ShadowCaster& caster) : field_(caster.field), offset_(caster.view.offset) {
+    const auto& clip = caster.view.clip;
+    if (!clip) return;
+    const Camera& camera = caster.view.camera;
+    const Vector3 toEye = camera.projection == Projection::orthographic
+                              ? Vector3(-camera.forward)
+                              : Vector3(camera.eye - clip->offset * Vector3::Unit(clip->axis));
+    clip_ = Clip{clip->axis, clip->offset, toEye[clip->axis] >= 0 ? 1.0 : -1.0};
+  }
+
+  /// What the field says of points outside of its domain, where it does not know the distance.
+  enum class Outside : std::uint8_t {
+    asTheField,  ///< an upper bound, which hides no light
+    lowerBound,  ///< a safe step for a ray
+  };
+
+  /// Replaces `values` by the distances at `points`.
+  void measure(std::span<const Vector3> points, Outside outside, std::vector<double>& values) const {
+    values.resize(points.size());
+    field_.values(points, values);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (outside == Outside::lowerBound) values[i] = lowerBound(points[i], values[i]);
+      values[i] -= offset_;
+      if (clip_) values[i] = std::max(values[i], clip_->side * (points[i][clip_->axis] - clip_->offset));
+    }
+  }
+
+ private:
+  struct Clip {
+    int axis;
+    double offset, side;
+  };
+
+  /// Outside of the domain the value is f(q) + |x − q|, which may exceed the distance. No point s of the domain is
+  /// nearer to x than √(|x − q|² + |q − s|²), because the domain is convex.
+  double lowerBound(const Vector3& x, double value) const {
+    const double beyond = std::sqrt(field_.domain().squaredExteriorDistance(x));
+    const double atBoundary = value - beyond;
+    return beyond > 0 && atBoundary > 0 ? std::hypot(beyond, atBoundary) : value;
+  }
+
+  const Field& field_;
+  double offset_;
+  std::optional<Clip> clip_;
+};
+
+/// The plane on which the solid stands.
+struct Ground {
+  int axis;
+  double height;
+  Vector3 middle;  ///< the point of the plane below the middle of the solid
+};
+
+/// The box around the surface that casts shadows.
+Box solidBox(const Field& field, double offset) {
+  const Box& known = field.metadata().source.box;
+  Box box = known.isEmpty() || !known.sizes().allFinite() ? field.domain() : known;
+  box.min() -= Vector3::Constant(offset);
+  box.max() += Vector3::Constant(offset);
+  box = box.intersection(field.domain());
+  return box.isEmpty() ? field.domain() : box;
+}
+
+class LightMeter {
+ public:
+  LightMeter(const ShadowCaster& caster, const ViewBuffers& buffers, const Vector3& toKey)
+      : view_(caster.view), buffers_(buffers), toKey_(toKey), distances_(caster) {
+    const Box box = solidBox(caster.field, caster.view.offset);
+    size_ = box.diagonal().norm();
+    around_ = Box(box.min().array() - kAround * size_, box.max().array() + kAround * size_);
+    if (!caster.onGround) return;
+    const int axis = caster.up == UpAxis::y ? 1 : 2;
+    Vector3 middle = box.center();
+    middle[axis] = box.min()[axis];
+    if (view_.camera.eye[axis] > middle[axis]) ground_ = Ground{axis, middle[axis], middle};
+  }
+
+  /// Measures the light in the rows from `first` to before `last`.
+  void measure(int first, int last, FieldLight& light) const {
+    std::vector<Place> places;
+    for (int y = first; y < last; ++y)
+      for (int x = 0; x < buffers_.width; ++x)
+        if (const auto place = placeAt(x, y)) places.push_back(*place);
+    measureAmbient(places, light);
+    followKey(places, light);
+    for (const Place& place : places) {
+      if (place.fade == 0) continue;
+      light.open[place.sample] += float(place.fade) * (1 - light.open[place.sample]);
+      light.lit[place.sample] += float(place.fade) * (1 - light.lit[place.sample]);
+    }
+  }
+
+ private:
+  struct Place {
+    std::size_t sample;
+    Vector3 point, normal;
+    double fade;  ///< 0 on the surface and on the ground near it; 1 where the shadow on the ground ends
+  };
+
+  std::optional<Place> placeAt(int x, int y) const {
+    const std::size_t i = std::size_t(y) * buffers_.width + x;
+    if (buffers_.shows(i, Shown::surface))
+      return Place{i, pointAt(view_, buffers_, x, y), buffers_.normal[i].cast<double>(), 0};
+    if (buffers_.covered(i) || !ground_) return std::nullopt;
+    const Vector3 eye = pixelEye(view_.camera, x, y, buffers_.width, buffers_.height);
+    const Vector3 ray = pixelRay(view_.camera, x, y, buffers_.width, buffers_.height);
+    const double t = (ground_->height - eye[ground_->axis]) / ray[ground_->axis];
+    if (!(t > 0)) return std::nullopt;
+    const Vector3 point = eye + t * ray;
+    const double away = (point - ground_->middle).norm() / (kGroundReach * size_);
+    if (!(away < 1)) return std::nullopt;
+    return Place{i, point, Vector3::Unit(ground_->axis), std::clamp(2 * away - 1, 0.0, 1.0)};
+  }
+
+  void measureAmbient(const std::vector<Place>& places, FieldLight& light) const {
+    std::vector<Vector3> points(places.size());
+    std::vector<double> values, closed(places.size(), 0);
+    double weight = 1, weights = 0;
+    for (const double tap : kTaps) {
+      const double height = tap * size_;
+      for (std::size_t i = 0; i < places.size(); ++i) points[i] = places[i].point + height * places[i].normal;
+      distances_.measure(points, Distances::Outside::asTheField, values);
+      for (std::size_t i = 0; i < places.size(); ++i)
+        closed[i] += weight * std::clamp(1 - values[i] / height, 0.0, 1.0);
+      weights += weight;
+      weight *= 0.85;
+    }
+    for (std::size_t i = 0; i < places.size(); ++i)
+      light.open[places[i].sample] = float(std::max(0.0, 1 - kAmbientStrength * closed[i] / weights));
+  }
+
+  /// The part of a ray towards the lamp on which the solid can hide the lamp.
+  struct Ray {
+    std::size_t sample;
+    Vector3 start;
+    double length, last;  ///< where the ray is, and where this part ends
+    double clear = 1;     ///< lowest ratio of the distance to the half width of the lamp's cone, at most 1
+  };
+
+  /// Returns the ray towards the lamp, or std::nullopt if it passes by the solid.
+  std::optional<Ray> rayFrom(const Place& place) const {
+    Ray ray{place.sample, place.point + kLift * size_ * place.normal, kLeastShadowStep * size_,
+            std::numeric_limits<double>::infinity()};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double slope = toKey_[axis], low = around_.min()[axis], high = around_.max()[axis];
+      if (slope == 0 && !(ray.start[axis] > low && ray.start[axis] < high)) return std::nullopt;
+      if (slope == 0) continue;
+      const double toLow = (low - ray.start[axis]) / slope, toHigh = (high - ray.start[axis]) / slope;
+      ray.length = std::max(ray.length, std::min(toLow, toHigh));
+      ray.last = std::min(ray.last, std::max(toLow, toHigh));
+    }
+    return ray.length < ray.last ? std::optional(ray) : std::nullopt;
+  }
+
+  /// Follows the rays from all places to the lamp, a step of all rays at a time.
+  void followKey(const std::vector<Place>& places, FieldLight& light) const {
+    std::vector<Ray> rays;
+    for (const Place& place : places) {
+      if (place.normal.dot(toKey_) <= kBehind)
+        light.lit[place.sample] = 0;
+      else if (const auto ray = rayFrom(place))
+        rays.push_back(*ray);
+    }
+    std::vector<Vector3> points;
+    std::vector<double> values;
+    for (int step = 0; step < kMostShadowSteps && !rays.empty(); ++step) {
+      points.clear();
+      for (const Ray& ray : rays) points.push_back(ray.start + ray.length * toKey_);
+      distances_.measure(points, Distances::Outside::lowerBound, values);
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        Ray ray = rays[i];
+        ray.clear = std::min(ray.clear, values[i] / (kLampRadius * ray.length));
+        ray.length += std::clamp(std::abs(values[i]), kLeastShadowStep * size_, kGreatestShadowStep * size_);
+        const double seen = std::clamp(ray.clear, -1.0, 1.0);
+        light.lit[ray.sample] = float(0.25 * (1 + seen) * (1 + seen) * (2 - seen));
+        if (ray.clear > -1 && ray.length < ray.last) rays[kept++] = ray;
+      }
+      rays.resize(kept);
+    }
+  }
+
+  const SurfaceView& view_;
+  const ViewBuffers& buffers_;
+  Vector3 toKey_;
+  Distances distances_;
+  double size_ = 0;
+  Box around_;
+  std::optional<Ground> ground_;
+};
+
+}  // namespace
+
+FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, const Vector3& toKey) {
+  FieldLight light{std::vector<float>(buffers.cell.size(), 1), std::vector<float>(buffers.cell.size(), 1)};
+  const LightMeter meter(caster, buffers, toKey);
+  const int strips = (buffers.height + kRowsTogether - 1) / kRowsTogether;
+  tbb::parallel_for(0, strips, [&](int strip) {
+    meter.measure(strip * kRowsTogether, std::min(buffers.height, (strip + 1) * kRowsTogether), light);
+  });
+  return light;
+}
+
+}  // namespace hpsdf::render
