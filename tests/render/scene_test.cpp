@@ -95,7 +95,7 @@ TEST(Scene, showsTheNearestOfSurfacePlaneAndBoxesInEachPixel) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
   const ShownCells choice{CellStyle::boxes, {2, 4}, {1, 2}};
-  const std::vector<Cell> cells = chosenCells(field, choice);
+  const std::vector<Cell> cells = chosenCells(field, choice, 0);
   ASSERT_GT(cells.size(), 10u);
   std::map<Shown, int> seen;
   for (const Projection projection : kProjections)
@@ -167,7 +167,7 @@ TEST(Scene, showsTheNearestOfSurfacePlaneAndBoxesInEachPixel) {
 TEST(Scene, showsOnlyTheChosenCells) {
   const Field field = testField();
   const auto cells = [&](std::vector<int> degrees, std::vector<int> depths) {
-    return chosenCells(field, {CellStyle::boxes, std::move(degrees), std::move(depths)});
+    return chosenCells(field, {CellStyle::boxes, std::move(degrees), std::move(depths)}, 0);
   };
   EXPECT_EQ(cells({}, {}).size(), statistics(field).leaves);
   EXPECT_EQ(cells({3}, {}).size(), statistics(field).degreeLeaves.at(3));
@@ -181,7 +181,7 @@ TEST(Scene, showsOnlyTheChosenCells) {
 
 TEST(Scene, omitsABoxThatContainsTheEye) {
   const Field field = testField();
-  const std::vector<Cell> cells = chosenCells(field, {});
+  const std::vector<Cell> cells = chosenCells(field, {}, 0);
   Camera camera = cameraAt(field, Projection::perspective);
   camera.eye = cells.back().box.center();
   ViewBuffers buffers = makeCpuRenderer(field)->surface({camera, 50}, kWidth, kHeight);
@@ -208,13 +208,13 @@ void alongEdges(const Box& box, const Visit& visit) {
 TEST(CellLines, followTheEdgesThatNothingHides) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
-  const std::vector<Cell> cells = chosenCells(field, {CellStyle::lines, {}, {0, 1}});
+  const std::vector<Cell> cells = chosenCells(field, {CellStyle::lines, {}, {0, 1}}, 0);
   for (const Projection projection : kProjections)
     for (const std::optional<ClipPlane> clip : {std::optional<ClipPlane>(), {ClipPlane{2, 0.1}}}) {
       const SurfaceView view{cameraAt(field, projection), 0, clip};
       ViewBuffers buffers = cpu->surface(view, kWidth, kHeight);
       addPlane(field, view, axisSlice(field.domain(), 0, -0.3, 8, 8), buffers);
-      const std::vector<float> lines = cellLines(field, view, cells, buffers, 1);
+      const std::vector<float> lines = cellLines(field, view, cells, buffers, 1, 0);
       std::vector<char> allowed(lines.size(), 0), wanted(lines.size(), 0);
       int hidden = 0;
       for (const Cell& cell : cells)
@@ -257,7 +257,7 @@ TEST(CellLines, fadeForSmallCellsAndAreStrongestForTheNearest) {
   ViewBuffers empty = makeCpuRenderer(field)->surface({view.camera, 50}, kWidth, kHeight);
   const auto strongest = [&](int depth, double width) {
     const std::vector<float> lines =
-        cellLines(field, view, chosenCells(field, {CellStyle::lines, {}, {depth}}), empty, width);
+        cellLines(field, view, chosenCells(field, {CellStyle::lines, {}, {depth}}, 0), empty, width, 0);
     return *std::ranges::max_element(lines);
   };
   EXPECT_GT(strongest(0, 1), 0.6F);

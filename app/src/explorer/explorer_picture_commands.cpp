@@ -129,6 +129,7 @@ void changeColor(ViewState& view, const Arguments& arguments, Session&) {
       colors.scale.limits = {n[0], n[1]};
     }
   }
+  if (arguments.given("per-cell")) colors.scale.perCell = arguments.flag("per-cell");
   if (arguments.given("scale")) colors.scale.logarithmic = arguments.text("scale") == "log";
   if (colors.scale.limits && !((*colors.scale.limits)[0] < (*colors.scale.limits)[1]))
     throw Error("range: expected LOW,HIGH with LOW below HIGH");
@@ -143,6 +144,7 @@ void changeCells(ViewState& view, const Arguments& arguments, Session&) {
   };
   if (arguments.given("degrees")) view.cells.degrees = levels("degrees", kMaxDegree);
   if (arguments.given("depths")) view.cells.depths = levels("depths", kMaxDepth);
+  if (arguments.given("at-surface")) view.cells.atSurface = arguments.flag("at-surface");
 }
 
 void changeTriangles(ViewState& view, const Arguments& arguments, Session& session) {
@@ -261,6 +263,8 @@ void addPlaneAndColorCommands(Registry& registry) {
                      {"of", choice({"surface", "slice"}), "Of which picture; of the one that is shown when left out."},
                      {"range", numbers("LOW,HIGH", {2}).orWords({"auto"}).under(kColours),
                       "What the ends of the scale of a jump, slope or error stand for; auto chooses."},
+                     {"per-cell", flag("").under(kColours),
+                      "Colour each cell by the greatest value that the picture shows of it."},
                      {"scale", choice({"log", "linear"}).under(kColours).advanced(),
                       "How such colours run between them; log at first."},
                      {"other", file("FIELD"), "For difference: the field to compare with, or none."},
@@ -304,7 +308,8 @@ void addCellsAndArrowsCommands(Registry& registry) {
                       "Lines along their edges, or boxes of 0.8 of their extent."},
                      {"degrees", text("LIST").under(kDrawn).advanced(),
                       "Only cells of these degrees: numbers, ranges and the word exact, as in 2,4-6,exact; or all."},
-                     {"depths", text("LIST").under(kDrawn).advanced(), "Only cells of these depths; or all."}},
+                     {"depths", text("LIST").under(kDrawn).advanced(), "Only cells of these depths; or all."},
+                     {"at-surface", flag("").under(kDrawn), "Only cells that the surface crosses."}},
       .action = changing(changeCells),
   });
   registry.addForScripts({

@@ -31,14 +31,15 @@ std::string surfaceLine(const ViewState& view) {
 
 std::string colorLine(const Coloring& colors, const char* of) {
   const render::ScaleOptions& scale = colors.scale;
-  return fmt::format("color {} of={} range={} scale={} other={} mesh={}\n", colorName(colors.by), of,
+  return fmt::format("color {} of={} range={} scale={} per-cell={} other={} mesh={}\n", colorName(colors.by), of,
                      scale.limits ? fmt::format("{},{}", (*scale.limits)[0], (*scale.limits)[1]) : "auto",
-                     scale.logarithmic ? "log" : "linear", wordOrNone(colors.other), wordOrNone(colors.mesh));
+                     scale.logarithmic ? "log" : "linear", scale.perCell, wordOrNone(colors.other),
+                     wordOrNone(colors.mesh));
 }
 
 std::string cellsLine(const render::ShownCells& cells) {
-  return fmt::format("cells {} degrees={} depths={}\n", cellStyleName(cells.style), levelText(cells.degrees),
-                     levelText(cells.depths));
+  return fmt::format("cells {} degrees={} depths={} at-surface={}\n", cellStyleName(cells.style),
+                     levelText(cells.degrees), levelText(cells.depths), cells.atSurface);
 }
 
 std::string panelLine(const ViewState& view) {

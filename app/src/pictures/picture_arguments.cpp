@@ -41,11 +41,11 @@ constexpr NamedView kViews[] = {{"front", 0, 0},
 
 render::ShownCells shownCells(const Arguments& arguments) {
   const std::string style = arguments.text("cells");
-  for (const char* name : {"degrees", "depths"})
+  for (const char* name : {"degrees", "depths", "at-surface"})
     if (style == "none" && arguments.given(name))
       throw Error(fmt::format("{}: needs cells=lines or cells=boxes, of which it chooses some", name));
   return {cellStyle(style), levelList(arguments.textOr("degrees", ""), "degrees", kMaxDegree),
-          levelList(arguments.textOr("depths", ""), "depths", kMaxDepth)};
+          levelList(arguments.textOr("depths", ""), "depths", kMaxDepth), arguments.flag("at-surface")};
 }
 
 render::FreePlane freePlane(const std::vector<double>& n) { return {{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}; }
@@ -208,6 +208,10 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
         !(color == ColorBy::distance && name == std::string_view("range")))
       throw Error(
           fmt::format("{}: the colours of {} have none; it is for {}", name, arguments.text("color"), quantityNames()));
+  options.perCell = arguments.flag("per-cell");
+  if (options.perCell && !render::isQuantity(color))
+    throw Error(fmt::format("per-cell: the colours of {} have no greatest value; it is for {}", arguments.text("color"),
+                            quantityNames()));
   if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
     throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
   if (arguments.given("mesh") && color != ColorBy::error)

@@ -199,6 +199,7 @@ const std::vector<Parameter> kRenderDrawn = {
     {"cells", choice({"none", "lines", "boxes"}).byDefault("none"),
      "Also draws the cells of the octree: lines along their edges, faded where cells are small in the picture, or "
      "boxes of 0.8 of their extent in the colours of the picture."},
+    {"at-surface", flag(), "Draws only cells that the surface crosses."},
     {"degrees", text("LIST").advanced(),
      "Draws cells of these polynomial degrees only: numbers, ranges and the word exact, as in 2,4-6,exact."},
     {"depths", text("LIST").advanced(), "Draws cells of these depths only: numbers and ranges, as in 2,4-6."}};
@@ -211,6 +212,9 @@ std::vector<Parameter> colorParameters(ColorBy left, const std::string& ofCells,
       {"range", numbers("LOW,HIGH", {2}),
        "Values of the darkest and the lightest colour of a jump, slope or error, or distances between which "
        "colours and iso-lines are chosen. Use it to compare pictures; when left out, it is chosen from the values."},
+      {"per-cell", flag(),
+       "Colours each cell by the greatest value that the picture shows of it, in place of each point by its own. Cells "
+       "that are worse than others are then seen at once."},
       {"scale", choice({"log", "linear"}).byDefault("log").advanced(), "Scale of the colours between these values."},
       {"levels", wholeNumbers("LOWEST,HIGHEST", {2}).within(0, kMaxDegree).advanced(),
        "Degrees or depths that the legend shows in addition to those of the field. Use it to compare pictures of "

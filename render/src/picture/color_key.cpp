@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <span>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -23,16 +24,30 @@ std::vector<Color> barOf(const std::function<LinearColor(double)>& colorAt) {
   return bar;
 }
 
+/// Replaces the value of each sample by the greatest value among the samples of its cell. Ignores values that are NaN.
+void spreadOverCells(const ViewBuffers& buffers, std::vector<float>& values) {
+  std::unordered_map<std::uint32_t, float> greatest;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!buffers.hit(i) || std::isnan(values[i])) continue;
+    float& most = greatest.try_emplace(buffers.cell[i], values[i]).first->second;
+    most = std::max(most, values[i]);
+  }
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (const auto found = greatest.find(buffers.cell[i]); found != greatest.end()) values[i] = found->second;
+}
+
 ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field, const ViewBuffers& buffers,
                        const std::function<Vector3(int, int)>& pointAt, ColorBy quantity, const ScaleOptions& options,
                        const ReferenceData& reference) {
   const std::vector<double> ofCells = quantityOfCells(field, quantity, reference);
   std::vector<float> values = quantityOfSamples(field, buffers, pointAt, quantity, reference, ofCells);
+  if (options.perCell) spreadOverCells(buffers, values);
   const ColorScale scale = colorScale(options, field, ofCells, values);
   const std::span<const std::string> titles = titlesOf(quantity);
   addScaleBar(overlay, frame, titles, scale);
 
   ColorKey key{.color = {}, .scale = options, .name = titles.back(), .range = describeGreatest(values)};
+  if (options.perCell) key.name = "greatest " + key.name + " of each cell";
   key.legend = {.title = titles.front(), .bar = barOf(orderedColor)};
   for (const double value : scaleMarks(scale))
     key.legend.marks.push_back({scale.fraction(value), formatNumber(value, 3)});

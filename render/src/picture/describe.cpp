@@ -48,7 +48,7 @@ std::string describeCells(const ShownCells& cells) {
   if (!cells.degrees.empty() && !onlyExact) text += " of degree " + describeRuns(cells.degrees);
   if (!cells.depths.empty())
     text += std::string(cells.degrees.empty() || onlyExact ? " of" : ",") + " depth " + describeRuns(cells.depths);
-  return text;
+  return cells.atSurface ? text + " at the surface" : text;
 }
 
 std::string describeCamera(const OrbitCamera& camera) {

@@ -30,6 +30,8 @@
 namespace hpsdf::render {
 namespace {
 
+constexpr float kHiddenLines = 0.12F;  // opacity of cells' edges where something hides them
+
 template <typename Picture>
 Frame frameOf(const Picture& picture) {
   checkPictureSize(picture.width, picture.height, picture.samples);
@@ -150,12 +152,12 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   if (picture.surface) addSection(field, view, scene.buffers);
   if (picture.plane) addPlane(field, view, sectionView(field.domain(), *picture.plane, 1, 1), scene.buffers);
   std::vector<Cell> cells;
-  if (picture.cells.style != CellStyle::none) cells = chosenCells(field, picture.cells);
+  if (picture.cells.style != CellStyle::none) cells = chosenCells(field, picture.cells, picture.offset);
   if (picture.cells.style == CellStyle::boxes) addBoxes(field, view, cells, scene.buffers);
   if (bodies.renderer) addBodies(bodies.renderer->view(view.camera, bodies.bodies, width, height), scene.buffers);
   if (picture.edges) scene.lines = featureEdges(view, scene.buffers, lineWidth);
   if (picture.cells.style == CellStyle::lines)
-    addLines(cellLines(field, view, cells, scene.buffers, lineWidth), scene.lines);
+    addLines(cellLines(field, view, cells, scene.buffers, lineWidth, kHiddenLines), scene.lines);
   if (mesh.mesh != nullptr)
     addLines(meshLines(*mesh.mesh, mesh.tolerance, field.domain(), view, scene.buffers, lineWidth), scene.lines);
   return scene;

@@ -90,9 +90,32 @@ void addValues(const Field& field, int y0, const std::vector<BoxRay>& rays, View
   for (std::size_t n = 0; n < pixels.size(); ++n) buffers.value[pixels[n]] = static_cast<float>(values[n]);
 }
 
+/// Removes the cells that the surface f = offset does not cross, as far as 4 × 4 × 4 points of each cell tell.
+void keepCrossed(const Field& field, double offset, std::vector<Cell>& cells) {
+  constexpr int kPoints = 4;
+  constexpr double kInset = 1e-6;  // share of the cell by which its outermost points lie within it
+  std::vector<std::uint8_t> crossed(cells.size());
+  tbb::parallel_for(std::size_t{0}, cells.size(), [&](std::size_t n) {
+    std::array<Vector3, kPoints * kPoints * kPoints> points;
+    std::array<double, points.size()> values;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vector3 t(double(i % kPoints), double(i / kPoints % kPoints), double(i / (kPoints * kPoints)));
+      const Vector3 inside = (t / (kPoints - 1)).cwiseMax(kInset).cwiseMin(1 - kInset);
+      points[i] = cells[n].box.min() + inside.cwiseProduct(cells[n].box.sizes());
+    }
+    field.values(points, values);
+    const auto [low, high] = std::ranges::minmax(values);
+    crossed[n] = low <= offset && high >= offset;
+  });
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < cells.size(); ++n)
+    if (crossed[n] != 0) cells[kept++] = cells[n];
+  cells.erase(cells.begin() + std::ptrdiff_t(kept), cells.end());
+}
+
 }  // namespace
 
-std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice) {
+std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice, double offset) {
   const auto among = [](const std::vector<int>& levels, int level) {
     return levels.empty() || std::ranges::find(levels, level) != levels.end();
   };
@@ -100,6 +123,7 @@ std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice) {
   field.forEachCell([&](const Cell& cell) {
     if (among(choice.degrees, cell.degree) && among(choice.depths, cell.depth)) cells.push_back(cell);
   });
+  if (choice.atSurface) keepCrossed(field, offset, cells);
   return cells;
 }
 

@@ -11,7 +11,7 @@
 namespace hpsdf::render {
 
 /// The leaves of the chosen degrees and depths, in the order of the octree.
-std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice);
+std::vector<Cell> chosenCells(const Field& field, const ShownCells& choice, double offset);
 
 /// The part of a box that the view's clipping plane does not remove; empty if at most a face of the box remains.
 Box clipped(Box box, const SurfaceView& view);

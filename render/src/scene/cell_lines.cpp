@@ -70,8 +70,8 @@ class EdgeCollector {
 }  // namespace
 
 std::vector<float> cellLines(const Field& field, const SurfaceView& view, const std::vector<Cell>& cells,
-                             const ViewBuffers& buffers, double lineWidth) {
-  const LinePainter painter(view.camera, field.domain(), buffers, lineWidth, {});
+                             const ViewBuffers& buffers, double lineWidth, float hiddenStrength) {
+  const LinePainter painter(view.camera, field.domain(), buffers, lineWidth, {.hiddenStrength = hiddenStrength});
   EdgeCollector collector(field, cells.size());
   for (const Cell& cell : cells)
     if (const Box box = clipped(cell.box, view); !box.isEmpty() && painter.mayShow(cell.box)) collector.add(cell, box);

@@ -88,16 +88,16 @@ void LinePainter::paintPixel(const Projected& line, const NearPixel& near, std::
   const double s = toNear / (toFar + toNear);
   const double depth = line.from.depth + s * (line.to.depth - line.from.depth);
   const double relativeDepth = std::clamp((depth - nearest_) / (farthest_ - nearest_), 0.0, 1.0);
-  const float strength =
-      line.strength * static_cast<float>(covered * (1 + relativeDepth * (style_.farthestStrength - 1)));
+  float strength = line.strength * static_cast<float>(covered * (1 + relativeDepth * (style_.farthestStrength - 1)));
   if (strength <= coverage[i]) return;
   if (buffers_.covered(i)) {
     const Vector3 p = line.line.a + s * (line.line.b - line.line.a);
     // Allow a tolerance, because the buffers show the surface at sample points up to two pixels away from the line.
     const double tolerance = (width_ + 2) * (parallel_ ? pixel_ : pixel_ * depth) + style_.slack;
-    if ((parallel_ ? depth : (p - camera_.eye).norm()) > double(buffers_.distance[i]) + tolerance) return;
+    if ((parallel_ ? depth : (p - camera_.eye).norm()) > double(buffers_.distance[i]) + tolerance)
+      strength *= style_.hiddenStrength;
   }
-  coverage[i] = strength;
+  coverage[i] = std::max(coverage[i], strength);
 }
 
 /// Returns the size in pixels of a world length that lies at a given depth from the eye.

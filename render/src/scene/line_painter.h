@@ -22,6 +22,7 @@ struct LineStyle {
   double goneLength = 6;          ///< lines of this length or less have the strength `leastStrength`
   float leastStrength = 0;        ///< opacity of the shortest lines; 0 leaves them out
   double farthestStrength = 0.3;  ///< opacity of lines at the far end of the domain; at the near end it is 1
+  float hiddenStrength = 0;       ///< share of a line's opacity that is left where something hides it
   double slack = 0;               ///< a line at most this far behind what the buffers show is visible, world units
 };
 

@@ -85,6 +85,8 @@ struct ScaleOptions {
   /// ignores a few outliers, except for distances.
   std::optional<std::array<double, 2>> limits = {};
   bool logarithmic = true;
+  /// Colours each cell by the greatest value that the picture shows of it, in place of each point by its own.
+  bool perCell = false;
   /// Degrees or depths that the legend contains in addition to those of the field; 0 to 255, in ascending order.
   std::vector<int> levels = {};
 };

@@ -17,6 +17,7 @@ struct ShownCells {
   CellStyle style = CellStyle::none;
   std::vector<int> degrees = {};  ///< degrees of the leaves to show, ascending; empty for all degrees
   std::vector<int> depths = {};   ///< depths of the leaves to show, ascending; empty for all depths
+  bool atSurface = false;         ///< shows only leaves that the picture's surface crosses
 };
 
 }  // namespace hpsdf::render
