@@ -18,8 +18,10 @@ constexpr std::array kTaps = {0.009, 0.018, 0.035, 0.065, 0.11};  // distances a
 constexpr double kAmbientStrength = 1.5;
 constexpr double kLift = 0.014;   // height at which the rays to the lamp start, above the steps between cells
 constexpr double kBehind = -0.3;  // cosine from which on a surface is turned away from the lamp
-constexpr double kLeastShadowStep = 0.008, kGreatestShadowStep = 0.12;
-constexpr int kMostShadowSteps = 48;
+constexpr double kLeastShadowStep = 0.005, kGreatestShadowStep = 0.1;
+constexpr double kShadowStep =
+    0.6;  // share of the distance by which a ray advances, so as not to miss the nearest place
+constexpr int kMostShadowSteps = 80;
 constexpr double kAround = 0.1;        // rays to the lamp are followed within this distance of the solid's box
 constexpr double kLampRadius = 0.13;   // tangent of the angle under which half of the lamp is seen
 constexpr double kGroundReach = 1.25;  // the ground is darkened up to this distance from the solid's middle
@@ -129,7 +131,7 @@ class LightMeter {
 
   std::optional<Place> placeAt(int x, int y) const {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
-    if (buffers_.shows(i, Shown::surface))
+    if (buffers_.shows(i, Shown::surface) || buffers_.showsBody(i))
       return Place{i, pointAt(view_, buffers_, x, y), buffers_.normal[i].cast<double>(), 0};
     if (buffers_.covered(i) || !ground_) return std::nullopt;
     const Vector3 eye = pixelEye(view_.camera, x, y, buffers_.width, buffers_.height);
@@ -201,7 +203,8 @@ class LightMeter {
       for (std::size_t i = 0; i < rays.size(); ++i) {
         Ray ray = rays[i];
         ray.clear = std::min(ray.clear, values[i] / (kLampRadius * ray.length));
-        ray.length += std::clamp(std::abs(values[i]), kLeastShadowStep * size_, kGreatestShadowStep * size_);
+        ray.length +=
+            std::clamp(kShadowStep * std::abs(values[i]), kLeastShadowStep * size_, kGreatestShadowStep * size_);
         const double seen = std::clamp(ray.clear, -1.0, 1.0);
         light.lit[ray.sample] = float(0.25 * (1 + seen) * (1 + seen) * (2 - seen));
         if (ray.clear > -1 && ray.length < ray.last) rays[kept++] = ray;

@@ -145,9 +145,9 @@ class SurfaceShader {
   /// The shares of the ambient light and of the key light that reach a sample.
   Light lightAt(int x, int y, const Eigen::Vector3f& normal) const {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
-    if (look_.light.open.empty() || !buffers_.shows(i, Shown::surface))
-      return {openness(x, y, frame_.position(x, y), normal), 1};
-    return {look_.light.open[i], look_.light.lit[i]};
+    const bool isMeasured = !look_.light.open.empty() && buffers_.shows(i, Shown::surface);
+    return {isMeasured ? look_.light.open[i] : openness(x, y, frame_.position(x, y), normal),
+            look_.light.lit.empty() ? 1 : look_.light.lit[i]};
   }
 
   /// The share of ambient light that reaches a point: 1 on open ground, close to 0 in a deep fold. It is blocked by

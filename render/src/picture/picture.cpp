@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "coloring/body_shadow.h"
 #include "coloring/color_view.h"
 #include "coloring/quantity.h"
 #include "hpsdf/error.h"
@@ -198,7 +199,13 @@ SurfaceLook lookOf(const Field& field, const SurfacePicture& picture, const Scen
   // What stands or lies beside the surface throws no shadow, so that a shadow on the ground would mislead.
   const bool isAlone = !picture.plane && picture.cells.style == CellStyle::none && !picture.bodies.renderer;
   const ShadowCaster caster{field, scene.view, picture.camera.up, isAlone};
-  look.light = fieldLight(caster, scene.buffers, directionToKey(scene.view.camera, look.lightTilt));
+  const Vector3 toKey = directionToKey(scene.view.camera, look.lightTilt);
+  look.light = fieldLight(caster, scene.buffers, toKey);
+  if (picture.bodies.renderer) {
+    throwShadows(*picture.bodies.renderer, picture.bodies.bodies, scene.view, scene.buffers, toKey,
+                 field.domain().diagonal().norm(), look.light.lit);
+    look.light.open.clear();  // the field knows nothing of the light that bodies take
+  }
   return look;
 }
 
