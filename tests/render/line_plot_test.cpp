@@ -87,7 +87,7 @@ TEST(LinePlot, hasEachNumberAtItsLevel) {
 TEST(LinePlot, hasBandsInTheColorsOfTheFieldsLevels) {
   const Field field = stepField();
   const Line line = sampleLine(field, {-1.5, 0.5, 0.5}, {1, 0.5, 0.5}, 20);
-  const Image image = drawLine(field, line, {}, 1280, 720);
+  const Image image = drawLine(field, line, {}, 1280, 720).image;
   const LineLayout layout = layOutLine(frame(1280, 720), field, line, {});
   const PixelRect& last = layout.charts.back();
   const auto at = [&](double t) { return last.x0 + int(t * last.width()); };
@@ -111,7 +111,8 @@ TEST(LinePlot, showsTheExactDistanceAndTheErrorWhereTheyAreKnown) {
     EXPECT_TRUE(texts.contains(name)) << name;
   EXPECT_FALSE(others.contains("exact"));
   EXPECT_TRUE(others.contains("jump of f at borders"));
-  EXPECT_NE(drawLine(field, line, exactAlong(line), 640, 360).pixels, drawLine(field, line, {}, 640, 360).pixels);
+  EXPECT_NE(drawLine(field, line, exactAlong(line), 640, 360).image.pixels,
+            drawLine(field, line, {}, 640, 360).image.pixels);
 }
 
 TEST(LinePlot, clipsAndOverlapsNothingAtAnySize) {
@@ -173,7 +174,7 @@ TEST(LinePlot, isDrawnInEverySizeAndRejectsOthers) {
   const Field field = randomField(1);
   const Line line = sampleLine(field, {-0.9, -0.8, -0.7}, {0.9, 0.7, 0.8}, 50);
   for (const auto& [width, height] : {std::pair{16, 16}, {64, 700}, {700, 64}, {320, 240}, {1920, 1080}}) {
-    const Image image = drawLine(field, line, exactAlong(line), width, height);
+    const Image image = drawLine(field, line, exactAlong(line), width, height).image;
     EXPECT_EQ(image.width, width);
     EXPECT_EQ(image.height, height);
   }

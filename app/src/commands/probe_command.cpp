@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <string_view>
 
 #include "commands/commands.h"
 #include "hpsdf/detail/line.h"
@@ -17,12 +18,16 @@
 namespace hpsdf::app {
 namespace {
 
+using namespace std::string_view_literals;
+
 bool isPicture(const std::string& file) {
   const std::string kind = lowerExtension(file);
-  if (kind != ".png" && kind != ".csv")
+  if (kind == ".pdf") render::requirePdf();
+  if (kind != ".png" && kind != ".csv" && !render::isVectorFile(file))
     throw Error(
-        fmt::format("{}: unknown kind of output '{}'; expected .png for a plot or .csv for the samples", file, kind));
-  return kind == ".png";
+        fmt::format("{}: unknown kind of output '{}'; expected .png, .svg or .pdf for a plot, or .csv for the samples",
+                    file, kind));
+  return kind != ".csv";
 }
 
 std::size_t cellCount(const Line& line) {
@@ -104,26 +109,33 @@ void report(Session& session, const Arguments& arguments, const Line& line, std:
   session.console().out << text << "\n";
 }
 
+render::DrawnLine drawnLine(const Field& field, const Line& line, std::span<const double> exact,
+                            const Arguments& arguments) {
+  const auto [width, height] = arguments.size("size");
+  return render::drawLine(field, line, exact, width, height, pictureForm(arguments));
+}
+
 render::Image drawProbe(Session& session, const Arguments& arguments) {
   useField(session, arguments);
   const Field& field = session.current().field;
   const Line line = lineOf(field, arguments);
-  const auto [width, height] = arguments.size("size");
-  return render::drawLine(field, line, exactValues(session, arguments, line), width, height);
+  return drawnLine(field, line, exactValues(session, arguments, line), arguments).image;
 }
 
 void runProbe(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const bool picture = isPicture(file);
-  if (!picture && arguments.given("size")) throw Error(fmt::format("{}: only a plot has a size; leave it out", file));
+  for (const char* name : {"size", "dpi", "transparent"})
+    if (!picture && arguments.given(name))
+      throw Error(fmt::format("{}: only a plot has {}; leave it out", file, name == "size"sv ? "a size" : name));
   checkWritable(file);
   useField(session, arguments);
   const Field& field = session.current().field;
   const Line line = lineOf(field, arguments);
   const std::vector<double> exact = exactValues(session, arguments, line);
   if (picture) {
-    const auto [width, height] = arguments.size("size");
-    savePng(render::drawLine(field, line, exact, width, height), file);
+    const render::DrawnLine drawn = drawnLine(field, line, exact, arguments);
+    savePicture(drawn.image, drawn.vectors, file);
   } else {
     writeTable(line, exact, file);
   }
@@ -133,7 +145,8 @@ void runProbe(Session& session, const Arguments& arguments) {
 const std::vector<Parameter> kProbeParameters = {
     {"from", numbers("X,Y,Z", {3}).in("world units").required().under("The line"), "Start of the line."},
     {"to", numbers("X,Y,Z", {3}).in("world units").required().under("The line"), "End of the line."},
-    {"output", outputFile().as('o').required(), "File to write: *.png for a plot, *.csv for the samples."},
+    {"output", outputFile().as('o').required(),
+     "File to write: *.png, *.svg or *.pdf for a plot, *.csv for the samples."},
     {"samples", wholeNumber().within(2, 1000000).byDefault("1000").under("The line"),
      "Number of evenly spaced samples, both ends included. Each border of cells adds two."},
     {"mesh", text("MESH"),
@@ -151,7 +164,7 @@ void addProbeCommand(Registry& registry) {
 Evaluates the field at points of a line and draws or writes what it finds. Use it to see jumps between cells and errors
 in detail.
 
-A .png shows curves over the distance along the line: f and the exact distance; the error f − exact on its own scale,
+A .png, .svg or .pdf shows curves over the distance along the line: f and the exact distance; the error f − exact on its own scale,
 or, where the exact distance is unknown, the jumps of f at borders of cells; the length of the gradient and its
 component along the line; bands of the cells' degrees and depths. Thin lines mark borders of cells. Each leaf's
 polynomial is drawn up to both of its ends, so that a jump is a vertical step.
@@ -163,7 +176,7 @@ and the columns of the cell are empty. The columns of the exact distance are emp
       .examples = {"hpsdf probe bunny.hpsdf --from -1,0,0 --to 1,0,0 -o line.png --mesh bunny.obj",
                    "hpsdf probe bunny.hpsdf --from 0.2,0.3,0 --to 0.2,0.4,0 -o line.csv --samples 100",
                    "hpsdf probe torus.hpsdf --from 0,0,0 --to 1,1,1 -o line.png --size 960x720"},
-      .parameters = joined({{fieldParameter()}, kProbeParameters}),
+      .parameters = joined({{fieldParameter()}, kProbeParameters, formParameters()}),
       .action = runProbe,
       .draw = drawProbe,
   });

@@ -247,6 +247,7 @@ render::SlicePicture slicePicture(const Arguments& arguments, const Box& box) {
   picture.scale = scaleOptions(arguments);
   setPixels(picture, arguments);
   picture.arrows = arguments.whole("arrows");
+  picture.form = pictureForm(arguments);
   return picture;
 }
 
@@ -302,6 +303,7 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& box
   picture.color = colorNamed(arguments.text("color"));
   picture.scale = scaleOptions(arguments);
   picture.arrows = arguments.whole("arrows");
+  picture.form = pictureForm(arguments);
   return picture;
 }
 
@@ -354,6 +356,35 @@ render::ReferenceData referenceDataFor(Session& session, const Arguments& argume
 
 void requirePng(const std::string& file) {
   if (lowerExtension(file) != ".png") throw Error(fmt::format("{}: pictures are written as .png", file));
+}
+
+void requirePicture(const std::string& file) {
+  const std::string kind = lowerExtension(file);
+  if (kind == ".pdf") return render::requirePdf();
+  if (kind != ".png" && kind != ".svg")
+    throw Error(fmt::format("{}: pictures are written as .png, .svg or .pdf", file));
+}
+
+void savePicture(const render::Image& image, const render::VectorPicture& vectors, const std::string& file) {
+  if (render::isVectorFile(file))
+    saveVectorPicture(vectors, file);
+  else
+    savePng(image, file);
+}
+
+std::vector<Parameter> formParameters() {
+  return {{"dpi", number().within(10, 2400).in("pixels per inch").byDefault("96").under(kPicture).advanced(),
+           "Resolution. The size counts 96 pixels to an inch; at 192, a .png has twice as many pixels each way, with "
+           "text and lines twice as large. Pictures of pixels within a .svg or .pdf become finer too."},
+          {"transparent", flag().under(kPicture).advanced(),
+           "Leaves the background out: the paper around what is drawn, and the backdrop of surfaces."}};
+}
+
+render::PictureForm pictureForm(const Arguments& arguments) {
+  if (!arguments.has("dpi")) return {};  // a frame of a film
+  return {.pixelRatio = arguments.number("dpi") / render::kScreenDpi,
+          .transparent = arguments.flag("transparent"),
+          .vectors = arguments.has("output") && render::isVectorFile(arguments.text("output"))};
 }
 
 void reportPicture(Session& session, const Arguments& arguments, const std::string& file, int width, int height,

@@ -105,6 +105,19 @@ double defaultOffset(const Box& box, int axis);
 /// Throws `Error` unless the file ends in .png.
 void requirePng(const std::string& file);
 
+/// Throws `Error` unless the file is one that `savePicture` can write: .png, .svg or, where this build can, .pdf.
+void requirePicture(const std::string& file);
+
+/// Writes a picture in the form that the file's extension names.
+void savePicture(const render::Image& image, const render::VectorPicture& vectors, const std::string& file);
+
+/// Returns the parameters that tell how many pixels make an inch, and whether the background is left out.
+std::vector<Parameter> formParameters();
+
+/// Returns the form of a picture from the arguments of `formParameters`. The picture has shapes if `output` names a
+/// vector file. Commands without these parameters, such as films, have pictures of the usual form.
+render::PictureForm pictureForm(const Arguments& arguments);
+
 /// Reports a picture that has been written, in one line, or as a JSON object if the arguments ask for JSON.
 void reportPicture(Session& session, const Arguments& arguments, const std::string& file, int width, int height,
                    const std::string& renderer);

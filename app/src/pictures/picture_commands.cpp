@@ -18,15 +18,27 @@
 namespace hpsdf::app {
 namespace {
 
-enum class SliceFormat : std::uint8_t { png, pfm, csv };
+enum class SliceFormat : std::uint8_t { picture, pfm, csv };
 
 SliceFormat sliceFormat(const std::string& file) {
   const std::string kind = lowerExtension(file);
-  if (kind == ".png") return SliceFormat::png;
+  if (kind == ".pdf") render::requirePdf();
+  if (kind == ".png" || render::isVectorFile(file)) return SliceFormat::picture;
   if (kind == ".pfm") return SliceFormat::pfm;
   if (kind == ".csv") return SliceFormat::csv;
-  throw Error(fmt::format("{}: unknown kind of output '{}'; expected .png for a picture, .pfm or .csv for raw values",
-                          file, kind));
+  throw Error(fmt::format(
+      "{}: unknown kind of output '{}'; expected .png, .svg or .pdf for a picture, .pfm or .csv for raw values", file,
+      kind));
+}
+
+/// Throws `Error` if the arguments ask for what only pictures have, but not raw values.
+void checkRawValues(const std::string& file, const Arguments& arguments, const render::SlicePicture& picture) {
+  if (picture.samples != 1) throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
+  if (picture.arrows != 0) throw Error(fmt::format("{}: raw values have no arrows; leave out arrows", file));
+  if (arguments.given("operands"))
+    throw Error(fmt::format("{}: raw values have no outlines; leave out operands", file));
+  for (const char* name : {"dpi", "transparent"})
+    if (arguments.given(name)) throw Error(fmt::format("{}: only pictures have {}; leave it out", file, name));
 }
 
 /// Returns for each pixel of a slice the number that its colour represents. The number is NaN for pixels
@@ -97,17 +109,18 @@ void runSlice(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
   const SliceFormat format = sliceFormat(file);
   render::SlicePicture picture = slicePicture(arguments);
-  if (format != SliceFormat::png && picture.samples != 1)
-    throw Error(fmt::format("{}: raw values take one sample a pixel; leave out samples", file));
-  if (format != SliceFormat::png && picture.arrows != 0)
-    throw Error(fmt::format("{}: raw values have no arrows; leave out arrows", file));
-  if (format != SliceFormat::png && arguments.given("operands"))
-    throw Error(fmt::format("{}: raw values have no outlines; leave out operands", file));
-  if (format == SliceFormat::png) render::checkPictureSize(picture.width, picture.height, picture.samples);
+  if (format == SliceFormat::picture)
+    render::checkPictureSize(picture.width, picture.height, picture.samples);
+  else
+    checkRawValues(file, arguments, picture);
   const Backend chosen = backend(arguments);
   checkWritable(file);
-  if (format == SliceFormat::png) {
-    savePng(slicedImage(session, arguments), file);
+  if (format == SliceFormat::picture) {
+    slicedImage(session, arguments);
+    const render::Drawn& drawn = session.picture();
+    savePicture(drawn.image, drawn.vectors, file);
+    picture.width = drawn.image.width;
+    picture.height = drawn.image.height;
   } else {
     useField(session, arguments);
     const render::ReferenceData reference = referenceDataFor(session, arguments, picture);
@@ -138,12 +151,13 @@ render::Image renderedImage(Session& session, const Arguments& arguments) {
 
 void runRender(Session& session, const Arguments& arguments) {
   const std::string file = arguments.text("output");
-  requirePng(file);
-  const render::SurfacePicture picture = surfacePicture(arguments);
-  backend(arguments);  // throws `Error` before any work
+  requirePicture(file);
+  surfacePicture(arguments);  // throws `Error` before any work, as `backend` does
+  backend(arguments);
   checkWritable(file);
-  savePng(renderedImage(session, arguments), file);
-  reportPicture(session, arguments, file, picture.width, picture.height, session.lastRenderer());
+  const render::Image image = renderedImage(session, arguments);
+  savePicture(image, session.picture().vectors, file);
+  reportPicture(session, arguments, file, image.width, image.height, session.lastRenderer());
 }
 
 using render::ColorBy;
@@ -253,7 +267,8 @@ Command sliceCommand() {
 The plane is perpendicular to an axis, or given by a point and a normal. Colours by degree and depth show the cells with
 their outlines; colours by distance show iso-lines and the surface as a heavy line.
 
-The extension of the output decides what is written: .png is a picture with legend and caption. .csv (columns
+The extension of the output decides what is written: .png is a picture with legend and caption. .svg and .pdf hold the
+same picture for papers, as lines, areas and text; colours that vary within cells are pixels in them. .csv (columns
 x,y,z,value,degree,depth, one row for each pixel in the domain) and .pfm (32-bit floats, NaN outside the domain) hold
 raw values of as many pixels as size says: distances, or in a .pfm the quantity that color names. The degree of an exact
 cell is the word exact in a .csv and the number 31 in a .pfm.)"),
@@ -261,16 +276,19 @@ cell is the word exact in a .csv and the number 31 in a .pfm.)"),
                    "hpsdf slice bunny.hpsdf -o distance.png --axis x --offset 0.2 --color distance",
                    "hpsdf slice bunny.hpsdf -o oblique.png --plane 0,0,0,1,1,0 --color depth",
                    "hpsdf slice bunny.hpsdf -o error.png --color error --mesh bunny.obj --range 1e-6,1e-3",
+                   "hpsdf slice bunny.hpsdf -o figure.pdf --size 640x400",
                    "hpsdf slice twins.hpsdf -o operands.png --color distance --operands own",
                    "hpsdf slice bunny.hpsdf -o values.csv --size 64x64"},
-      .parameters = joined(
-          {{fieldParameter(), {"output", outputFile().as('o').required(), "File to write: *.png, *.pfm or *.csv."}},
-           under("Plane", kSlicePlane),
-           under(kDrawn, kSliceDrawn),
-           under(kColours,
-                 colorParameters(ColorBy::normal, "degree and depth show the cells, distance iso-lines.", "degree")),
-           kSizeSamplesArrows,
-           backendParameters()}),
+      .parameters =
+          joined({{fieldParameter(),
+                   {"output", outputFile().as('o').required(), "File to write: *.png, *.svg, *.pdf, *.pfm or *.csv."}},
+                  under("Plane", kSlicePlane),
+                  under(kDrawn, kSliceDrawn),
+                  under(kColours, colorParameters(ColorBy::normal,
+                                                  "degree and depth show the cells, distance iso-lines.", "degree")),
+                  kSizeSamplesArrows,
+                  formParameters(),
+                  backendParameters()}),
       .action = runSlice,
       .draw = slicedImage,
       .view =
@@ -288,7 +306,8 @@ Command renderCommand() {
       .help =
           "The surface is where the distance is 0, or equals an offset: positive offsets thicken the body, negative "
           "ones make it thinner. The camera turns around the centre of the domain. Planes, cells and arrows can be "
-          "drawn with the surface or without it.",
+          "drawn with the surface or without it. In a .svg or .pdf the legend and the caption are shapes and text, the "
+          "view is made of pixels.",
       .examples = {"hpsdf render bunny.hpsdf -o surface.png",
                    "hpsdf render bunny.hpsdf -o swollen.png --offset 0.05 --camera 120,10,0.9",
                    "hpsdf render bunny.hpsdf -o degrees.png --color degree --samples 4",
@@ -300,13 +319,14 @@ Command renderCommand() {
                    "hpsdf render bunny.hpsdf -o ear.png --camera 30,20,0.3 --target 0.2,0.6,-0.1",
                    "hpsdf render chair.hpsdf -o defects.png --defects chair.obj"},
       .parameters = joined(
-          {{fieldParameter(), {"output", outputFile().as('o').required(), "File to write, *.png."}},
+          {{fieldParameter(), {"output", outputFile().as('o').required(), "File to write: *.png, *.svg or *.pdf."}},
            under(kCamera, renderCamera()),
            under(kDrawn, kRenderDrawn),
            under(kColours,
                  colorParameters(ColorBy::distance,
                                  "normal lights the surface; degree and depth show the cells that hold it.", "normal")),
            kSizeSamplesArrows,
+           formParameters(),
            backendParameters()}),
       .action = runRender,
       .draw = renderedImage,

@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "coloring/line_style.h"
 #include "coloring/surface_shader.h"
 #include "image/color.h"
 
@@ -17,27 +18,12 @@ namespace hpsdf::render {
 namespace {
 
 constexpr Color kPaper = {250, 250, 248};
-constexpr Color kOutline = {18, 16, 38};
-constexpr Color kIsoLine = {24, 28, 44};
-constexpr Color kZeroLine = {10, 10, 20};
-constexpr Color kSurfaceLine = {255, 255, 255};
-constexpr Color kSurfaceCasing = {16, 14, 34};
 constexpr Color kSection = {238, 222, 205};  // cut through a solid without a colour scale
 constexpr Color kAir = {222, 228, 235};      // part of a plane that lies outside of the solid
 
 // The greatest shares of the light that shadow and occlusion take from the ground.
 constexpr float kGroundShadow = 0.34F, kGroundOcclusion = 0.42F;
 
-constexpr double kOutlineStrength = 0.62;
-constexpr double kIsoStrength = 0.42;
-// The widths of lines are in multiples of a thin line's width.
-constexpr double kZeroWidth = 2.4;
-constexpr double kSurfaceWidth = 1.6;
-constexpr double kCasingWidth = 3.4;
-// Cell outlines fade if the cell is narrower than this many widths of a thin line, because they would cover the colours
-// of small cells.
-constexpr double kOutlineFadesBelow = 10;
-constexpr double kOutlineGoneBelow = 3;
 // Lines are drawn as if the distance had at least this slope. With the true slope, lines would widen to blots where the
 // distance is almost constant in the plane of a slice (near a medial axis or on a tangent plane).
 constexpr double kFlattestSlope = 0.25;
@@ -217,7 +203,8 @@ class SurfaceLine {
 
   /// Draws the line over the colour `ground` of a sample at `distance` samples from the line's centre.
   LinearColor operator()(const LinearColor& ground, double distance) const {
-    const LinearColor cased = mix(ground, casing_, 0.8F * coverage(distance, kCasingWidth * thin_));
+    const LinearColor cased =
+        mix(ground, casing_, float(kSurfaceCasingStrength) * coverage(distance, kCasingWidth * thin_));
     return mix(cased, line_, coverage(distance, kSurfaceWidth * thin_));
   }
 
@@ -253,7 +240,7 @@ SampleColor quantityColors(std::vector<float> quantity, ColorScale scale) {
 Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling) {
   const CellOutlines outlines(buffers, sampling, false);
   const Contours contours(buffers);
-  const LinearColor paper = decodeSrgb(kPaper), outline = decodeSrgb(kOutline);
+  const LinearColor paper = decodeSrgb(sampling.paper.value_or(kPaper)), outline = decodeSrgb(kOutline);
   const SurfaceLine lines(sampling);
   return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) -> LinearColor {
     const LinearColor ground = buffers.hit(i) ? color(i) : paper;
@@ -262,19 +249,25 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
   });
 }
 
-Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling) {
+SampleColor distanceColors(const ViewBuffers& buffers, const DistanceScale& scale) {
   constexpr int kSteps = 2048;
   std::vector<LinearColor> table(2 * kSteps + 1);
   for (int i = -kSteps; i <= kSteps; ++i) table[i + kSteps] = divergingColor(double(i) / kSteps);
+  return [&buffers, table = std::move(table), range = scale.range](std::size_t i) {
+    return table[std::lround(std::clamp(buffers.value[i] / range, -1.0, 1.0) * kSteps) + kSteps];
+  };
+}
 
+Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling) {
+  const SampleColor ground = distanceColors(buffers, scale);
   const Contours contours(buffers);
-  const LinearColor paper = decodeSrgb(kPaper), isoLine = decodeSrgb(kIsoLine), zeroLine = decodeSrgb(kZeroLine);
+  const LinearColor paper = decodeSrgb(sampling.paper.value_or(kPaper)), isoLine = decodeSrgb(kIsoLine);
+  const LinearColor zeroLine = decodeSrgb(kZeroLine);
   const double thin = sampling.lineWidth * sampling.samples;
   return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) -> LinearColor {
     if (!buffers.hit(i)) return paper;
     const double value = buffers.value[i];
-    const int step = static_cast<int>(std::lround(std::clamp(value / scale.range, -1.0, 1.0) * kSteps));
-    LinearColor sample = table[step + kSteps];
+    LinearColor sample = ground(i);
     const double slope = contours.slope(x, y, sampling.sampleSize);
     const double nearest = std::round(value / scale.step);
     if (nearest != 0) {
@@ -283,6 +276,11 @@ Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale,
     }
     return mix(sample, zeroLine, coverage(contours.toZero(x, y, slope), kZeroWidth * thin));
   });
+}
+
+Image colorGround(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling) {
+  const LinearColor paper = decodeSrgb(sampling.paper.value_or(kPaper));
+  return average(buffers, sampling.samples, [&](int, int, std::size_t i) { return buffers.hit(i) ? color(i) : paper; });
 }
 
 Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const SurfaceLook& look, const Sampling& sampling,
@@ -298,7 +296,8 @@ Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const Surfa
     return buffers.shows(i, Shown::section) || buffers.value[i] < offset ? solid : air;
   };
   std::vector<LinearColor> backdrop;
-  for (int y = 0; y < buffers.height; ++y) backdrop.push_back(backdropColor((y + 0.5) / buffers.height));
+  for (int y = 0; y < buffers.height; ++y)
+    backdrop.push_back(sampling.paper ? decodeSrgb(*sampling.paper) : backdropColor((y + 0.5) / buffers.height));
   return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) {
     LinearColor sample = !buffers.covered(i)  ? backdrop[y] * groundLight(look.light, i)
                          : isFlat(buffers, i) ? flatColor(i)

@@ -3,6 +3,7 @@
 // buffers, so that views from OpenGL and from the reference renderer are coloured alike.
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "coloring/surface_shader.h"
@@ -16,8 +17,9 @@ namespace hpsdf::render {
 /// of these points are averaged in linear light.
 struct Sampling {
   int samples = 1;
-  double lineWidth = 1;   ///< width of thin lines, pixels of the finished picture
-  double sampleSize = 1;  ///< distance between neighbouring samples of a slice, world units
+  double lineWidth = 1;             ///< width of thin lines, pixels of the finished picture
+  double sampleSize = 1;            ///< distance between neighbouring samples of a slice, world units
+  std::optional<Color> paper = {};  ///< replaces the colour of the paper, and the backdrop of surfaces
 };
 
 /// A function that returns the colour of a sample, given the sample's index in the buffers.
@@ -28,6 +30,13 @@ using SampleColor = std::function<LinearColor(std::size_t)>;
 SampleColor levelColors(const ViewBuffers& buffers, LevelMap map, ColorBy color);
 /// Returns a function that colours each sample by its value of a quantity.
 SampleColor quantityColors(std::vector<float> quantity, ColorScale scale);
+
+/// Returns a function that colours samples by distance with the diverging colour map. The buffers must outlive the
+/// function.
+SampleColor distanceColors(const ViewBuffers& buffers, const DistanceScale& scale);
+
+/// Colours the samples of a slice without any lines.
+Image colorGround(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling);
 
 /// Colours the samples of a slice. Draws thin outlines of the cells over the colours, and the field's surface
 /// as a white line.

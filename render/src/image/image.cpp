@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -35,6 +36,29 @@ constexpr int kMostSamples = 8;
 // and 27 more while it is rendered. Bodies add 28 bytes per sample, and 12 more while they are drawn.
 constexpr std::size_t kMostSamplesInAll = std::size_t{1} << 26;
 
+/// Returns the CRC of a chunk of a PNG file (ISO 3309, polynomial 0xedb88320).
+std::uint32_t crcOf(std::string_view bytes) {
+  std::uint32_t crc = 0xffffffff;
+  for (const char byte : bytes) {
+    crc ^= static_cast<unsigned char>(byte);
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1 ? 0xedb88320 : 0);
+  }
+  return ~crc;
+}
+
+std::string bigEndian(std::uint32_t number) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8) bytes.push_back(static_cast<char>(number >> shift));
+  return bytes;
+}
+
+/// Returns the chunk of a PNG file that holds the number of pixels to a metre.
+std::string physicalSizeChunk(double dpi) {
+  const std::string perMetre = bigEndian(static_cast<std::uint32_t>(std::lround(dpi / 0.0254)));
+  const std::string content = "pHYs" + perMetre + perMetre + '\1';
+  return bigEndian(9) + content + bigEndian(crcOf(content));
+}
+
 std::string systemReason() { return errno ? std::strerror(errno) : "unknown reason"; }
 
 }  // namespace
@@ -42,13 +66,21 @@ std::string systemReason() { return errno ? std::strerror(errno) : "unknown reas
 std::string pngBytes(const Image& image) {
   if (image.width <= 0 || image.height <= 0 || image.pixels.size() != std::size_t(image.width) * image.height)
     throw Error("cannot write the picture: it has no pixels; draw one first");
+  std::vector<std::uint8_t> withAlpha;
+  for (std::size_t i = 0; i < image.alpha.size(); ++i) {
+    withAlpha.insert(withAlpha.end(), image.pixels[i].begin(), image.pixels[i].end());
+    withAlpha.push_back(image.alpha[i]);
+  }
+  const int channels = withAlpha.empty() ? 3 : 4;
+  const void* pixels = withAlpha.empty() ? static_cast<const void*>(image.pixels.data()) : withAlpha.data();
   std::string bytes;
   const auto append = [](void* context, void* data, int size) {
     static_cast<std::string*>(context)->append(static_cast<const char*>(data), std::size_t(size));
   };
-  if (!stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, image.pixels.data(), image.width * 3))
+  if (!stbi_write_png_to_func(append, &bytes, image.width, image.height, channels, pixels, image.width * channels))
     throw Error("cannot write the picture: not enough memory to compress it; make it smaller");
-  return bytes;
+  constexpr std::size_t kHeader = 33;  // bytes of the signature and of the first chunk, which must be IHDR
+  return bytes.insert(kHeader, physicalSizeChunk(image.dpi));
 }
 
 void savePng(const Image& image, const std::filesystem::path& file) {
@@ -81,6 +113,22 @@ Image loadPng(const std::filesystem::path& file) {
                 "; it must be a whole PNG file");
   Image image(width, height, Color{});
   std::memcpy(image.pixels.data(), pixels.get(), image.pixels.size() * sizeof(Color));
+  return image;
+}
+
+Image withoutBackground(const Image& onWhite, const Image& onBlack) {
+  Image image = onWhite;
+  image.alpha.resize(image.pixels.size());
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    // What shines through is what differs; the channel in which most does decides, so that no colour is cut off.
+    int transparency = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      transparency = std::max(transparency, int(onWhite.pixels[i][k]) - int(onBlack.pixels[i][k]));
+    const int alpha = 255 - transparency;
+    image.alpha[i] = static_cast<std::uint8_t>(alpha);
+    for (std::uint8_t& channel : image.pixels[i])
+      channel = alpha == 0 ? 0 : static_cast<std::uint8_t>(std::clamp((channel - transparency) * 255 / alpha, 0, 255));
+  }
   return image;
 }
 

@@ -57,7 +57,18 @@ char32_t takeCodePoint(std::string_view& text) {
   return valid ? code : kReplacement;
 }
 
+// Returns a code point in UTF-8.
+std::string utf8Of(char32_t code) {
+  const auto byte = [](char32_t bits) { return static_cast<char>(bits); };
+  const auto follower = [&](int shift) { return byte(0x80 | (code >> shift & 0x3f)); };
+  if (code < 0x80) return {byte(code)};
+  if (code < 0x800) return {byte(0xc0 | code >> 6), follower(0)};
+  if (code < 0x10000) return {byte(0xe0 | code >> 12), follower(6), follower(0)};
+  return {byte(0xf0 | code >> 18), follower(12), follower(6), follower(0)};
+}
+
 struct PlacedGlyph {
+  char32_t code;
   int glyph;
   int column;      // integer part of the glyph's origin, pixels
   float fraction;  // fractional part of the glyph's origin
@@ -79,10 +90,11 @@ TextLine layOut(std::string_view text, double size, double x, double baseline) {
   TextLine line;
   int previous = 0;
   while (!text.empty()) {
-    const int glyph = stbtt_FindGlyphIndex(&font(), static_cast<int>(takeCodePoint(text)));
+    const char32_t code = takeCodePoint(text);
+    const int glyph = stbtt_FindGlyphIndex(&font(), static_cast<int>(code));
     if (previous) line.advance += scale * float(stbtt_GetGlyphKernAdvance(&font(), previous, glyph));
     const double origin = x + line.advance;
-    PlacedGlyph placed{glyph, static_cast<int>(std::floor(origin)), 0, {}};
+    PlacedGlyph placed{code, glyph, static_cast<int>(std::floor(origin)), 0, {}};
     placed.fraction = static_cast<float>(origin - placed.column);
     PixelRect& box = placed.box;
     stbtt_GetGlyphBitmapBoxSubpixel(&font(), glyph, scale, scale, placed.fraction, 0, &box.x0, &box.y0, &box.x1,
@@ -141,6 +153,13 @@ double capHeight(double size) {
     return double(y1);
   }();
   return scaleFor(size) * unitsOfCapital;
+}
+
+std::vector<Glyph> glyphsOf(std::string_view text, double size) {
+  std::vector<Glyph> glyphs;
+  for (const PlacedGlyph& placed : layOut(text, size, 0, 0).glyphs)
+    glyphs.push_back({placed.glyph, placed.column + double(placed.fraction), utf8Of(placed.code)});
+  return glyphs;
 }
 
 void drawText(Image& image, std::string_view text, double size, double x, double baseline, Color color) {

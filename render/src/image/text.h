@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "hpsdf/render/image.h"
 #include "image/pixel_rect.h"
@@ -23,6 +24,16 @@ inline double advanceOf(std::string_view text, double size) { return measureText
 
 /// Height in pixels of capitals and digits above the baseline. It serves to centre text vertically.
 double capHeight(double size);
+
+/// A letter of a text, with its place on the baseline.
+struct Glyph {
+  int index = 0;     ///< number of the glyph in the font
+  double x = 0;      ///< distance from the beginning of the text, pixels
+  std::string text;  ///< the letter in UTF-8; U+FFFD for bytes that are no UTF-8 and for control characters
+};
+
+/// Returns the letters of a text in the places where `drawText` draws them.
+std::vector<Glyph> glyphsOf(std::string_view text, double size);
 
 /// Draws a text into an image. Leaves out pixels outside of the image.
 void drawText(Image& image, std::string_view text, double size, double x, double baseline, Color color);

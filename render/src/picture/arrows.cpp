@@ -13,12 +13,16 @@ namespace {
 constexpr Color kCore = {22, 20, 34};
 constexpr Color kCasing = {252, 251, 246};
 constexpr float kCasingStrength = 0.75F;
+// Vector pictures are mixed in sRGB values instead of linear light: there, this opacity has the effect of
+// `kCasingStrength` on most colours.
+constexpr double kCasingOpacity = 0.8;
 // The following lengths of an arrow's parts are in multiples of the width of a thin line.
 constexpr double kCoreWidth = 1.3;
 constexpr double kCasingBorder = 1.0;  // width of the light casing on either side of the dark core
 constexpr double kHeadLength = 5.5;
 constexpr double kHeadShare = 0.6;       // greatest length of the head, as a share of the arrow's length
 constexpr double kHeadHalfWidth = 0.45;  // half the width of the head, as a share of its length
+constexpr int kCapCorners = 3;           // corners of a quarter of the shaft's round end in a vector picture
 constexpr float kHidden = 0.3F;          // opacity of an arrow's hidden parts
 
 struct FieldPixel {
@@ -51,6 +55,31 @@ class Shape {
     along_ = length_ > 0 ? Eigen::Vector2d((arrow.to - arrow.from) / length_) : Eigen::Vector2d(1, 0);
     head_ = std::min(kHeadLength * thin, kHeadShare * length_);
     half_ = 0.5 * kCoreWidth * thin;
+  }
+
+  /// The arrow's outline, moved outwards by `border`, as a closed line.
+  Polyline outline(double border) const {
+    const double half = half_ + border;
+    const double tip = length_ + border * std::hypot(1.0, kHeadHalfWidth) / kHeadHalfWidth;
+    const double base = length_ - head_ - border;
+    const double halfBase = std::max(half, kHeadHalfWidth * (tip - base));
+    std::vector<Eigen::Vector2d> right;  // corners of the right half: distances along the arrow and across it
+    for (int n = 1; n <= kCapCorners; ++n) {
+      const double angle = M_PI / 2 * n / kCapCorners;
+      right.emplace_back(-half * std::cos(angle), half * std::sin(angle));
+    }
+    right.emplace_back(base, half);
+    right.emplace_back(base, halfBase);
+    Polyline line;
+    const auto add = [&](double along, double across) {
+      line.push_back(from_ + along * along_ + across * Eigen::Vector2d(-along_.y(), along_.x()));
+    };
+    add(-half, 0);
+    for (const Eigen::Vector2d& corner : right) add(corner.x(), corner.y());
+    add(tip, 0);
+    for (auto corner = right.rbegin(); corner != right.rend(); ++corner) add(corner->x(), -corner->y());
+    line.push_back(line.front());
+    return line;
   }
 
   /// Signed distance of x from the arrow's outline, negative inside.
@@ -132,6 +161,19 @@ void paintArrows(Image& image, const PixelRect& rect, const std::vector<Arrow>& 
   // neighbour.
   paintShapes(image, rect, arrows, lineWidth, kCasingBorder * lineWidth, decodeSrgb(kCasing), kCasingStrength);
   paintShapes(image, rect, arrows, lineWidth, 0, decodeSrgb(kCore), 1);
+}
+
+std::vector<VectorShape> arrowShapes(const std::vector<Arrow>& arrows, double lineWidth) {
+  std::vector<VectorShape> shapes;
+  FilledShape cores{{}, kCore};
+  for (const Arrow& arrow : arrows) {
+    const Shape shape(arrow, lineWidth);
+    cores.borders.push_back(shape.outline(0));
+    // Casings may overlap, and the areas of one shape must not.
+    shapes.emplace_back(FilledShape{{shape.outline(kCasingBorder * lineWidth)}, kCasing, kCasingOpacity});
+  }
+  if (!arrows.empty()) shapes.emplace_back(std::move(cores));
+  return shapes;
 }
 
 }  // namespace hpsdf::render

@@ -7,6 +7,7 @@
 
 #include "hpsdf/field.h"
 #include "hpsdf/render/image.h"
+#include "hpsdf/render/vector_picture.h"
 #include "hpsdf/render/view.h"
 #include "image/text.h"
 
@@ -35,5 +36,8 @@ std::vector<Arrow> gradientArrows(const Field& field, const SurfaceView& view, c
 
 /// Paints dark arrows with a light casing, which are visible on any colour; only pixels within `rect` change.
 void paintArrows(Image& image, const PixelRect& rect, const std::vector<Arrow>& arrows, double lineWidth);
+
+/// Returns the arrows as shapes of a vector picture, with the same casing. All arrows are fully opaque.
+std::vector<VectorShape> arrowShapes(const std::vector<Arrow>& arrows, double lineWidth);
 
 }  // namespace hpsdf::render

@@ -39,7 +39,7 @@ void spreadOverCells(const ViewBuffers& buffers, std::vector<float>& values) {
 ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field, const ViewBuffers& buffers,
                        const std::function<Vector3(int, int)>& pointAt, ColorBy quantity, const ScaleOptions& options,
                        const ReferenceData& reference) {
-  const std::vector<double> ofCells = quantityOfCells(field, quantity, reference);
+  std::vector<double> ofCells = quantityOfCells(field, quantity, reference);
   std::vector<float> values = quantityOfSamples(field, buffers, pointAt, quantity, reference, ofCells);
   if (options.perCell) spreadOverCells(buffers, values);
   const ColorScale scale = colorScale(options, field, ofCells, values);
@@ -53,6 +53,8 @@ ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field,
     key.legend.marks.push_back({scale.fraction(value), formatNumber(value, 3)});
   key.scale.limits = {scale.low(), scale.high()};
   key.color = quantityColors(std::move(values), scale);
+  if (!ofCells.empty())
+    key.cellColor = [ofCells = std::move(ofCells), scale](const Cell& cell) { return scale(float(ofCells[cell.id])); };
   return key;
 }
 
@@ -68,6 +70,7 @@ ColorKey keyOfLevels(Overlay& overlay, const Frame& frame, const FieldStatistics
   LevelMap map(key.scale.levels);
   for (const auto& [level, share] : shares) key.legend.levels.push_back({level, encodeSrgb(map(level)), share});
   addLevelLegend(overlay, frame, titles, shares, map);
+  key.cellColor = [map, color](const Cell& cell) { return map(color == ColorBy::degree ? cell.degree : cell.depth); };
   key.color = levelColors(buffers, std::move(map), color);
   return key;
 }

@@ -12,7 +12,9 @@
 namespace hpsdf::render {
 
 struct ColorKey {
-  SampleColor color;   ///< colour of each sample; may refer to the buffers
+  SampleColor color;  ///< colour of each sample; may refer to the buffers
+  /// The colour of a whole cell; empty for quantities that vary within cells.
+  std::function<LinearColor(const Cell&)> cellColor = {};
   Legend legend = {};  ///< the legend in the panel, as data
   ScaleOptions scale;  ///< the given options, with the limits and levels that were chosen
   std::string name;    ///< short name of the shown quantity for a caption, e.g. "degree"

@@ -419,6 +419,24 @@ void paint(Image& image, const Overlay& overlay) {
   for (const TextItem& text : overlay.texts) drawText(image, text.text, text.size, text.x, text.baseline, text.color);
 }
 
+Overlay enlarged(Overlay overlay, double factor) {
+  for (BoxItem& box : overlay.boxes)
+    for (double* side : {&box.x0, &box.y0, &box.x1, &box.y1}) *side *= factor;
+  for (TextItem& text : overlay.texts)
+    for (double* length : {&text.size, &text.x, &text.baseline}) *length *= factor;
+  return overlay;
+}
+
+VectorLayer overlayLayer(const Overlay& overlay) {
+  VectorLayer layer{"legend"};
+  for (const BoxItem& box : overlay.boxes)
+    layer.shapes.emplace_back(FilledShape{
+        {{{box.x0, box.y0}, {box.x1, box.y0}, {box.x1, box.y1}, {box.x0, box.y1}, {box.x0, box.y0}}}, box.color});
+  for (const TextItem& text : overlay.texts)  // baselines are rounded, as `drawText` rounds them
+    layer.shapes.emplace_back(TextShape{text.text, text.size, {text.x, std::round(text.baseline)}, text.color});
+  return layer;
+}
+
 std::string formatNumber(double value, int digits) {
   if (value == 0) return "0";
   const double size = std::abs(value);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "hpsdf/render/vector_picture.h"
 #include "image/colormap.h"
 #include "image/text.h"
 
@@ -109,6 +110,12 @@ double swatchHeight(const Frame& frame);
 void addCaption(Overlay& overlay, const Frame& frame, const std::string& name, std::span<const std::string> details);
 
 void paint(Image& image, const Overlay& overlay);
+
+/// Returns the overlay of a picture that is enlarged by this factor.
+Overlay enlarged(Overlay overlay, double factor);
+
+/// Returns the overlay as shapes of a vector picture.
+VectorLayer overlayLayer(const Overlay& overlay);
 
 /// Formats a number, as in "−0.25", "15200", "1.5e-7". The minus sign is U+2212. Numbers with up to 6 digits before the
 /// point have no exponent, unless they are very small.

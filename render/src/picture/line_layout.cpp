@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "coloring/color_view.h"
+#include "coloring/picture_form.h"
 #include "hpsdf/render/line_plot.h"
 #include "image/strokes.h"
 #include "picture/describe.h"
+#include "vector/paths.h"
 
 namespace hpsdf::render {
 namespace {
@@ -391,6 +393,27 @@ class Plotter {
   LineLayout layout_;  // layout_.charts[n] is the rectangle of charts_[n]
 };
 
+CurveItem enlargedCurve(CurveItem curve, const PictureForm& form) {
+  for (Eigen::Vector2d& point : curve.points) point *= form.pixelRatio;
+  curve.width *= form.pixelRatio;
+  for (int* side : {&curve.within.x0, &curve.within.y0, &curve.within.x1, &curve.within.y1})
+    *side = enlargedLength(*side, form);
+  return curve;
+}
+
+/// Returns a curve as a shape of a vector picture. Points that are not finite interrupt it.
+VectorLayer curveLayer(const CurveItem& curve, const std::string& name) {
+  constexpr double kTolerance = 0.02;  // pixels
+  StrokedShape stroke{{{}}, curve.width, curve.color, 1, true};
+  for (const Eigen::Vector2d& point : curve.points)
+    if (point.allFinite())
+      stroke.lines.back().push_back(point);
+    else
+      stroke.lines.emplace_back();
+  for (Polyline& line : stroke.lines) line = simplified(line, kTolerance);
+  return {name, {std::move(stroke)}, areaOf(curve.within)};
+}
+
 }  // namespace
 
 LineLayout layOutLine(const Frame& frame, const Field& field, const Line& line, std::span<const double> exact) {
@@ -419,13 +442,25 @@ void paintCurve(Image& image, const CurveItem& curve) {
         mixInto(image.at(x, y), color, share);
 }
 
-Image drawLine(const Field& field, const Line& line, std::span<const double> exact, int width, int height) {
-  checkPictureSize(width, height, 1);
-  const LineLayout layout = layOutLine(frame(width, height), field, line, exact);
-  Image image(width, height, paperColor());
-  paint(image, layout.overlay);
-  for (const CurveItem& curve : layout.curves) paintCurve(image, curve);
-  return image;
+DrawnLine drawLine(const Field& field, const Line& line, std::span<const double> exact, int width, int height,
+                   const PictureForm& form) {
+  checkPictureForm(width, height, 1, form);
+  LineLayout layout = layOutLine(frame(width, height), field, line, exact);
+  layout.overlay = enlarged(std::move(layout.overlay), form.pixelRatio);
+  for (CurveItem& curve : layout.curves) curve = enlargedCurve(std::move(curve), form);
+  DrawnLine drawn;
+  drawn.image = finished(form, [&](const std::optional<Color>& paper) {
+    Image image(enlargedLength(width, form), enlargedLength(height, form), paper.value_or(paperColor()));
+    paint(image, layout.overlay);
+    for (const CurveItem& curve : layout.curves) paintCurve(image, curve);
+    return image;
+  });
+  if (!form.vectors) return drawn;
+  std::vector<VectorLayer> layers = {overlayLayer(layout.overlay)};
+  for (const CurveItem& curve : layout.curves)
+    layers.push_back(curveLayer(curve, "curve-" + std::to_string(layers.size())));
+  drawn.vectors = vectorPicture(drawn.image, form, std::move(layers));
+  return drawn;
 }
 
 }  // namespace hpsdf::render

@@ -10,6 +10,7 @@
 
 #include "coloring/body_shadow.h"
 #include "coloring/color_view.h"
+#include "coloring/picture_form.h"
 #include "coloring/quantity.h"
 #include "hpsdf/error.h"
 #include "picture/arrows.h"
@@ -19,12 +20,14 @@
 #include "picture/describe.h"
 #include "picture/legend.h"
 #include "picture/slice_lines.h"
+#include "picture/slice_shapes.h"
 #include "scene/body_view.h"
 #include "scene/cell_boxes.h"
 #include "scene/cell_lines.h"
 #include "scene/feature_edges.h"
 #include "scene/mesh_lines.h"
 #include "scene/section.h"
+#include "vector/paths.h"
 #include "view/view_buffers.h"
 #include "view/view_checks.h"
 
@@ -33,9 +36,15 @@ namespace {
 
 constexpr float kHiddenLines = 0.12F;  // opacity of cells' edges where something hides them
 
+/// The size of a finished view.
+template <typename Picture>
+ViewSize finishedSize(const Picture& picture, const Frame& frame) {
+  return {enlargedLength(frame.view.width(), picture.form), enlargedLength(frame.view.height(), picture.form)};
+}
+
 template <typename Picture>
 Frame frameOf(const Picture& picture) {
-  checkPictureSize(picture.width, picture.height, picture.samples);
+  checkPictureForm(picture.width, picture.height, picture.samples, picture.form);
   Frame result = frame(picture.width, picture.height);
   if (picture.bare) {
     result.view = {0, 0, picture.width, picture.height};
@@ -64,6 +73,19 @@ PixelRect sectionOf(const ViewBuffers& buffers, int samples) {
   return {samplesHit.x0 / samples, samplesHit.y0 / samples, up(samplesHit.x1), up(samplesHit.y1)};
 }
 
+/// The least rectangle of a picture's size that holds a rectangle of the finished picture.
+PixelRect beforeEnlarging(const PixelRect& rect, const PictureForm& form) {
+  const auto low = [&](int x) { return static_cast<int>(std::floor(x / form.pixelRatio)); };
+  const auto high = [&](int x) { return static_cast<int>(std::ceil(x / form.pixelRatio)); };
+  return {low(rect.x0), low(rect.y0), high(rect.x1), high(rect.y1)};
+}
+
+/// Returns the view of a surface as a picture of pixels: the upper rows of the image.
+VectorLayer viewLayer(const Image& image, int height) {
+  const PixelRect part{0, 0, image.width, height};
+  return {"view", {RasterShape{croppedTo(part, image), areaOf(part)}}};
+}
+
 /// Moves the panel next to the right edge of the section, because a square domain leaves much of a wide view
 /// empty.
 void movePanelTo(const PixelRect& section, Frame& frame) {
@@ -86,10 +108,15 @@ void checkArrows(int spacing) {
 
 /// Draws arrows along the gradient over the finished view. The legend and the caption are painted later, over the
 /// arrows.
-void addArrows(Image& image, const Frame& frame, const Field& field, const auto& view, const ViewBuffers& buffers,
-               int samples, int spacing) {
-  if (spacing > 0)
-    paintArrows(image, frame.view, gradientArrows(field, view, buffers, samples, spacing), frame.lineWidth());
+void addArrows(Image& image, const std::vector<Arrow>& arrows, const ViewBuffers& buffers, const Sampling& sampling) {
+  const PixelRect view{0, 0, buffers.width / sampling.samples, buffers.height / sampling.samples};
+  paintArrows(image, view, arrows, sampling.lineWidth);
+}
+
+/// The arrows along the gradient that a picture shows.
+std::vector<Arrow> arrowsOf(const Field& field, const auto& view, const ViewBuffers& buffers, const auto& picture) {
+  if (picture.arrows == 0) return {};
+  return gradientArrows(field, view, buffers, picture.samples, enlargedLength(picture.arrows, picture.form));
 }
 
 void checkColor(ColorBy color, ColorBy inapplicable, const ReferenceData& reference) {
@@ -229,10 +256,7 @@ void addFieldDetails(const Field& field, const FieldStatistics& figures, std::ve
 
 }  // namespace
 
-ViewSize viewSize(const SurfacePicture& picture) {
-  const PixelRect view = frameOfSurface(picture).view;
-  return {view.width(), view.height()};
-}
+ViewSize viewSize(const SurfacePicture& picture) { return finishedSize(picture, frameOfSurface(picture)); }
 
 SliceView sliceView(const Field& field, const SlicePicture& picture, int width, int height) {
   if (!(picture.zoom > 0) || !std::isfinite(picture.zoom))
@@ -252,8 +276,8 @@ SliceView sliceView(const Field& field, const SlicePicture& picture, int width, 
 }
 
 SliceView sliceView(const Field& field, const SlicePicture& picture) {
-  const PixelRect view = frameOf(picture).view;
-  return sliceView(field, picture, view.width(), view.height());
+  const ViewSize size = finishedSize(picture, frameOf(picture));
+  return sliceView(field, picture, size.width, size.height);
 }
 
 Image draw(Renderer& renderer, const Field& field, const SlicePicture& picture, const ReferenceData& reference) {
@@ -270,54 +294,80 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   checkColor(picture.color, ColorBy::normal, reference);
   checkArrows(picture.arrows);
   const int samples = picture.samples;
+  const auto [width, height] = finishedSize(picture, frame);
   const SliceView view = sliceView(field, picture);
   Drawn drawn{.image = {},
               .view = view,
-              .buffers = renderer.slice(view, frame.view.width() * samples, frame.view.height() * samples),
+              .buffers = renderer.slice(view, width * samples, height * samples),
               .samples = samples,
               .scale = picture.scale};
   const ViewBuffers& buffers = drawn.buffers;
   const PixelRect section = sectionOf(buffers, samples);
+  const PixelRect sectionInFrame = beforeEnlarging(section, picture.form);
   drawn.seen = !section.empty();
-  movePanelTo(section, frame);
+  movePanelTo(sectionInFrame, frame);
 
-  // Colour the view, and collect the caption's details about the colours.
-  const Sampling sampling{samples, frame.lineWidth(), view.right.norm() / buffers.width};
+  // Choose the colours and the legend, and collect the caption's details about the colours.
   const FieldStatistics figures = statistics(field);
   const std::string plane = describePlane("slice", picture.plane);
   const std::vector<Legend::Line> lines = lineLegend(reference);
   Overlay overlay;
   addLineLegend(overlay, frame, lines);
-  drawn.image = Image(picture.width, picture.height, paperColor());
+  ColorKey key;
+  std::optional<DistanceScale> distances;
   if (picture.color == ColorBy::distance) {
-    const DistanceScale scale = distanceScaleFor(buffers, picture.scale);
-    if (!drawn.scale.limits) drawn.scale.limits = {scale.minimum, scale.maximum};
-    addDistanceBar(overlay, frame, scale);
-    drawn.legend = distanceLegend(scale);
-    pasteView(drawn.image, colorDistanceSlice(buffers, scale, sampling));
-    drawn.details = {"distance", plane, formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
-                     "lines every " + formatNumber(scale.step)};
+    distances = distanceScaleFor(buffers, picture.scale);
+    if (!drawn.scale.limits) drawn.scale.limits = {distances->minimum, distances->maximum};
+    addDistanceBar(overlay, frame, *distances);
+    drawn.legend = distanceLegend(*distances);
+    drawn.details = {"distance", plane, formatNumber(distances->minimum) + " to " + formatNumber(distances->maximum),
+                     "lines every " + formatNumber(distances->step)};
+    key.color = distanceColors(buffers, *distances);
   } else {
-    const ColorKey key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers),
-                                      picture.color, picture.scale, reference);
-    pasteView(drawn.image, colorCellSlice(buffers, key.color, sampling));
+    key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers), picture.color,
+                       picture.scale, reference);
     drawn.legend = key.legend;
     drawn.scale = key.scale;
     drawn.details = {key.name, plane};
     if (!key.range.empty()) drawn.details.push_back(key.range);
   }
-
-  // Add the lines, the arrows, the axes and the caption to the picture.
-  paintSliceLines(drawn.image, field, view, section, frame.view.width(), frame.view.height(), reference,
-                  frame.lineWidth());
   drawn.legend.lines = lines;
+
+  // Add the axes and the caption to the overlay.
   if (!reference.outlined.empty())
     drawn.details.insert(drawn.details.begin() + 2, "dashed where they do not bound the solid");
-  addArrows(drawn.image, frame, field, view, buffers, samples, picture.arrows);
-  addAxesOf(overlay, frame, view, section);
+  addAxesOf(overlay, frame, view, sectionInFrame);
   addFieldDetails(field, figures, drawn.details);
   addCaption(overlay, frame, describeSource(field), drawn.details);
-  paint(drawn.image, overlay);
+  overlay = enlarged(std::move(overlay), picture.form.pixelRatio);
+
+  // Draw the view, the lines, the arrows and the overlay.
+  Sampling sampling{samples, frame.lineWidth() * picture.form.pixelRatio, view.right.norm() / buffers.width};
+  const std::vector<Arrow> arrows = arrowsOf(field, view, buffers, picture);
+  drawn.image = finished(picture.form, [&](const std::optional<Color>& paper) {
+    Image image(enlargedLength(picture.width, picture.form), enlargedLength(picture.height, picture.form),
+                paper.value_or(paperColor()));
+    sampling.paper = paper;
+    pasteView(image, distances ? colorDistanceSlice(buffers, *distances, sampling)
+                               : colorCellSlice(buffers, key.color, sampling));
+    paintSliceLines(image, field, view, section, width, height, reference, sampling.lineWidth);
+    addArrows(image, arrows, buffers, sampling);
+    paint(image, overlay);
+    return image;
+  });
+  if (!picture.form.vectors) return drawn;
+  const Image ground = finished(picture.form, [&](const std::optional<Color>& paper) {
+    sampling.paper = paper;
+    return colorGround(buffers, key.color, sampling);
+  });
+  std::vector<VectorLayer> layers =
+      sliceLayers({field, view, buffers, sampling, section, key.cellColor, ground, distances ? &*distances : nullptr});
+  const Eigen::AlignedBox2d window = areaOf({0, 0, width, height});
+  layers.push_back(
+      {"lines", sliceLineShapes(field, view, section, width, height, reference, sampling.lineWidth), window});
+  layers.push_back({"arrows", arrowShapes(arrows, sampling.lineWidth), window});
+  layers.push_back(overlayLayer(overlay));
+  drawn.vectors = vectorPicture(drawn.image, picture.form, std::move(layers));
   return drawn;
 }
 
@@ -328,9 +378,9 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   checkColor(picture.color, ColorBy::distance, reference);
   checkArrows(picture.arrows);
   const int samples = picture.samples;
-  const Sampling sampling{samples, frame.lineWidth(), 1};
-  Scene scene = renderScene(renderer, field, picture, reference.mesh, frame.view.width(), frame.view.height(),
-                            sampling.lineWidth);
+  const auto [width, height] = finishedSize(picture, frame);
+  Sampling sampling{samples, frame.lineWidth() * picture.form.pixelRatio, 1};
+  Scene scene = renderScene(renderer, field, picture, reference.mesh, width, height, sampling.lineWidth);
   const ViewBuffers& buffers = scene.buffers;
   const Camera& camera = scene.view.camera;
   Drawn drawn{.image = {},
@@ -340,7 +390,7 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
               .seen = scene.showsField(),
               .scale = picture.scale};
 
-  // Colour the view, and collect the caption's details about the colours.
+  // Choose the colours and the legend, and collect the caption's details about the colours.
   const FieldStatistics figures = statistics(field);
   const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
   Overlay overlay;
@@ -359,27 +409,40 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
       addFieldFacts(overlay, frame, field, figures);
     if (picture.surface) drawn.details.push_back(surface);
   }
-  drawn.image = backdropPicture(picture.width, picture.height, frame.view.height());
-  const SurfaceLook look = lookOf(field, picture, scene, std::move(key.color));
-  pasteView(drawn.image, colorSurface(buffers, camera, look, sampling, picture.offset, scene.lines));
 
-  // Add the marks of cracks and defects, the arrows and the caption to the picture.
-  if (picture.cracks) {
-    markCracks(drawn.image, buffers, sampling);
-    drawn.details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
-  }
+  // Add the details about marks and scene, and the caption.
+  if (picture.cracks) drawn.details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
   if (reference.defects) {
-    paintDefects(drawn.image, camera, buffers, samples, *reference.defects, sampling.lineWidth);
     drawn.legend.defects = defectLegend(*reference.defects);
     for (const auto& [name, count, color] : drawn.legend.defects) drawn.details.push_back(name + ": " + count);
   }
-  addArrows(drawn.image, frame, field, scene.view, buffers, samples, picture.arrows);
   addSceneDetails(picture, drawn.details);
   addFieldDetails(field, figures, drawn.details);
   const Caption caption = picture.caption.value_or(Caption{describeSource(field), std::move(drawn.details)});
   addCaption(overlay, frame, caption.name, caption.details);
   drawn.details = caption.details;
-  paint(drawn.image, overlay);
+  overlay = enlarged(std::move(overlay), picture.form.pixelRatio);
+
+  // Draw the view with its marks and arrows, then the overlay.
+  const SurfaceLook look = lookOf(field, picture, scene, std::move(key.color));
+  const std::vector<Arrow> arrows = arrowsOf(field, scene.view, buffers, picture);
+  const Image shown = finished(picture.form, [&](const std::optional<Color>& paper) {
+    Image image = backdropPicture(enlargedLength(picture.width, picture.form),
+                                  enlargedLength(picture.height, picture.form), height);
+    if (paper) image = Image(image.width, image.height, *paper);
+    sampling.paper = paper;
+    pasteView(image, colorSurface(buffers, camera, look, sampling, picture.offset, scene.lines));
+    if (picture.cracks) markCracks(image, buffers, sampling);
+    if (reference.defects) paintDefects(image, camera, buffers, samples, *reference.defects, sampling.lineWidth);
+    addArrows(image, arrows, buffers, sampling);
+    if (!picture.form.vectors) paint(image, overlay);
+    return image;
+  });
+  drawn.image = shown;
+  if (picture.form.vectors) {
+    drawn.vectors = vectorPicture(shown, picture.form, {viewLayer(shown, height), overlayLayer(overlay)});
+    paint(drawn.image, overlay);
+  }
   drawn.buffers = std::move(scene.buffers);
   return drawn;
 }

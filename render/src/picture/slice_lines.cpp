@@ -11,6 +11,7 @@
 #include "coloring/color_view.h"
 #include "image/color.h"
 #include "image/strokes.h"
+#include "vector/paths.h"
 
 namespace hpsdf::render {
 namespace {
@@ -18,16 +19,20 @@ namespace {
 constexpr int kOutlineBlock = 8;  // pixels along each side of a block in which an outline is searched
 constexpr Color kOutlineCasing = {16, 14, 34};
 constexpr float kOutlineCasingStrength = 0.8F;
+// Vector pictures are mixed in sRGB values instead of linear light: there, this opacity has the effect of the strength
+// on most colours.
+constexpr double kOutlineCasingOpacity = 0.6;
 constexpr Color kMeshLine = {255, 0, 255};  // the colour of cracks, which no colour map contains
 // The following lengths are in multiples of the width of a thin line.
 constexpr double kOutlineWidth = 2.6;
 constexpr double kOutlineCasingBorder = 1.3;
 constexpr double kMeshLineWidth = 1.4;
-constexpr double kMeshDotRadius = 2.2;  // of the dots where the section of a mesh bends
-constexpr double kDottedLength = 14;    // lines of this length or more have dots at their ends
-constexpr double kOutlineDash = 8;      // length of a dash, and of the gap after it
-constexpr double kLegendTitle = 2.7;    // height of the legend's title and of the gap below the rows, in ems
-constexpr double kOnSurface = 2;        // pixels between an outline and the field's surface up to which they agree
+constexpr double kMeshDotRadius = 2.2;   // of the dots where the section of a mesh bends
+constexpr double kDottedLength = 14;     // lines of this length or more have dots at their ends
+constexpr double kOutlineDash = 8;       // length of a dash, and of the gap after it
+constexpr double kLegendTitle = 2.7;     // height of the legend's title and of the gap below the rows, in ems
+constexpr double kLineTolerance = 0.02;  // pixels by which a line of a vector picture may differ
+constexpr double kOnSurface = 2;         // pixels between an outline and the field's surface up to which they agree
 
 /// The point at a position in a view, in pixels from its upper left corner; the middle of the first pixel is (½, ½).
 Vector3 pointIn(const SliceView& view, const Eigen::Vector2d& at, int width, int height) {
@@ -124,6 +129,28 @@ std::vector<bool> areOnSurface(const std::vector<FlatLine>& lines, const Field& 
   std::vector<bool> result;
   for (const double value : values) result.push_back(std::abs(value) <= most);
   return result;
+}
+
+/// Returns the outline of a solid without the gaps where it does not follow the field's surface.
+std::vector<FlatLine> dashedOutline(const DistanceFunction& distance, const Field& field, const SliceView& view,
+                                    const PixelRect& part, int width, int height, double lineWidth) {
+  const std::vector<FlatLine> lines = outlineOf(distance, view, part, width, height);
+  const std::vector<bool> onSurface = areOnSurface(lines, field, view, width, height);
+  std::vector<FlatLine> drawn;
+  for (std::size_t n = 0; n < lines.size(); ++n)
+    if (onSurface[n] || !isGap(lines[n], kOutlineDash * lineWidth)) drawn.push_back(lines[n]);
+  return drawn;
+}
+
+/// Joins lines that meet at their ends.
+std::vector<Polyline> joinedLines(const std::vector<FlatLine>& lines) {
+  PointNumbers numbers;
+  std::vector<Link> links;
+  for (const FlatLine& line : lines)
+    if (const Link link = {numbers(line.from), numbers(line.to)}; link[0] != link[1]) links.push_back(link);
+  std::vector<Polyline> joined = joinedLinks(links, numbers.points());
+  for (Polyline& line : joined) line = simplified(line, kLineTolerance);
+  return joined;
 }
 
 void paintMesh(Image& picture, const std::vector<FlatLine>& lines, const PixelRect& part, double lineWidth) {
@@ -227,16 +254,44 @@ void paintSliceLines(Image& picture, const Field& field, const SliceView& view, 
   if (part.empty()) return;  // the view shows nothing of the domain
   const double halfWidth = 0.5 * kOutlineWidth * lineWidth, border = kOutlineCasingBorder * lineWidth;
   for (std::size_t n = 0; n < reference.outlined.size(); ++n) {
-    const std::vector<FlatLine> lines = outlineOf(*reference.outlined[n].distance, view, part, width, height);
-    const std::vector<bool> onSurface = areOnSurface(lines, field, view, width, height);
     LineDistances distances(part, halfWidth + border + 0.5);
-    for (std::size_t i = 0; i < lines.size(); ++i)
-      if (onSurface[i] || !isGap(lines[i], kOutlineDash * lineWidth)) distances.add(lines[i]);
+    for (const FlatLine& line :
+         dashedOutline(*reference.outlined[n].distance, field, view, part, width, height, lineWidth))
+      distances.add(line);
     distances.paint(picture, kOutlineCasing, halfWidth + border, kOutlineCasingStrength);
     distances.paint(picture, outlineColor(n), halfWidth, 1);
   }
   if (reference.mesh.mesh != nullptr)
     paintMesh(picture, sectionOf(*reference.mesh.mesh, view, width, height), part, lineWidth);
+}
+
+std::vector<VectorShape> sliceLineShapes(const Field& field, const SliceView& view, const PixelRect& part, int width,
+                                         int height, const ReferenceData& reference, double lineWidth) {
+  std::vector<VectorShape> shapes;
+  if (part.empty()) return shapes;  // the view shows nothing of the domain
+  for (std::size_t n = 0; n < reference.outlined.size(); ++n) {
+    StrokedShape line{
+        joinedLines(dashedOutline(*reference.outlined[n].distance, field, view, part, width, height, lineWidth)),
+        kOutlineWidth * lineWidth, outlineColor(n), 1, true};
+    StrokedShape casing = line;
+    casing.width += 2 * kOutlineCasingBorder * lineWidth;
+    casing.color = kOutlineCasing;
+    casing.opacity = kOutlineCasingOpacity;
+    shapes.emplace_back(std::move(casing));
+    shapes.emplace_back(std::move(line));
+  }
+  if (reference.mesh.mesh == nullptr) return shapes;
+  StrokedShape mesh{{}, kMeshLineWidth * lineWidth, kMeshLine, 1, true};
+  StrokedShape dots{{}, 2 * kMeshDotRadius * lineWidth, kMeshLine, 1, true};
+  for (const FlatLine& line : sectionOf(*reference.mesh.mesh, view, width, height)) {
+    mesh.lines.push_back({line.from, line.to});
+    if ((line.to - line.from).norm() < kDottedLength * lineWidth) continue;
+    dots.lines.push_back({line.from});
+    dots.lines.push_back({line.to});
+  }
+  shapes.emplace_back(std::move(mesh));
+  shapes.emplace_back(std::move(dots));
+  return shapes;
 }
 
 }  // namespace hpsdf::render

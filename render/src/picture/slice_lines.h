@@ -5,6 +5,7 @@
 
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/picture_settings.h"
+#include "hpsdf/render/vector_picture.h"
 #include "hpsdf/render/view.h"
 #include "picture/legend.h"
 
@@ -37,5 +38,9 @@ void addLineLegend(Overlay& overlay, Frame& frame, const std::vector<Legend::Lin
 /// pixels in the upper left corner of the picture. `part` is the part of the view that shows the domain.
 void paintSliceLines(Image& picture, const Field& field, const SliceView& view, const PixelRect& part, int width,
                      int height, const ReferenceData& reference, double lineWidth);
+
+/// Returns the lines that `paintSliceLines` paints as shapes of a vector picture.
+std::vector<VectorShape> sliceLineShapes(const Field& field, const SliceView& view, const PixelRect& part, int width,
+                                         int height, const ReferenceData& reference, double lineWidth);
 
 }  // namespace hpsdf::render

@@ -12,11 +12,16 @@ namespace hpsdf::render {
 /// An sRGB colour with 8 bits per channel.
 using Color = std::array<std::uint8_t, 3>;
 
+/// Pixels of a screen to an inch, as browsers count them.
+constexpr double kScreenDpi = 96;
+
 /// sRGB picture, rows top to bottom.
 struct Image {
   int width = 0;
   int height = 0;
   std::vector<Color> pixels;
+  std::vector<std::uint8_t> alpha = {};  ///< opacity of each pixel, 0 to 255; empty for an opaque picture
+  double dpi = kScreenDpi;               ///< pixels to an inch, for PNG files
 
   Image() = default;
   Image(int columns, int rows, Color fill) : width(columns), height(rows), pixels(std::size_t(columns) * rows, fill) {}
@@ -24,8 +29,8 @@ struct Image {
   const Color& at(int x, int y) const { return pixels[std::size_t(y) * width + x]; }
 };
 
-/// Returns the picture as the bytes of a PNG file. Throws `hpsdf::Error` for a picture without pixels, and if there is
-/// not enough memory.
+/// Returns the picture as the bytes of a PNG file, with its physical size. Throws `hpsdf::Error` for a picture without
+/// pixels, and if there is not enough memory.
 std::string pngBytes(const Image& image);
 
 /// Writes the picture to a temporary file and then renames this file to `file`. If that fails, throws
@@ -34,6 +39,10 @@ void savePng(const Image& image, const std::filesystem::path& file);
 
 /// Loads a picture from a PNG file. Throws `hpsdf::Error`, which names the file.
 Image loadPng(const std::filesystem::path& file);
+
+/// Returns the picture whose background is transparent, from the same picture on a white and on a black background.
+/// Laid over white, it looks as the first of them.
+Image withoutBackground(const Image& onWhite, const Image& onBlack);
 
 /// Throws `Error` unless the size and sample count of a picture are in range: 16 to 16384 pixels per side,
 /// 1 to 8 samples per pixel along each axis, and at most 64 Mi samples in all.

@@ -13,6 +13,7 @@
 #include "hpsdf/render/picture_settings.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/render/shown_cells.h"
+#include "hpsdf/render/vector_picture.h"
 #include "hpsdf/render/view.h"
 
 namespace hpsdf::render {
@@ -41,6 +42,7 @@ struct Drawn {
   std::vector<std::string> details = {};  ///< details of the caption, the most important first
   ScaleOptions scale = {};                ///< the chosen colour scale; pictures with equal scales have equal colours
   std::array<int, 2> corner = {0, 0};     ///< upper left corner of the view in the picture, pixels
+  VectorPicture vectors = {};             ///< the same picture as shapes, if `PictureForm::vectors` asks for them
 };
 /// Draws a picture as `draw` does. Returns it together with the data from which it was drawn.
 Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& picture,

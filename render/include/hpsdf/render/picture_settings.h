@@ -102,6 +102,13 @@ struct FreePlane {
 
 using Plane = std::variant<AxisPlane, FreePlane>;
 
+/// The form in which a picture is finished.
+struct PictureForm {
+  double pixelRatio = 1;     ///< pixels of the finished picture for each pixel of its size, above 0: enlarges all parts
+  bool transparent = false;  ///< leaves out the paper and the backdrop
+  bool vectors = false;      ///< also makes `Drawn::vectors`
+};
+
 struct SlicePicture {
   Plane plane = AxisPlane{};
   ColorBy color = ColorBy::degree;
@@ -113,6 +120,7 @@ struct SlicePicture {
   double zoom = 1;                     ///< magnification, above 0; 1 shows the whole section of the domain
   std::optional<Vector3> target = {};  ///< centre of the view, projected onto the plane; default: the section's centre
   int arrows = 0;                      ///< spacing of gradient arrows in pixels, 4 to 1000; 0 draws none
+  PictureForm form = {};
 };
 
 /// Bodies that a picture shows together with a field's surface. The bodies keep their own colours, and a
@@ -152,6 +160,7 @@ struct SurfacePicture {
   /// Replaces the caption about the field. With `ColorBy::normal`, the panel of facts about the field is omitted too,
   /// and the view becomes wider.
   std::optional<Caption> caption = {};
+  PictureForm form = {};
 };
 
 /// The meaning of a picture's colours, as data. An application can draw this legend beside a picture that has none.
