@@ -51,7 +51,7 @@ TEST_F(HelpCommand, usageMistakesAreRefused) {
   expectRefused({{"help", "slcie"}}, "did you mean 'slice'?");
   expectRefused({{"save", "-o", at("x.hpsdf")}}, "'save' is a command of scripts");
   expectRefused({{"build", "builtin:torus"}}, "--output is missing");
-  expectRefused({{"slice", field(), "-o", at("x.gif")}}, "expected .png for a picture, .pfm or .csv");
+  expectRefused({{"slice", field(), "-o", at("x.gif")}}, "expected .png, .svg or .pdf for a picture, .pfm or .csv");
   expectRefused({{"render", field(), "-o", at("x.csv")}}, "written as .png");
   expectRefused({{"slice", field(), "-o", at("x.pfm"), "--samples", "2"}}, "one sample a pixel");
   expectRefused({{"slice", field(), "-o", at("x.csv"), "--arrows", "20"}}, "no arrows");

@@ -12,6 +12,7 @@
 #include "cli_fixture.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/image.h"
+#include "hpsdf/render/vector_picture.h"
 #include "support/require_gl.h"
 
 namespace hpsdf::app {
@@ -78,6 +79,45 @@ TEST_F(Pictures, rawSlicesHoldTheFieldsValues) {
       if (!std::isnan(value)) inside.push_back(value);
     }
   EXPECT_EQ(inside, values);
+}
+
+TEST_F(Pictures, theExtensionChoosesVectors) {
+  const std::vector<std::vector<std::string>> commands = {
+      {"slice", field(), "--cpu"},
+      {"slice", field(), "--cpu", "--color", "distance", "--transparent"},
+      {"render", field(), "--cpu"},
+      {"probe", field(), "--from", "-1,0,0", "--to", "1,0,0"}};
+  std::vector<std::string> kinds = {".svg"};
+  if (render::writesPdf()) kinds.emplace_back(".pdf");
+  for (const auto& command : commands)
+    for (const std::string& kind : kinds) {
+      std::vector<std::string> files;
+      for (const char* name : {"first", "second"}) {
+        std::vector<std::string> words = command;
+        words.insert(words.end(), {"-o", at(name + kind), "--size", "320x200", "--dpi", "192"});
+        const Outcome outcome = run({words});
+        ASSERT_EQ(outcome.status, 0) << outcome.err;
+        files.push_back(readFile(at(name + kind)));
+      }
+      EXPECT_EQ(files[0], files[1]) << command[0] << " writes other bytes each time";
+      EXPECT_THAT(files[0], StartsWith(kind == ".svg" ? "<svg" : "%PDF"));
+      if (kind == ".pdf") continue;
+      EXPECT_THAT(files[0], HasSubstr("width=\"320\" height=\"200\" viewBox=\"0 0 640 400\""));
+      EXPECT_THAT(files[0], HasSubstr("</text>"));
+    }
+}
+
+TEST_F(Pictures, theResolutionEnlargesPixels) {
+  const Outcome outcome =
+      run({{"slice", field(), "--cpu", "-o", at("s.png"), "--size", "320x200", "--dpi", "240", "--json"}});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(Json::parse(outcome.out).at("width"), 800);
+  EXPECT_EQ(render::loadPng(at("s.png")).height, 500);
+  expectRefused({{"slice", field(), "-o", at("s.csv"), "--dpi", "192"}}, "only pictures have dpi");
+  expectRefused({{"probe", field(), "--from", "0,0,0", "--to", "1,0,0", "-o", at("l.csv"), "--transparent"}},
+                "only a plot has transparent");
+  expectRefused({{"slice", field(), "-o", at("s.png"), "--size", "16000x9000", "--dpi", "960"}}, "out of range");
+  expectRefused({{"render", field(), "-o", at("s.gif")}}, "pictures are written as .png, .svg or .pdf");
 }
 
 TEST_F(Pictures, quantitiesColourSlicesAndSurfaces) {

@@ -5,20 +5,24 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <set>
+#include <string_view>
+#include <utility>
 
-#include "files/html_page.h"
+#include "hpsdf/render/vector_picture.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
 // The layout of a chart, in pixels.
-constexpr double kChartWidth = 960, kChartHeight = 440;
+constexpr int kChartWidth = 960, kChartHeight = 440;
 constexpr double kPlotLeft = 76, kPlotTop = 12, kPlotRight = 700, kPlotBottom = 384;
 constexpr double kLegendLeft = 724, kLegendLine = 20;
 constexpr std::size_t kLegendLetters = 30;
+constexpr render::Color kChartInk = {28, 32, 36};
 
 /// A logarithmic axis from `low` to `high`, drawn between the pixels `from` and `to`.
 struct LogAxis {
@@ -56,98 +60,153 @@ std::vector<double> ticksOf(const LogAxis& axis) {
   return ticks;
 }
 
-/// Returns a legend's text as SVG, cut off if it is too long. It is cut between characters of UTF-8, not within one.
+/// Returns a legend's text, cut off if it is too long. It is cut between characters of UTF-8, not within one.
 std::string legendText(const std::string& name) {
-  if (name.size() <= kLegendLetters) return htmlEscaped(name);
+  if (name.size() <= kLegendLetters) return name;
   std::size_t end = kLegendLetters - 1;
   while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xc0) == 0x80) --end;
-  return fmt::format("{}…<title>{}</title>", htmlEscaped(name.substr(0, end)), htmlEscaped(name));
+  return name.substr(0, end) + "…";
 }
 
-/// Returns the text of a tick, as SVG: 0.01, 5, 10⁻⁶.
+/// Returns a whole number in superscript digits.
+std::string superscript(int number) {
+  constexpr std::array kDigits = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  std::string text = number < 0 ? "⁻" : "";
+  for (const char digit : std::to_string(std::abs(number))) text += kDigits[std::size_t(digit - '0')];
+  return text;
+}
+
+/// Returns the text of a tick: 0.01, 5, 10⁻⁶.
 std::string tickText(double tick) {
   const int power = int(std::floor(std::log10(tick) + 1e-9));
   const long factor = std::lround(tick / std::pow(10, power));
   if (power >= -2 && power <= 3) return fmt::format("{:.6g}", tick);
-  return fmt::format("{}10<tspan dy=\"-5\" font-size=\"9\">{}</tspan>", factor == 1 ? "" : fmt::format("{}·", factor),
-                     power);
+  return fmt::format("{}10{}", factor == 1 ? "" : fmt::format("{}·", factor), superscript(power));
 }
 
-std::string lineSvg(double x0, double y0, double x1, double y1, const char* style) {
-  return fmt::format("<path d=\"M{:.2f} {:.2f}L{:.2f} {:.2f}\" {}/>\n", x0, y0, x1, y1, style);
+/// Returns the colour "#rrggbb".
+render::Color colorOf(const std::string& text) {
+  const auto bits = static_cast<std::uint32_t>(std::stoul(text.substr(1), nullptr, 16));
+  return {std::uint8_t(bits >> 16), std::uint8_t(bits >> 8 & 0xff), std::uint8_t(bits & 0xff)};
 }
 
-std::string textSvg(double x, double y, const char* anchor, const std::string& svg) {
-  return fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"{}\" fill=\"currentColor\">{}</text>\n", x, y,
-                     anchor, svg);
-}
+/// Draws a chart as shapes.
+class ChartDrawing {
+ public:
+  explicit ChartDrawing(const Chart& chart)
+      : chart_(chart), x_(axisFor(chart, 0, kPlotLeft, kPlotRight)), y_(axisFor(chart, 1, kPlotBottom, kPlotTop)) {}
 
-std::string axesSvg(const Chart& chart, const LogAxis& x, const LogAxis& y) {
-  constexpr const char* kGrid = "stroke=\"currentColor\" stroke-opacity=\"0.16\"";
-  std::string svg;
-  for (const double tick : ticksOf(x)) {
-    svg += lineSvg(x.at(tick), kPlotTop, x.at(tick), kPlotBottom, kGrid);
-    svg += textSvg(x.at(tick), kPlotBottom + 20, "middle", tickText(tick));
+  render::VectorPicture picture() {
+    addAxes();
+    for (const ChartCurve& curve : chart_.curves) addCurve(curve);
+    addLegend();
+    render::VectorPicture result{kChartWidth, kChartHeight};
+    result.layers.push_back(std::move(layer_));
+    return result;
   }
-  for (const double tick : ticksOf(y)) {
-    svg += lineSvg(kPlotLeft, y.at(tick), kPlotRight, y.at(tick), kGrid);
-    svg += textSvg(kPlotLeft - 8, y.at(tick) + 4, "end", tickText(tick));
-  }
-  svg += fmt::format(
-      "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"currentColor\" "
-      "stroke-opacity=\"0.6\"/>\n",
-      kPlotLeft, kPlotTop, kPlotRight - kPlotLeft, kPlotBottom - kPlotTop);
-  svg += textSvg((kPlotLeft + kPlotRight) / 2, kPlotBottom + 46, "middle", htmlEscaped(chart.xLabel));
-  const double middle = (kPlotTop + kPlotBottom) / 2;
-  return svg + fmt::format(
-                   "<text transform=\"translate(16 {:.2f}) rotate(-90)\" text-anchor=\"middle\" "
-                   "fill=\"currentColor\">{}</text>\n",
-                   middle, htmlEscaped(chart.yLabel));
-}
 
-std::string curveSvg(const ChartCurve& curve, const LogAxis& x, const LogAxis& y) {
-  std::string line, marks;
-  for (const auto& [px, py] : curve.points) {
-    if (!(px > 0 && py > 0)) continue;
-    line += fmt::format("{}{:.2f} {:.2f}", line.empty() ? "M" : "L", x.at(px), y.at(py));
-    marks +=
-        fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2.6\" fill=\"{}\"><title>{}: {}, {}</title></circle>\n",
-                    x.at(px), y.at(py), curve.color, htmlEscaped(curve.name), shortNumber(px), shortNumber(py));
-  }
-  return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}/>\n{}", line, curve.color,
-                     curve.dashed ? " stroke-dasharray=\"6 4\" stroke-opacity=\"0.8\"" : "", marks);
-}
+ private:
+  static constexpr double kTextSize = 12;
 
-std::string legendSvg(const Chart& chart) {
-  std::string svg;
-  double y = kPlotTop + 12;
-  const auto entry = [&](const std::string& name, const std::string& color, bool dashed) {
-    svg += lineSvg(
-        kLegendLeft, y - 4, kLegendLeft + 26, y - 4,
-        fmt::format("stroke=\"{}\" stroke-width=\"2.5\"{}", color, dashed ? " stroke-dasharray=\"6 4\"" : "").c_str());
-    svg += textSvg(kLegendLeft + 34, y, "start", legendText(name));
-    y += kLegendLine;
-  };
-  std::set<std::string> named;
-  for (const ChartCurve& curve : chart.curves)
-    if (named.insert(curve.name).second) entry(curve.name, curve.color, false);
-  y += kLegendLine / 2;
-  if (!chart.solid.empty()) entry(chart.solid, "currentColor", false);
-  if (!chart.dashed.empty()) entry(chart.dashed, "currentColor", true);
-  return svg;
-}
+  void line(double x0, double y0, double x1, double y1, render::Color color, double width, double opacity,
+            std::vector<double> dashes = {}) {
+    layer_.shapes.emplace_back(render::StrokedShape{.lines = {{{x0, y0}, {x1, y1}}},
+                                                    .width = width,
+                                                    .color = color,
+                                                    .opacity = opacity,
+                                                    .dashes = std::move(dashes)});
+  }
+
+  void text(double x, double y, render::TextAnchor anchor, const std::string& shown, double rotation = 0,
+            const std::string& title = {}) {
+    layer_.shapes.emplace_back(render::TextShape{shown, kTextSize, {x, y}, kChartInk, anchor, rotation, title});
+  }
+
+  void addAxes() {
+    using enum render::TextAnchor;
+    constexpr double kGridOpacity = 0.16, kFrameOpacity = 0.6;
+    for (const double tick : ticksOf(x_)) {
+      line(x_.at(tick), kPlotTop, x_.at(tick), kPlotBottom, kChartInk, 1, kGridOpacity);
+      text(x_.at(tick), kPlotBottom + 20, middle, tickText(tick));
+    }
+    for (const double tick : ticksOf(y_)) {
+      line(kPlotLeft, y_.at(tick), kPlotRight, y_.at(tick), kChartInk, 1, kGridOpacity);
+      text(kPlotLeft - 8, y_.at(tick) + 4, end, tickText(tick));
+    }
+    layer_.shapes.emplace_back(render::StrokedShape{{{{kPlotLeft, kPlotTop},
+                                                      {kPlotRight, kPlotTop},
+                                                      {kPlotRight, kPlotBottom},
+                                                      {kPlotLeft, kPlotBottom},
+                                                      {kPlotLeft, kPlotTop}}},
+                                                    1,
+                                                    kChartInk,
+                                                    kFrameOpacity});
+    text((kPlotLeft + kPlotRight) / 2, kPlotBottom + 46, middle, chart_.xLabel);
+    text(16, (kPlotTop + kPlotBottom) / 2, middle, chart_.yLabel, 90);
+  }
+
+  void addCurve(const ChartCurve& curve) {
+    const render::Color color = colorOf(curve.color);
+    render::StrokedShape drawn{.lines = {{}}, .width = 2, .color = color};
+    if (curve.dashed) {
+      drawn.opacity = 0.8;
+      drawn.dashes = kDashes;
+    }
+    std::vector<render::VectorShape> marks;
+    for (const auto& [px, py] : curve.points) {
+      if (!(px > 0 && py > 0)) continue;
+      const Eigen::Vector2d at(x_.at(px), y_.at(py));
+      drawn.lines[0].push_back(at);
+      marks.emplace_back(
+          render::StrokedShape{.lines = {{at}},
+                               .width = 5.2,
+                               .color = color,
+                               .round = true,
+                               .title = fmt::format("{}: {}, {}", curve.name, shortNumber(px), shortNumber(py))});
+    }
+    if (marks.empty()) return;
+    layer_.shapes.emplace_back(std::move(drawn));
+    layer_.shapes.insert(layer_.shapes.end(), marks.begin(), marks.end());
+  }
+
+  void addLegend() {
+    double y = kPlotTop + 12;
+    const auto entry = [&](const std::string& name, render::Color color, bool dashed) {
+      line(kLegendLeft, y - 4, kLegendLeft + 26, y - 4, color, 2.5, 1, dashed ? kDashes : std::vector<double>());
+      const std::string shown = legendText(name);
+      text(kLegendLeft + 34, y, render::TextAnchor::start, shown, 0, shown == name ? "" : name);
+      y += kLegendLine;
+    };
+    std::set<std::string> named;
+    for (const ChartCurve& curve : chart_.curves)
+      if (named.insert(curve.name).second) entry(curve.name, colorOf(curve.color), false);
+    y += kLegendLine / 2;
+    if (!chart_.solid.empty()) entry(chart_.solid, kChartInk, false);
+    if (!chart_.dashed.empty()) entry(chart_.dashed, kChartInk, true);
+  }
+
+  const std::vector<double> kDashes = {6, 4};
+  const Chart& chart_;
+  LogAxis x_, y_;
+  render::VectorLayer layer_;
+};
 
 }  // namespace
 
+std::vector<std::string> writeChart(OutputFolder& folder, const std::string& name, const Chart& chart) {
+  const render::VectorPicture picture = ChartDrawing(chart).picture();
+  std::vector<std::string> files = {name + ".svg"};
+  folder.write(files.back(), svgBytes(picture));
+  if (!render::writesPdf()) return files;
+  files.push_back(name + ".pdf");
+  folder.write(files.back(), pdfBytes(picture));
+  return files;
+}
+
 std::string chartSvg(const Chart& chart) {
-  const LogAxis x = axisFor(chart, 0, kPlotLeft, kPlotRight), y = axisFor(chart, 1, kPlotBottom, kPlotTop);
-  std::string svg = fmt::format(
-      "<svg class=\"chart\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"DejaVu Sans, sans-serif\" font-size=\"12\">\n",
-      kChartWidth, kChartHeight);
-  svg += axesSvg(chart, x, y);
-  for (const ChartCurve& curve : chart.curves) svg += curveSvg(curve, x, y);
-  return svg + legendSvg(chart) + "</svg>\n";
+  const std::string svg = svgBytes(ChartDrawing(chart).picture(), kChartInk);
+  constexpr std::string_view kTag = "<svg";
+  return std::string(kTag) + " class=\"chart\"" + svg.substr(kTag.size());
 }
 
 std::string curveColor(std::size_t index) {

@@ -1,9 +1,11 @@
 #pragma once
-// Draws curves over two logarithmic axes as SVG, for HTML pages and as a file of its own.
+// Draws curves over two logarithmic axes, for HTML pages and as files of their own.
 
 #include <array>
 #include <string>
 #include <vector>
+
+#include "files/output_folder.h"
 
 namespace hpsdf::app {
 
@@ -19,6 +21,9 @@ struct Chart {
   std::string solid, dashed;   ///< meanings of solid and of dashed curves; "" if there are none
   std::vector<ChartCurve> curves = {};
 };
+
+/// Writes the chart as NAME.svg and, if this build writes PDF files, as NAME.pdf. Returns the names of the files.
+std::vector<std::string> writeChart(OutputFolder& folder, const std::string& name, const Chart& chart);
 
 /// Returns the chart as an SVG element. Axes and texts have the colour of the text around the element.
 std::string chartSvg(const Chart& chart);

@@ -8,12 +8,14 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
 #include "construction/build_field.h"
 #include "files/other_program.h"
 #include "files/output_folder.h"
+#include "files/svg_chart.h"
 #include "files/text_file.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/output_file.h"
@@ -183,6 +185,26 @@ std::string textOf(const Json& mesh) {
   return text;
 }
 
+/// Returns the chart of the measured errors of a mesh, for papers.
+Chart convergenceChart(const Json& mesh) {
+  Chart chart{.xLabel = "coefficients",
+              .yLabel = "error, where the longest side is 2",
+              .solid = "measured RMS",
+              .dashed = "measured maximum"};
+  for (const auto& [strategy, stages] : mesh["curves"].items()) {
+    ChartCurve rms{.name = strategy, .color = kCurveColors[chart.curves.size() / 2]}, greatest = rms;
+    greatest.dashed = true;
+    for (const Json& stage : stages) {
+      const double coefficients = numberIn(stage, "coefficients");
+      rms.points.push_back({coefficients, numberIn(stage, "measured_rms")});
+      greatest.points.push_back({coefficients, numberIn(stage, "measured_max")});
+    }
+    chart.curves.push_back(std::move(rms));
+    chart.curves.push_back(std::move(greatest));
+  }
+  return chart;
+}
+
 /// Returns the gnuplot script that draws the curves of a mesh. The data of the n-th curve are the n-th block of
 /// the file plot.dat.
 std::string plotScript(const Json& mesh) {
@@ -257,7 +279,12 @@ void runConvergence(Session& session, const Arguments& arguments) {
     files.push_back((folder.path() / file).string());
   };
   write("convergence.csv", csvOf(meshes));
-  for (std::size_t n = 0; n < pictures.size(); ++n) write(fmt::format("convergence-{}.png", names[n]), pictures[n]);
+  for (std::size_t n = 0; n < pictures.size(); ++n) {
+    const std::string name = "convergence-" + names[n];
+    write(name + ".png", pictures[n]);
+    for (const std::string& file : writeChart(folder, name, convergenceChart(meshes[n])))
+      files.push_back((folder.path() / file).string());
+  }
   files.push_back((folder.path() / "convergence.json").string());
   const Json json = {{"points", static_cast<std::uint64_t>(arguments.number("points"))},
                      {"seed", static_cast<std::uint64_t>(arguments.number("seed"))},
@@ -292,7 +319,7 @@ Study convergenceStudy() {
 error over the number of coefficients, for hp and for plain octrees of degree 2 and 1 (the paper's Figs. 3 and 4), each
 curve from one construction. The weighted estimate of the construction stands beside RMS error and maximum measured at
 random points, whose exact distances are taken once. Errors are at the scale where the mesh's longest side is 2. Writes
-convergence.csv, convergence.json and, with gnuplot, a picture of each mesh; tells how many coefficients each strategy
+convergence.csv, convergence.json and, with gnuplot, a picture of each mesh, also for papers as .svg and .pdf; tells how many coefficients each strategy
 needs for the same measured RMS error.)"),
       .parameters =
           joined({{{"at", number().above(0),

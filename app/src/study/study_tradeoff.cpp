@@ -274,8 +274,7 @@ std::string tradeoffText(const Tradeoff& tradeoff) {
 }
 
 /// Returns the chart of the errors over a cost, such as bytes.
-std::string tradeoffChart(const Tradeoff& tradeoff, const std::string& costLabel,
-                          double (*cost)(const TradeoffPoint&)) {
+Chart tradeoffChart(const Tradeoff& tradeoff, const std::string& costLabel, double (*cost)(const TradeoffPoint&)) {
   using Error = Measurement::Error;
   const std::pair<const char*, Error Measurement::*> kinds[] = {{"near the surface", &Measurement::near},
                                                                 {"over the domain", &Measurement::domain}};
@@ -294,7 +293,15 @@ std::string tradeoffChart(const Tradeoff& tradeoff, const std::string& costLabel
       chart.curves.push_back(std::move(*curve));
     }
   }
-  return chartSvg(chart);
+  return chart;
+}
+
+Chart memoryChart(const Tradeoff& tradeoff) {
+  return tradeoffChart(tradeoff, "memory [bytes]", [](const TradeoffPoint& p) { return double(p.counts.bytes); });
+}
+
+Chart timeChart(const Tradeoff& tradeoff) {
+  return tradeoffChart(tradeoff, "time of the construction [s]", [](const TradeoffPoint& p) { return p.seconds; });
 }
 
 constexpr std::string_view kTradeoffStyle = R"(
@@ -322,9 +329,7 @@ std::string tradeoffSection(const Tradeoff& tradeoff) {
       tradeoff.range.isOfTolerances() ? " A tolerance is kept if no cell and no point misses it." : "");
   if (!tradeoff.recommendation.empty()) html += fmt::format("<p>{}</p>\n", htmlEscaped(tradeoff.recommendation));
   if (tradeoff.recommended) html += fmt::format("<code>{}</code>\n", htmlEscaped(tradeoff.best()->command));
-  html += tradeoffChart(tradeoff, "memory [bytes]", [](const TradeoffPoint& p) { return double(p.counts.bytes); });
-  return html +
-         tradeoffChart(tradeoff, "time of the construction [s]", [](const TradeoffPoint& p) { return p.seconds; });
+  return html + chartSvg(memoryChart(tradeoff)) + chartSvg(timeChart(tradeoff));
 }
 
 std::string tradeoffHtml(const std::vector<Tradeoff>& tradeoffs) {
@@ -352,6 +357,10 @@ void runTradeoff(Session& session, const Arguments& arguments) {
   folder.write("tradeoff.csv", tradeoffCsv(tradeoffs));
   folder.write("tradeoff.json", jsonText(json));
   folder.write("index.html", tradeoffHtml(tradeoffs));
+  for (std::size_t n = 0; n < tradeoffs.size(); ++n) {
+    writeChart(folder, names[n] + "-memory", memoryChart(tradeoffs[n]));
+    writeChart(folder, names[n] + "-time", timeChart(tradeoffs[n]));
+  }
   folder.commit();
   json["page"] = (folder.path() / "index.html").string();
   if (session.wantsJson(arguments)) return printJson(session.console().out, json);
@@ -383,8 +392,8 @@ bytes, time and measured errors of a mesh's fields for a range of tolerances, or
 --tolerance, or the --target-error, of 'hpsdf build' for a mesh. With --budget or --within-seconds it names the most exact field of the range that keeps them, and
 the command that builds it; the field with the least RMS error near the surface is the most exact. The column "kept" says
 whether a tolerance was kept by all cells and at all points. Half of the points at
-which errors are measured lie near the surface. Writes index.html with the table and the curves, tradeoff.csv and
-tradeoff.json.)"),
+which errors are measured lie near the surface. Writes index.html with the table and the curves, tradeoff.csv, tradeoff.json,
+and the curves of each mesh for papers: NAME-memory and NAME-time as .svg and .pdf.)"),
       .parameters = joined(
           {{{"tolerances", text("TOLERANCE,…").byDefault("2%,1%,0.5%,0.2%,0.1%"),
              "The tolerances of the range, as lengths or as percentages of the mesh's longest side. Each makes a field "

@@ -25,7 +25,8 @@ std::vector<Color> barOf(const std::function<LinearColor(double)>& colorAt) {
 }
 
 /// Replaces the value of each sample by the greatest value among the samples of its cell. Ignores values that are NaN.
-void spreadOverCells(const ViewBuffers& buffers, std::vector<float>& values) {
+/// Returns these values of the cells.
+std::unordered_map<std::uint32_t, float> spreadOverCells(const ViewBuffers& buffers, std::vector<float>& values) {
   std::unordered_map<std::uint32_t, float> greatest;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!buffers.hit(i) || std::isnan(values[i])) continue;
@@ -34,6 +35,7 @@ void spreadOverCells(const ViewBuffers& buffers, std::vector<float>& values) {
   }
   for (std::size_t i = 0; i < values.size(); ++i)
     if (const auto found = greatest.find(buffers.cell[i]); found != greatest.end()) values[i] = found->second;
+  return greatest;
 }
 
 ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field, const ViewBuffers& buffers,
@@ -41,7 +43,8 @@ ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field,
                        const ReferenceData& reference) {
   std::vector<double> ofCells = quantityOfCells(field, quantity, reference);
   std::vector<float> values = quantityOfSamples(field, buffers, pointAt, quantity, reference, ofCells);
-  if (options.perCell) spreadOverCells(buffers, values);
+  std::unordered_map<std::uint32_t, float> greatest;
+  if (options.perCell) greatest = spreadOverCells(buffers, values);
   const ColorScale scale = colorScale(options, field, ofCells, values);
   const std::span<const std::string> titles = titlesOf(quantity);
   addScaleBar(overlay, frame, titles, scale);
@@ -53,7 +56,12 @@ ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field,
     key.legend.marks.push_back({scale.fraction(value), formatNumber(value, 3)});
   key.scale.limits = {scale.low(), scale.high()};
   key.color = quantityColors(std::move(values), scale);
-  if (!ofCells.empty())
+  if (options.perCell)
+    key.cellColor = [greatest = std::move(greatest), scale](const Cell& cell) {
+      const auto found = greatest.find(cell.id);  // a cell may be too small for any sample
+      return scale(found == greatest.end() ? 0 : found->second);
+    };
+  else if (!ofCells.empty())
     key.cellColor = [ofCells = std::move(ofCells), scale](const Cell& cell) { return scale(float(ofCells[cell.id])); };
   return key;
 }

@@ -211,6 +211,83 @@ void addFieldFacts(Overlay& overlay, const Frame& frame, const Field& field, con
   addShares(overlay, frame, next, "depths by volume", figures.depthVolume);
 }
 
+/// The colours of a slice: those of cells or samples, or those of distances.
+struct SliceColors {
+  ColorKey key = {};
+  std::optional<DistanceScale> distances = {};
+};
+
+/// Chooses the colours of a slice. Adds their legend to the overlay, and to `drawn` the legend, the scale and the first
+/// details of the caption.
+SliceColors sliceColors(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures,
+                        const SlicePicture& picture, const ReferenceData& reference, Drawn& drawn) {
+  const ViewBuffers& buffers = drawn.buffers;
+  const std::string plane = describePlane("slice", picture.plane);
+  SliceColors colors;
+  if (picture.color == ColorBy::distance) {
+    const DistanceScale scale = distanceScaleFor(buffers, picture.scale);
+    if (!drawn.scale.limits) drawn.scale.limits = {scale.minimum, scale.maximum};
+    addDistanceBar(overlay, frame, scale);
+    drawn.legend = distanceLegend(scale);
+    drawn.details = {"distance", plane, formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
+                     "lines every " + formatNumber(scale.step)};
+    colors.key.color = distanceColors(buffers, scale);
+    colors.distances = scale;
+    return colors;
+  }
+  colors.key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers), picture.color,
+                            picture.scale, reference);
+  drawn.legend = colors.key.legend;
+  drawn.scale = colors.key.scale;
+  drawn.details = {colors.key.name, plane};
+  if (!colors.key.range.empty()) drawn.details.push_back(colors.key.range);
+  return colors;
+}
+
+/// Returns the layers of a slice in a vector picture, without the legend and the caption. The colours of `slice` are
+/// those of `colors`.
+std::vector<VectorLayer> layersOfSlice(SliceContent slice, const SliceColors& colors, const std::vector<Arrow>& arrows,
+                                       const PictureForm& form, const ReferenceData& reference) {
+  slice.ground = finished(form, [&](const std::optional<Color>& paper) {
+    Sampling sampling = slice.sampling;
+    sampling.paper = paper;
+    return colorGround(slice.buffers, colors.key.color, sampling);
+  });
+  slice.cellColor = colors.key.cellColor;
+  slice.distances = colors.distances ? &*colors.distances : nullptr;
+  std::vector<VectorLayer> layers = sliceLayers(slice);
+  const int width = slice.ground.width, height = slice.ground.height;
+  const double lineWidth = slice.sampling.lineWidth;
+  const Eigen::AlignedBox2d window = areaOf({0, 0, width, height});
+  layers.push_back(
+      {"lines", sliceLineShapes(slice.field, slice.view, slice.section, width, height, reference, lineWidth), window});
+  layers.push_back({"arrows", arrowShapes(arrows, lineWidth), window});
+  return layers;
+}
+
+/// Chooses the colours of a surface. Adds their legend, or facts about the field, to the overlay, and to `drawn` the
+/// legend, the scale and the first details of the caption.
+SampleColor surfaceColors(Overlay& overlay, const Frame& frame, const Field& field, const FieldStatistics& figures,
+                          const SurfacePicture& picture, const ReferenceData& reference, const ViewBuffers& buffers,
+                          Drawn& drawn) {
+  const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
+  if (picture.color == ColorBy::normal) {
+    if (reference.defects)
+      addSwatches(overlay, frame, kDefectTitles, defectSwatches(*reference.defects));
+    else
+      addFieldFacts(overlay, frame, field, figures);
+    if (picture.surface) drawn.details.push_back(surface);
+    return {};
+  }
+  ColorKey key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers), picture.color,
+                              picture.scale, reference);
+  drawn.legend = key.legend;
+  drawn.scale = key.scale;
+  drawn.details.push_back(key.name + (picture.surface ? " on the " + surface : ""));
+  if (!key.range.empty()) drawn.details.push_back(key.range);
+  return std::move(key.color);
+}
+
 std::vector<LinearColor> materialsOf(const ShownBodies& shown) {
   std::vector<LinearColor> materials;
   for (const Body& body : shown.bodies) materials.push_back(decodeSrgb(body.color));
@@ -309,28 +386,10 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
 
   // Choose the colours and the legend, and collect the caption's details about the colours.
   const FieldStatistics figures = statistics(field);
-  const std::string plane = describePlane("slice", picture.plane);
   const std::vector<Legend::Line> lines = lineLegend(reference);
   Overlay overlay;
   addLineLegend(overlay, frame, lines);
-  ColorKey key;
-  std::optional<DistanceScale> distances;
-  if (picture.color == ColorBy::distance) {
-    distances = distanceScaleFor(buffers, picture.scale);
-    if (!drawn.scale.limits) drawn.scale.limits = {distances->minimum, distances->maximum};
-    addDistanceBar(overlay, frame, *distances);
-    drawn.legend = distanceLegend(*distances);
-    drawn.details = {"distance", plane, formatNumber(distances->minimum) + " to " + formatNumber(distances->maximum),
-                     "lines every " + formatNumber(distances->step)};
-    key.color = distanceColors(buffers, *distances);
-  } else {
-    key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers), picture.color,
-                       picture.scale, reference);
-    drawn.legend = key.legend;
-    drawn.scale = key.scale;
-    drawn.details = {key.name, plane};
-    if (!key.range.empty()) drawn.details.push_back(key.range);
-  }
+  const SliceColors colors = sliceColors(overlay, frame, field, figures, picture, reference, drawn);
   drawn.legend.lines = lines;
 
   // Add the axes and the caption to the overlay.
@@ -348,26 +407,20 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
     Image image(enlargedLength(picture.width, picture.form), enlargedLength(picture.height, picture.form),
                 paper.value_or(paperColor()));
     sampling.paper = paper;
-    pasteView(image, distances ? colorDistanceSlice(buffers, *distances, sampling)
-                               : colorCellSlice(buffers, key.color, sampling));
+    pasteView(image, colors.distances ? colorDistanceSlice(buffers, *colors.distances, sampling)
+                                      : colorCellSlice(buffers, colors.key.color, sampling));
     paintSliceLines(image, field, view, section, width, height, reference, sampling.lineWidth);
     addArrows(image, arrows, buffers, sampling);
     paint(image, overlay);
     return image;
   });
-  if (!picture.form.vectors) return drawn;
-  const Image ground = finished(picture.form, [&](const std::optional<Color>& paper) {
-    sampling.paper = paper;
-    return colorGround(buffers, key.color, sampling);
-  });
-  std::vector<VectorLayer> layers =
-      sliceLayers({field, view, buffers, sampling, section, key.cellColor, ground, distances ? &*distances : nullptr});
-  const Eigen::AlignedBox2d window = areaOf({0, 0, width, height});
-  layers.push_back(
-      {"lines", sliceLineShapes(field, view, section, width, height, reference, sampling.lineWidth), window});
-  layers.push_back({"arrows", arrowShapes(arrows, sampling.lineWidth), window});
-  layers.push_back(overlayLayer(overlay));
-  drawn.vectors = vectorPicture(drawn.image, picture.form, std::move(layers));
+  if (picture.form.vectors) {
+    sampling.paper = {};
+    std::vector<VectorLayer> layers =
+        layersOfSlice({field, view, buffers, sampling, section}, colors, arrows, picture.form, reference);
+    layers.push_back(overlayLayer(overlay));
+    drawn.vectors = vectorPicture(drawn.image, picture.form, std::move(layers));
+  }
   return drawn;
 }
 
@@ -390,31 +443,16 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
               .seen = scene.showsField(),
               .scale = picture.scale};
 
-  // Choose the colours and the legend, and collect the caption's details about the colours.
+  // Choose the colours and the legend.
   const FieldStatistics figures = statistics(field);
-  const std::string surface = picture.offset == 0 ? "surface" : "offset surface at " + formatNumber(picture.offset);
   Overlay overlay;
-  ColorKey key;
-  if (picture.color != ColorBy::normal) {
-    key = makeColorKey(overlay, frame, field, figures, buffers, pointsOf(drawn.view, buffers), picture.color,
-                       picture.scale, reference);
-    drawn.legend = key.legend;
-    drawn.scale = key.scale;
-    drawn.details.push_back(key.name + (picture.surface ? " on the " + surface : ""));
-    if (!key.range.empty()) drawn.details.push_back(key.range);
-  } else {
-    if (reference.defects)
-      addSwatches(overlay, frame, kDefectTitles, defectSwatches(*reference.defects));
-    else
-      addFieldFacts(overlay, frame, field, figures);
-    if (picture.surface) drawn.details.push_back(surface);
-  }
+  SampleColor color = surfaceColors(overlay, frame, field, figures, picture, reference, buffers, drawn);
 
   // Add the details about marks and scene, and the caption.
   if (picture.cracks) drawn.details.push_back(describeCracks(cracksOf(buffers, picture.offset, samples)));
   if (reference.defects) {
     drawn.legend.defects = defectLegend(*reference.defects);
-    for (const auto& [name, count, color] : drawn.legend.defects) drawn.details.push_back(name + ": " + count);
+    for (const auto& [name, count, shade] : drawn.legend.defects) drawn.details.push_back(name + ": " + count);
   }
   addSceneDetails(picture, drawn.details);
   addFieldDetails(field, figures, drawn.details);
@@ -424,12 +462,12 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   overlay = enlarged(std::move(overlay), picture.form.pixelRatio);
 
   // Draw the view with its marks and arrows, then the overlay.
-  const SurfaceLook look = lookOf(field, picture, scene, std::move(key.color));
+  const SurfaceLook look = lookOf(field, picture, scene, std::move(color));
   const std::vector<Arrow> arrows = arrowsOf(field, scene.view, buffers, picture);
   const Image shown = finished(picture.form, [&](const std::optional<Color>& paper) {
     Image image = backdropPicture(enlargedLength(picture.width, picture.form),
                                   enlargedLength(picture.height, picture.form), height);
-    if (paper) image = Image(image.width, image.height, *paper);
+    if (paper) image.pixels.assign(image.pixels.size(), *paper);
     sampling.paper = paper;
     pasteView(image, colorSurface(buffers, camera, look, sampling, picture.offset, scene.lines));
     if (picture.cracks) markCracks(image, buffers, sampling);

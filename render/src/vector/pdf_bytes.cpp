@@ -17,6 +17,7 @@ namespace hpsdf::render {
 namespace {
 
 constexpr double kPointsPerInch = 72;
+constexpr double kRasterMargin = 0.01;  // pixels
 
 using CairoSurface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
 using CairoContext = std::unique_ptr<cairo_t, decltype(&cairo_destroy)>;
@@ -107,6 +108,8 @@ class PdfPainter {
     cairo_save(context_);
     cairo_translate(context_, shape.position.x(), shape.position.y());
     cairo_rotate(context_, -shape.rotation * M_PI / 180);
+    const double share = shape.anchor == TextAnchor::start ? 0 : shape.anchor == TextAnchor::middle ? 0.5 : 1;
+    cairo_translate(context_, -share * advanceOf(shape.text, shape.size), 0);
     cairo_set_font_size(context_, shape.size);
     setColor(shape.color, 1);
     cairo_show_text_glyphs(context_, text.data(), int(text.size()), glyphs.data(), int(glyphs.size()), clusters.data(),
@@ -129,10 +132,12 @@ class PdfPainter {
     }
     cairo_surface_mark_dirty(surface.get());
     cairo_save(context_);
-    cairo_translate(context_, shape.box.min().x(), shape.box.min().y());
-    cairo_scale(context_, shape.box.sizes().x() / image.width, shape.box.sizes().y() / image.height);
+    // Poppler widens a picture that ends where a pixel begins by this pixel, and so scales the whole picture.
+    const Eigen::Vector2d least = shape.box.min().array() + kRasterMargin,
+                          size = shape.box.max().array() - kRasterMargin - least.array();
+    cairo_translate(context_, least.x(), least.y());
+    cairo_scale(context_, size.x() / image.width, size.y() / image.height);
     cairo_set_source_surface(context_, surface.get(), 0, 0);
-    cairo_pattern_set_filter(cairo_get_source(context_), CAIRO_FILTER_NEAREST);
     cairo_paint(context_);
     cairo_restore(context_);
   }
@@ -151,7 +156,7 @@ class PdfPainter {
 
 }  // namespace
 
-void requirePdf() {}
+bool writesPdf() { return true; }
 
 std::string pdfBytes(const VectorPicture& picture) {
   std::string bytes;

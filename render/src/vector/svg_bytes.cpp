@@ -137,40 +137,63 @@ std::string opacityText(std::string_view name, double opacity) {
   return opacity < 1 ? attribute(name, opacity) : std::string();
 }
 
-std::string svgOf(const FilledShape& shape) {
-  return "<path" + attribute("fill", colorText(shape.color)) + opacityText("fill-opacity", shape.opacity) +
-         pathData(shape.borders) + "/>\n";
-}
+/// Writes shapes as SVG elements.
+class SvgWriter {
+ public:
+  explicit SvgWriter(std::optional<Color> ink) : ink_(ink) {}
 
-std::string svgOf(const StrokedShape& shape) {
-  std::string style = attribute("fill", std::string("none")) + attribute("stroke", colorText(shape.color)) +
-                      attribute("stroke-width", shape.width) + opacityText("stroke-opacity", shape.opacity);
-  if (shape.round) style += R"( stroke-linecap="round" stroke-linejoin="round")";
-  if (!shape.dashes.empty()) {
-    std::string lengths;
-    for (const double length : shape.dashes) lengths += (lengths.empty() ? "" : " ") + numberText(length);
-    style += attribute("stroke-dasharray", lengths);
+  std::string operator()(const FilledShape& shape) const {
+    return "<path" + attribute("fill", paint(shape.color)) + opacityText("fill-opacity", shape.opacity) +
+           pathData(shape.borders) + "/>\n";
   }
-  return "<path" + style + pathData(shape.lines) + "/>\n";
-}
 
-std::string svgOf(const TextShape& shape) {
-  std::string text;
-  for (const Glyph& glyph : glyphsOf(shape.text, shape.size)) text += glyph.text;
-  std::string place = attribute("x", shape.position.x()) + attribute("y", shape.position.y());
-  if (shape.rotation != 0)
-    place += attribute("transform", "rotate(" + numberText(-shape.rotation) + " " + numberText(shape.position.x()) +
-                                        " " + numberText(shape.position.y()) + ")");
-  return "<text" + place + attribute("font-size", shape.size) + attribute("fill", colorText(shape.color)) + ">" +
-         escaped(text) + "</text>\n";
-}
+  std::string operator()(const StrokedShape& shape) const {
+    std::string style = attribute("fill", std::string("none")) + attribute("stroke", paint(shape.color)) +
+                        attribute("stroke-width", shape.width) + opacityText("stroke-opacity", shape.opacity);
+    if (shape.round) style += R"( stroke-linecap="round" stroke-linejoin="round")";
+    if (!shape.dashes.empty()) {
+      std::string lengths;
+      for (const double length : shape.dashes) lengths += (lengths.empty() ? "" : " ") + numberText(length);
+      style += attribute("stroke-dasharray", lengths);
+    }
+    const std::string element = "<path" + style + pathData(shape.lines);
+    return shape.title.empty() ? element + "/>\n" : element + ">" + titleText(shape.title) + "</path>\n";
+  }
 
-std::string svgOf(const RasterShape& shape) {
-  return "<image" + attribute("x", shape.box.min().x()) + attribute("y", shape.box.min().y()) +
-         attribute("width", shape.box.sizes().x()) + attribute("height", shape.box.sizes().y()) +
-         attribute("preserveAspectRatio", std::string("none")) +
-         attribute("href", "data:image/png;base64," + base64(pngBytes(shape.image))) + "/>\n";
-}
+  std::string operator()(const TextShape& shape) const {
+    const double x = shape.position.x(), y = shape.position.y();
+    std::string place = attribute("x", x) + attribute("y", y);
+    if (shape.anchor != TextAnchor::start)
+      place += attribute("text-anchor", std::string(shape.anchor == TextAnchor::middle ? "middle" : "end"));
+    if (shape.rotation != 0)
+      place += attribute("transform",
+                         "rotate(" + numberText(-shape.rotation) + " " + numberText(x) + " " + numberText(y) + ")");
+    return "<text" + place + attribute("font-size", shape.size) + attribute("fill", paint(shape.color)) + ">" +
+           escaped(lettersOf(shape.text)) + (shape.title.empty() ? std::string() : titleText(shape.title)) +
+           "</text>\n";
+  }
+
+  std::string operator()(const RasterShape& shape) const {
+    return "<image" + attribute("x", shape.box.min().x()) + attribute("y", shape.box.min().y()) +
+           attribute("width", shape.box.sizes().x()) + attribute("height", shape.box.sizes().y()) +
+           attribute("preserveAspectRatio", std::string("none")) +
+           attribute("href", "data:image/png;base64," + base64(pngBytes(shape.image))) + "/>\n";
+  }
+
+ private:
+  std::string paint(Color color) const { return color == ink_ ? "currentColor" : colorText(color); }
+
+  /// Returns a text whose letters XML allows.
+  static std::string lettersOf(const std::string& text) {
+    std::string letters;
+    for (const Glyph& glyph : glyphsOf(text, 1)) letters += glyph.text;
+    return letters;
+  }
+
+  static std::string titleText(const std::string& title) { return "<title>" + escaped(lettersOf(title)) + "</title>"; }
+
+  std::optional<Color> ink_;
+};
 
 std::string clipText(const std::string& name, const Eigen::AlignedBox2d& box) {
   return "<clipPath" + attribute("id", name) + "><rect" + attribute("x", box.min().x()) +
@@ -180,7 +203,8 @@ std::string clipText(const std::string& name, const Eigen::AlignedBox2d& box) {
 
 }  // namespace
 
-std::string svgBytes(const VectorPicture& picture) {
+std::string svgBytes(const VectorPicture& picture, std::optional<Color> ink) {
+  const SvgWriter write(ink);
   const double cssPixels = kScreenDpi / picture.dpi;  // an inch has 96 CSS pixels
   std::string svg =
       "<svg xmlns=\"http://www.w3.org/2000/svg\"" + attribute("width", picture.width * cssPixels) +
@@ -191,10 +215,9 @@ std::string svgBytes(const VectorPicture& picture) {
     if (layer.shapes.empty()) continue;
     const std::string clip = layer.name + "-clip";
     if (layer.clip) svg += clipText(clip, *layer.clip);
-    svg += "<g" + attribute("id", layer.name) +
+    svg += "<g" + (layer.name.empty() ? std::string() : attribute("id", layer.name)) +
            (layer.clip ? attribute("clip-path", "url(#" + clip + ")") : std::string()) + ">\n";
-    for (const VectorShape& shape : layer.shapes)
-      svg += std::visit([](const auto& ofKind) { return svgOf(ofKind); }, shape);
+    for (const VectorShape& shape : layer.shapes) svg += std::visit(write, shape);
     svg += "</g>\n";
   }
   return svg + "</svg>\n";

@@ -16,6 +16,12 @@ bool endsIn(const std::filesystem::path& file, std::string_view wanted) {
 
 }  // namespace
 
+void requirePdf() {
+  if (!writesPdf())
+    throw Error(
+        "this build writes no PDF files, because libcairo2-dev was not there when it was built; name an .svg file");
+}
+
 bool isVectorFile(const std::filesystem::path& file) { return endsIn(file, ".svg") || endsIn(file, ".pdf"); }
 
 void saveVectorPicture(const VectorPicture& picture, const std::filesystem::path& file) {

@@ -2,6 +2,7 @@
 // Vector pictures for papers, and their SVG and PDF files.
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -31,15 +32,21 @@ struct StrokedShape {
   double opacity = 1;
   bool round = false;               ///< round ends and corners, instead of square ones
   std::vector<double> dashes = {};  ///< lengths of dashes and gaps by turns, pixels; empty for solid lines
+  std::string title = {};           ///< what browsers show while the pointer is over the lines
 };
+
+/// The part of a text that lies at its position.
+enum class TextAnchor : std::uint8_t { start, middle, end };
 
 /// A line of text in DejaVu Sans.
 struct TextShape {
   std::string text;          ///< UTF-8
   double size;               ///< the em, pixels
-  Eigen::Vector2d position;  ///< left end of the baseline
+  Eigen::Vector2d position;  ///< a point of the baseline
   Color color;
-  double rotation = 0;  ///< degrees counter-clockwise about `position`
+  TextAnchor anchor = TextAnchor::start;
+  double rotation = 0;     ///< degrees counter-clockwise about `position`
+  std::string title = {};  ///< what browsers show while the pointer is over the text
 };
 
 /// A picture of pixels that is scaled to a rectangle.
@@ -52,7 +59,7 @@ using VectorShape = std::variant<FilledShape, StrokedShape, TextShape, RasterSha
 
 /// Shapes that belong together, in the order in which they are painted.
 struct VectorLayer {
-  std::string name;  ///< a word that names the layer in an SVG file
+  std::string name;  ///< a word that names the layer in an SVG file; may be empty if there is no clip
   std::vector<VectorShape> shapes = {};
   std::optional<Eigen::AlignedBox2d> clip = {};  ///< the part of the picture that the shapes may cover
 };
@@ -66,14 +73,17 @@ struct VectorPicture {
 };
 
 /// Returns the picture as the text of an SVG file. Its texts name the font DejaVu Sans. The bytes depend on nothing but
-/// the picture.
-std::string svgBytes(const VectorPicture& picture);
+/// the arguments. In an HTML page, shapes of the colour `ink` have the colour of the text around the picture.
+std::string svgBytes(const VectorPicture& picture, std::optional<Color> ink = {});
 
 /// Returns the picture as the bytes of a PDF file, into which the letters that occur are embedded. The bytes depend on
 /// nothing but the picture. Throws `Error` if the library was built without cairo.
 std::string pdfBytes(const VectorPicture& picture);
 
-/// Throws `Error` if the library was built without cairo, and therefore cannot write PDF files.
+/// Returns true if the library was built with cairo, and therefore can write PDF files.
+bool writesPdf();
+
+/// Throws `Error` unless `writesPdf()` is true.
 void requirePdf();
 
 /// Returns true if the file's extension is that of a vector picture, .svg or .pdf.
