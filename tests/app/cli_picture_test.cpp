@@ -116,7 +116,7 @@ TEST_F(Pictures, theResolutionEnlargesPixels) {
   expectRefused({{"slice", field(), "-o", at("s.csv"), "--dpi", "192"}}, "only pictures have dpi");
   expectRefused({{"probe", field(), "--from", "0,0,0", "--to", "1,0,0", "-o", at("l.csv"), "--transparent"}},
                 "only a plot has transparent");
-  expectRefused({{"slice", field(), "-o", at("s.png"), "--size", "16000x9000", "--dpi", "960"}}, "out of range");
+  expectRefused({{"slice", field(), "-o", at("s.png"), "--size", "1600x900", "--dpi", "2400"}}, "out of range");
   expectRefused({{"render", field(), "-o", at("s.gif")}}, "pictures are written as .png, .svg or .pdf");
 }
 

@@ -112,7 +112,9 @@ void report(Session& session, const Arguments& arguments, const Line& line, std:
 render::DrawnLine drawnLine(const Field& field, const Line& line, std::span<const double> exact,
                             const Arguments& arguments) {
   const auto [width, height] = arguments.size("size");
-  return render::drawLine(field, line, exact, width, height, pictureForm(arguments));
+  render::PictureForm form = pictureForm(arguments);
+  form.vectors = render::isVectorFile(arguments.text("output"));
+  return render::drawLine(field, line, exact, width, height, form);
 }
 
 render::Image drawProbe(Session& session, const Arguments& arguments) {

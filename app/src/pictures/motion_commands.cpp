@@ -26,9 +26,9 @@ std::vector<Parameter> filmParameters(const std::string& frames, const std::stri
           {"fps", number().within(0.1, 240).byDefault("12"), "Frames a second of an .mp4."}};
 }
 
-/// Returns the parameters of a command that draws, without those for its files, for JSON and for single pictures.
+/// Returns the parameters of a command that draws, without the parameters for its files and for JSON.
 std::vector<Parameter> drawingParameters(const Registry& registry, std::string_view command) {
-  return without({"field", "output", "json", "dpi", "transparent"}, registry.command(command).parameters);
+  return without({"field", "output", "json"}, registry.command(command).parameters);
 }
 
 /// Moves the finished film to its output and reports it to the user.

@@ -381,10 +381,7 @@ std::vector<Parameter> formParameters() {
 }
 
 render::PictureForm pictureForm(const Arguments& arguments) {
-  if (!arguments.has("dpi")) return {};  // a frame of a film
-  return {.pixelRatio = arguments.number("dpi") / render::kScreenDpi,
-          .transparent = arguments.flag("transparent"),
-          .vectors = arguments.has("output") && render::isVectorFile(arguments.text("output"))};
+  return {.pixelRatio = arguments.number("dpi") / render::kScreenDpi, .transparent = arguments.flag("transparent")};
 }
 
 void reportPicture(Session& session, const Arguments& arguments, const std::string& file, int width, int height,

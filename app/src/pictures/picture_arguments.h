@@ -114,8 +114,7 @@ void savePicture(const render::Image& image, const render::VectorPicture& vector
 /// Returns the parameters that tell how many pixels make an inch, and whether the background is left out.
 std::vector<Parameter> formParameters();
 
-/// Returns the form of a picture from the arguments of `formParameters`. The picture has shapes if `output` names a
-/// vector file. Commands without these parameters, such as films, have pictures of the usual form.
+/// Returns the form of a picture of pixels from the arguments of `formParameters`.
 render::PictureForm pictureForm(const Arguments& arguments);
 
 /// Reports a picture that has been written, in one line, or as a JSON object if the arguments ask for JSON.

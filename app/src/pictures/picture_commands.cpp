@@ -83,7 +83,7 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
 }
 
 /// Loads the field of a call, draws the picture whose settings are `settings(arguments, box)`, and makes it the
-/// session's picture. Returns the settings.
+/// session's picture, with shapes if the output is a vector file. Returns the settings.
 template <typename Settings, typename Draw>
 auto drawForSession(Session& session, const Arguments& arguments, const Settings& settings, const Draw& draw) {
   const auto asked = settings(arguments, kAnyBox);  // throws `Error` for wrong arguments before the field is loaded
@@ -92,7 +92,8 @@ auto drawForSession(Session& session, const Arguments& arguments, const Settings
   const render::ReferenceData reference = referenceDataFor(session, arguments, asked);
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
-  const auto picture = settings(arguments, shownBox(field));
+  auto picture = settings(arguments, shownBox(field));
+  picture.form.vectors = render::isVectorFile(arguments.text("output"));
   session.setPicture(draw(renderer, field, picture, reference));
   return picture;
 }

@@ -59,8 +59,11 @@ Bar addBar(Overlay& overlay, const Frame& frame, std::span<const std::string> ti
                 .labelsLeft = right + 0.6 * em,
                 .labelsRight = column.right,
                 .labelSize = std::min(em, 0.9 * em + 1)};
+  // Each row reaches down to the end of the bar, and the next one covers the rest: between rows that only touch, an
+  // enlarged picture would show the paper.
   for (double y = bar.top; y < bar.bottom; ++y)
-    overlay.boxes.push_back({bar.left, y, bar.right, y + 1, encodeSrgb(colorAt((y + 0.5 - bar.top) / bar.height()))});
+    overlay.boxes.push_back(
+        {bar.left, y, bar.right, bar.bottom, encodeSrgb(colorAt((y + 0.5 - bar.top) / bar.height()))});
   return bar;
 }
 
