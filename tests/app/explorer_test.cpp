@@ -62,7 +62,8 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
             "triangles shown=true tolerance=2.5% simplify=true\n"
             "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
             "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
-            "worst by=gradient on=surface page=2 mark=0.1,0.25,-0.5 ; panel build=false bar=false left-scroll=3\n"
+            "worst by=gradient on=surface page=2 mark=0.1,0.25,-0.5 ; panel build=true worst=true shown=false "
+            "bar=false left=false keys=true left-scroll=3\n"
             "show slice samples=2 size=640x400");
   const ViewState wanted = bench.view();
   bench.out.str("");
@@ -217,20 +218,20 @@ TEST(Explorer, eachKindOfWidgetRunsItsCommand) {
   EXPECT_EQ((*bench.view().sliceColors.scale.limits)[0], 1e-5);
   bench.run("ui type view/plane-offset 0.125");
   EXPECT_EQ(bench.view().planeOffset, 0.125);
-  bench.run("ui drag view/zoom 30,0");
+  bench.run("panel camera=true; ui drag view/zoom 30,0");
   EXPECT_GT(bench.view().zoom, 2);
   bench.run("ui click view/whole");
   EXPECT_EQ(bench.view().zoom, 1);
-  bench.run("ui click statistics/close");
-  EXPECT_FALSE(bench.view().isOpen(Panel::statistics));
-  bench.run("ui click bar/statistics");
+  bench.run("ui click statistics/fold");
   EXPECT_TRUE(bench.view().isOpen(Panel::statistics));
-  bench.run("panel histograms=false statistics=false; ui click worst/next; ui click worst/2");
+  bench.run("ui click statistics/fold");
+  EXPECT_FALSE(bench.view().isOpen(Panel::statistics));
+  bench.run("panel histograms=false worst=true; ui click worst/next; ui click worst/2");
   EXPECT_EQ(bench.view().worstPage, 1);
   EXPECT_EQ(*bench.view().sliceTarget, bench.session.jumps().interfaces[bench.explorer().worst(10)[9]].worst);
   bench.run("ui key z control=true");
   EXPECT_FALSE(bench.view().sliceTarget);
-  bench.run("panel view=false; ui type build/target-error 1e-3; ui click build/rebuild");
+  bench.run("panel all=false build=true; ui type build/target-error 1e-3; ui click build/rebuild");
   EXPECT_EQ(bench.session.current().field.metadata().settings.targetError.weighted(), 1e-3);
   EXPECT_THAT(bench.failure("ui type build/target-error abc; ui click build/rebuild"),
               HasSubstr("target-error: expected a number"));
@@ -242,7 +243,7 @@ TEST(Explorer, missingAndDisabledWidgetsAreErrors) {
   bench.run(kTorus);
   EXPECT_THAT(bench.failure("ui click view/colour"), HasSubstr("no widget 'view/colour'; did you mean 'view/color'?"));
   EXPECT_THAT(bench.failure("ui click view/color/depth"), HasSubstr("no widget 'view/color/depth'")) << "not open";
-  EXPECT_THAT(bench.failure("ui click view/center"), HasSubstr("takes no input now"));
+  EXPECT_THAT(bench.failure("panel camera=true; ui click view/center"), HasSubstr("takes no input now"));
   EXPECT_THAT(bench.failure("show size=400x200 ; ui click worst/8"), HasSubstr("widget"));
   EXPECT_THAT(bench.failure("ui clik view/color"), HasSubstr("did you mean 'click'?"));
   EXPECT_THAT(bench.failure("ui drag canvas 12"), HasSubstr("expected DX,DY"));
@@ -320,7 +321,7 @@ TEST(Explorer, worstPlacesCanBeThoseAtTheSurface) {
   EXPECT_TRUE(bench.view().worstOnSurface);
   EXPECT_THAT(bench.failure("fly 7999"), HasSubstr("interfaces at the surface; give one of them"));
   const std::size_t worst = bench.explorer().worst(1)[0];
-  bench.run("ui click worst/on ; ui click worst/on/all");
+  bench.run("panel worst=true ; ui click worst/on ; ui click worst/on/all");
   EXPECT_FALSE(bench.view().worstOnSurface);
   EXPECT_NE(bench.explorer().worst(1)[0], worst);
 }
@@ -529,7 +530,7 @@ TEST(Explorer, aRebuildKeepsContinuity) {
 
 TEST(Explorer, rebuildsWithinATolerance) {
   Bench bench;
-  bench.run("build builtin:gear,teeth=3 tolerance=1% ; show size=900x1100 ; panel view=false");
+  bench.run("build builtin:gear,teeth=3 tolerance=1% ; show size=900x1100 ; panel build=true");
   const auto settings = [&] { return bench.session.current().field.metadata().settings; };
   const double tolerance = settings().tolerance;
   EXPECT_TRUE(bench.explorer().widgets().contains("build/tolerance"));
@@ -548,7 +549,7 @@ TEST(Explorer, rebuildsWithinATolerance) {
 
 TEST(Explorer, rebuildsWhatWasSmoothedAfterATolerance) {
   Bench bench;
-  bench.run("build builtin:gear,teeth=3 tolerance=2% grid=3 ; smooth ; show size=900x1100 ; panel view=false");
+  bench.run("build builtin:gear,teeth=3 tolerance=2% grid=3 ; smooth ; show size=900x1100 ; panel build=true");
   const auto field = [&]() -> const Field& { return bench.session.current().field; };
   EXPECT_FALSE(bench.explorer().widgets().contains("build/tolerance"));
   EXPECT_TRUE(bench.explorer().widgets().contains("build/target-error"));
@@ -564,7 +565,7 @@ TEST(Explorer, rebuildsWhatWasSmoothedAfterATolerance) {
 
 TEST(Explorer, thePanelSetsCriterionContinuityAndBounds) {
   Bench bench;
-  bench.run("build analytic:torus target-error=1e-2 ; show size=900x1100 ; panel view=false");
+  bench.run("build analytic:torus target-error=1e-2 ; show size=900x1100 ; panel build=true");
   const auto current = [&]() -> const Field& { return bench.session.current().field; };
   const auto offers = [&](const char* control) { return bench.explorer().widgets().contains(control); };
   EXPECT_FALSE(offers("build/continuity-weight"));
@@ -606,7 +607,7 @@ TEST(Explorer, aFieldBesideHasTheSameView) {
   const auto halves = [&] {
     const render::Image frame = bench.explorer().frame();
     std::size_t differing = 0;
-    for (int y = 40; y < frame.height; ++y)  // the rows above show the names of the fields
+    for (int y = 100; y < frame.height; ++y)  // the rows above show the names of the fields and the axes
       for (int x = 1; x < 400; ++x) differing += frame.at(x, y) != frame.at(400 + x, y);
     return differing;
   };
@@ -752,7 +753,7 @@ TEST(Explorer, aCopiedViewForgetsFilesThatItDoesNotName) {
 
 TEST(Explorer, scriptLinesAreStepsWhileATextFieldIsEdited) {
   Bench bench;
-  bench.run(std::string(kTorus) + "show size=1280x720; ui click build/mesh; show slice");
+  bench.run(std::string(kTorus) + "show size=1280x720; panel build=true; ui click build/mesh; show slice");
   const ViewState slice = bench.view();
   bench.run("color depth; undo");
   EXPECT_TRUE(bench.view() == slice) << scriptOf(bench.view());

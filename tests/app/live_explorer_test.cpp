@@ -198,7 +198,7 @@ TEST(Recording, anotherScriptGivesAnotherFrame) {
 
 TEST(Explorer, aTextThatIsNoNumberIsAnErrorOfTheCommand) {
   Desk desk;
-  desk.run(std::string(kFirst) + "\nshow slice ; color value-jump range=1e-6,1e-2 ; panel build=false right-scroll=0");
+  desk.run(std::string(kFirst) + "\nshow slice ; color value-jump range=1e-6,1e-2 ; panel questions=false right-scroll=0");
   desk.explorer().frame();
   desk.click("view/low");
   desk.type("many");
@@ -209,7 +209,7 @@ TEST(Explorer, aTextThatIsNoNumberIsAnErrorOfTheCommand) {
 
 TEST(LiveWork, showsAConstructionAndCancelsIt) {
   Desk desk;
-  desk.run(std::string(kFirst) + "\npanel view=false");
+  desk.run(std::string(kFirst) + "\npanel shown=false build=true");
   desk.explorer().frame();
   const std::uint64_t cells = desk.explorer().figures().leaves;
   int frames = 0;

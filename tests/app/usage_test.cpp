@@ -69,20 +69,25 @@ TEST(Usage, everyControlOfTheExplorerIsInACheckedScript) {
   HPSDF_REQUIRE_GL();
   const Registry registry = makeRegistry();
   const support::TemporaryDirectory folder;
-  std::set<std::string> seen, used;
+  std::set<std::string> seen, used, withoutTooltip;
   std::istringstream in;
   std::ostringstream out, err;
   Session session(registry, Console{in, out, err});
   for (const Call& call : callsOf(registry, kScripts / "explorer.hps", folder.path())) {
     runScript(session, std::span(&call, 1));
     if (call.command->name == "ui") used.insert(controlOf(call.arguments.text("target")));
-    for (const auto& [path, widget] : explorerOf(session).widgets()) seen.insert(controlOf(path));
+    for (const auto& [path, widget] : explorerOf(session).widgets()) {
+      seen.insert(controlOf(path));
+      const bool isEntry = std::ranges::count(path, '/') > 1;  // the list has the tooltip
+      if (widget.isControl && !isEntry && widget.help.empty()) withoutTooltip.insert(path);
+    }
   }
   std::set<std::string> unused;
   std::ranges::set_difference(seen, used, std::inserter(unused, unused.end()));
   unused.erase("build/progress");  // shows progress and takes no input
   unused.erase("build/cancel");    // exists only during a construction; window_test.cpp covers it
   EXPECT_THAT(unused, IsEmpty());
+  EXPECT_THAT(withoutTooltip, IsEmpty());
   EXPECT_GT(seen.size(), 60u);
   for (const char* control : {"view/cells/…", "worst/…", "build/rebuild", "canvas", "beside"})
     EXPECT_TRUE(seen.contains(control)) << control;

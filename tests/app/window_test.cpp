@@ -280,12 +280,20 @@ TEST_F(WindowTest, aSessionOfMouseAndKeyboardReplaysToTheSamePixels) {
   follower.run("ui click view/color");
   click(follower.middleOf("view/color/depth"));
   follower.run("ui click view/color/depth");
+  click(follower.middleOf("camera/fold"));
+  follower.run("panel camera=true");
   move(follower.middleOf("view/zoom"));
   desktop({"keydown", "ctrl", "click", "1", "keyup", "ctrl"});
   type("4");
   follower.run("plane zoom=4");
-  click(follower.middleOf("bar/worst"));
+  click(follower.middleOf("worst/fold"));
   desktop({"key", "ctrl+z"});
+  click(follower.middleOf("questions/fold"));
+  follower.run("panel questions=false");
+  click(follower.middleOf("colors/fold"));
+  follower.run("panel colors=false");
+  click(follower.middleOf("build/fold"));
+  follower.run("panel build=true");
   click(follower.middleOf("build/target-error"));
   type("1e-4");
   click(follower.middleOf("build/rebuild"));
@@ -299,8 +307,10 @@ TEST_F(WindowTest, aSessionOfMouseAndKeyboardReplaysToTheSamePixels) {
 
   const std::string script = contents(file("session.hps"));
   for (const char* line :
-       {"build builtin:torus\nshow size=960x640 gl=software\ncamera 6,8,1.1\ncamera target=", "\nshow slice\n",
-        "\ncolor depth\n", "\nplane zoom=4\npanel worst=false\nundo\nsettings target-error=1e-4\nrebuild\nui hover ",
+       {"camera up=auto\nbuild builtin:torus\nshow size=960x640 gl=software\ncamera 6,8,1.1\ncamera target=",
+        "\nshow slice\n", "\ncolor depth\n",
+        "\nplane zoom=4\npanel worst=true\nundo\npanel questions=false\npanel colors=false\npanel build=true\nsettings "
+        "target-error=1e-4\nrebuild\nui hover ",
         "\nshot output=hpsdf-0001.png\nui hover "})
     EXPECT_THAT(script, HasSubstr(line));
   const std::string first = contents(file("hpsdf-0001.png")), last = contents(file("last.png"));
@@ -321,8 +331,10 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
   const std::string field = "analytic:torus";
   ASSERT_NO_FATAL_FAILURE(open(field));
   Follower follower(field);
-  click(follower.middleOf("bar/view"));  // makes room for the construction panel
-  follower.run("panel view=false");
+  click(follower.middleOf("questions/fold"));  // makes room for the construction
+  follower.run("panel questions=false");
+  click(follower.middleOf("build/fold"));
+  follower.run("panel build=true");
   click(follower.middleOf("build/grid"));
   type("many");
   click(follower.middleOf("build/target-error"));

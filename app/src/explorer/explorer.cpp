@@ -10,10 +10,12 @@
 #include "console/console.h"
 #include "console/interrupt.h"
 #include "explorer/exact_outline.h"
+#include "explorer/gizmo.h"
 #include "explorer/worst_places.h"
 #include "hpsdf/detail/build_settings.h"
 #include "language/script.h"
 #include "pictures/picture_arguments.h"
+#include "pictures/up_axis.h"
 #include "session/field_operands.h"
 #include "session/field_summary.h"
 #include "text/text.h"
@@ -46,11 +48,12 @@ std::string kindOf(const std::string& line) {
   return kind;
 }
 
-/// Returns `view` with the frame size and the renderer of the state `frame`.
+/// Returns `view` with the frame size, the renderer and the list of keys of the state `frame`, which undo leaves alone.
 ViewState withFrameOf(const ViewState& frame, ViewState view) {
   view.width = frame.width;
   view.height = frame.height;
   view.backend = frame.backend;
+  view.open[static_cast<std::size_t>(Panel::keys)] = frame.isOpen(Panel::keys);
   return view;
 }
 
@@ -75,10 +78,8 @@ Layout layoutOf(const ViewState& view) {
   if (open(Panel::readout) && bottom - top - kReadoutHeight >= kSmallestCanvas)
     layout.readout = {0, bottom -= kReadoutHeight, width, height};
   const auto roomForColumn = [&] { return right - left - kColumnWidth >= kSmallestCanvas; };
-  if ((open(Panel::view) || open(Panel::build)) && roomForColumn()) layout.left = {0, top, left = kColumnWidth, bottom};
-  const bool anyFigures =
-      open(Panel::legend) || open(Panel::histograms) || open(Panel::statistics) || open(Panel::worst);
-  if (anyFigures && roomForColumn()) layout.right = {right -= kColumnWidth, top, width, bottom};
+  if (open(Panel::left) && roomForColumn()) layout.left = {0, top, left = kColumnWidth, bottom};
+  if (open(Panel::right) && roomForColumn()) layout.right = {right -= kColumnWidth, top, width, bottom};
   layout.canvas = {left, top, right, bottom};
   if (!view.beside.empty()) {
     const double half = std::floor((right - left) / 2);
@@ -107,9 +108,26 @@ void Explorer::change(ViewState next) {
   redone_.clear();
 }
 
+void Explorer::changeBy(const std::string& line) {
+  const History before{view_, undone_.size(), redone_};
+  const auto goBackTo = [this](const History& history) {
+    undone_.resize(history.undone);
+    redone_ = history.redone;
+    return std::exchange(view_, history.view);
+  };
+  try {
+    runScript(session_, parseScript(session_.registry(), "preset", line, {}));
+  } catch (...) {
+    goBackTo(before);
+    throw;
+  }
+  change(goBackTo(before));
+}
+
 bool Explorer::goBack(std::vector<ViewState>& from, std::vector<ViewState>& to) {
   if (from.empty()) return false;
   ViewState next = withFrameOf(view_, from.back());
+  if (next.guessesUp && session_.hasField()) next.camera.up = guessedUp(session_.current().field);
   makeContour(next);
   to.push_back(std::exchange(view_, std::move(next)));
   from.pop_back();
@@ -218,6 +236,7 @@ void Explorer::fieldChanged() {
   const auto steps = session_.current().field.metadata().steps;
   if (rebuilding_ != Rebuilding::steps || !allSteps_ || (steps && *steps > *allSteps_)) allSteps_ = steps;
   if (rebuilding_ == Rebuilding::no) settings_.clear();  // the settings belong to the previous field
+  if (view_.guessesUp) view_.camera.up = guessedUp(session_.current().field);
   if (view_.operands == kOwnOperands && !session_.current().field.metadata().source.exactness) view_.operands.clear();
   ++fields_;
   try {
@@ -270,7 +289,10 @@ void Explorer::finishGesture() {
   }
 }
 
-void Explorer::showMesh(const TriangleMesh& mesh, const Box& domain) { preview_.showMesh(mesh, domain, view_.backend); }
+void Explorer::showMesh(const TriangleMesh& mesh, const Box& domain) {
+  if (view_.guessesUp) view_.camera.up = guessedUp(mesh);
+  preview_.showMesh(mesh, domain, view_.backend);
+}
 
 void Explorer::showUnfinished(Field field) { preview_.showField(std::move(field), view_.backend); }
 
@@ -315,9 +337,10 @@ void Explorer::run(const std::string& line) {
 void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
   // Measure the jumps before the panels are drawn. The measurement is long work: its progress display draws the panels
   // too, so it must not start while they are being drawn.
-  const bool showsJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::worst) || view_.isOpen(Panel::readout);
+  const bool showsJumps =
+      view_.isUnfolded(Panel::statistics) || view_.isUnfolded(Panel::worst) || view_.isOpen(Panel::readout);
   if (!work && showsJumps) session_.jumps();
-  const bool showsOtherJumps = view_.isOpen(Panel::statistics) || view_.isOpen(Panel::readout);
+  const bool showsOtherJumps = view_.isUnfolded(Panel::statistics) || view_.isOpen(Panel::readout);
   if (!work && showsOtherJumps && beside_ && !isStale()) session_.otherJumps(view_.beside);
   ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
@@ -421,17 +444,36 @@ std::string Explorer::dragCommand(double dx, double dy) const {
   return "camera target=" + vectorWord(target);
 }
 
+/// Returns the command for a key, or std::nullopt if there is none.
+std::optional<std::string> Explorer::keyCommand(const Input& event) const {
+  if (event.control && event.key == Key::z && canUndo()) return "undo";
+  if (event.control && event.key == Key::y && canRedo()) return "redo";
+  if (event.control && event.key == Key::c) return "copy-view";
+  const bool showsKeys = view_.isOpen(Panel::keys);
+  if (event.key == Key::f1) return fmt::format("panel keys={}", !showsKeys);
+  if (event.key == Key::escape && showsKeys) return "panel keys=false";
+  return std::nullopt;
+}
+
+/// Returns the command for a character that no text field takes, or std::nullopt if there is none.
+std::optional<std::string> Explorer::typedCommand(const std::string& text) const {
+  if (text == "?") return fmt::format("panel keys={}", !view_.isOpen(Panel::keys));
+  if (text == "s") return "show surface";
+  if (text == "p") return "show slice";
+  const std::size_t view = text.size() == 1 ? std::string_view("1234567").find(text[0]) : std::string::npos;
+  if (view == std::string::npos || view_.slice) return std::nullopt;
+  return "camera view=" + viewNames()[view];
+}
+
 /// Returns the command for a mouse event over the picture, or for a key that no text field takes. Returns
 /// std::nullopt if there is no such command.
 std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
-  if (event.kind == Input::Kind::key && event.control && !ui_.editing()) {
-    if (event.key == Key::z && canUndo()) return "undo";
-    if (event.key == Key::y && canRedo()) return "redo";
-    if (event.key == Key::c) return "copy-view";
-  }
+  if (event.kind == Input::Kind::key && !ui_.editing()) return keyCommand(event);
+  if (event.kind == Input::Kind::type && !ui_.editing()) return typedCommand(event.text);
   const bool overPicture = !ui_.wantsMouse() && (layout.canvas.contains(x, y) || layout.beside.contains(x, y));
+  if (event.kind == Input::Kind::press && view_.isOpen(Panel::keys)) return "panel keys=false";
   if (event.kind == Input::Kind::press && !dragged_ && overPicture) {
     dragged_ = event.button;
     dragFrom_ = {x, y};
@@ -448,9 +490,10 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   return dragCommand(x - dragFrom_[0], y - dragFrom_[1]);
 }
 
-/// Returns the command that explains the cell at the pointer. Returns std::nullopt if the pointer is not over the
-/// field.
+/// Returns the command for a click into the picture: it looks along the axis of the gizmo at the pointer, or explains
+/// the cell there. Returns std::nullopt if the pointer is not over the field.
 std::optional<std::string> Explorer::clickCommand() {
+  if (const auto view = gizmoViewAt(view_, layoutOf(view_).canvas, ui_.pointer())) return "camera view=" + *view;
   const std::optional<Readout> at = readout();
   if (!at || !session_.current().field.domain().contains(at->pick.position)) return std::nullopt;
   if (!session_.knowsSurface()) {

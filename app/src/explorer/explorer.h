@@ -38,10 +38,13 @@ class Explorer final : public SessionExtension {
 
   const ViewState& view() const { return view_; }
   /// Makes `next` the explorer's state. `undo` returns to the previous state. Undo treats all changes of one
-  /// mouse gesture as one change, and never changes the frame size or the renderer. If `next` shows the triangles of
-  /// a contour that is not known yet, the contour is made first, unless a mouse gesture lasts; `Cancelled` is thrown
-  /// if this is cancelled, and the triangles are hidden if it fails.
+  /// mouse gesture as one change, and never changes the frame size, the renderer or the list of keys. If `next` shows
+  /// the triangles of a contour that is not known yet, the contour is made first, unless a mouse gesture lasts;
+  /// `Cancelled` is thrown if this is cancelled, and the triangles are hidden if it fails.
   void change(ViewState next);
+  /// Runs a line of script whose commands change the state, as one change. If one of them fails, the state is as
+  /// before.
+  void changeBy(const std::string& line);
   /// Returns to the state before the last change. `undo` and `redo` return false if there is no state to return
   /// to.
   bool undo() { return goBack(undone_, redone_); }
@@ -159,6 +162,8 @@ class Explorer final : public SessionExtension {
   void runOnPreview(const std::string& line);
   std::optional<std::string> canvasCommand(const Input& event);
   std::optional<std::string> clickCommand();
+  std::optional<std::string> keyCommand(const Input& event) const;
+  std::optional<std::string> typedCommand(const std::string& text) const;
   std::string wheelCommand(double notches) const;
   std::string dragCommand(double dx, double dy) const;
   render::ShownMesh contourToDraw() const;

@@ -20,9 +20,23 @@ namespace hpsdf::app {
 namespace {
 
 void changePanel(ViewState& view, const Arguments& arguments, Session&) {
-  if (arguments.given("all")) view.open.fill(arguments.flag("all"));
-  for (std::size_t panel = 0; panel < kPanels; ++panel)
-    if (arguments.given(kPanelNames[panel])) view.open[panel] = arguments.flag(kPanelNames[panel]);
+  const auto set = [&](Panel panel, bool open) { view.open[static_cast<std::size_t>(panel)] = open; };
+  const auto forEach = [&](bool sections, const auto& act) {
+    for (std::size_t i = 0; i < kPanels; ++i)
+      if (const auto panel = static_cast<Panel>(i); isSection(panel) == sections) act(panel, kPanelNames[i]);
+  };
+  if (arguments.given("all")) {
+    view.open.fill(arguments.flag("all"));
+    set(Panel::keys, false);
+  }
+  forEach(true, [&](Panel section, const char* name) {
+    if (!arguments.given(name)) return;
+    set(section, arguments.flag(name));
+    if (arguments.flag(name)) set(columnOf(section), true);
+  });
+  forEach(false, [&](Panel part, const char* name) {
+    if (arguments.given(name)) set(part, arguments.flag(name));
+  });
   if (arguments.given("left-scroll")) view.scroll[0] = arguments.number("left-scroll");
   if (arguments.given("right-scroll")) view.scroll[1] = arguments.number("right-scroll");
 }
@@ -102,6 +116,43 @@ void runFly(Session& session, const Arguments& arguments) {
   explorer.change(std::move(view));
 }
 
+constexpr Preset kPresets[] = {
+    {"whole", "The whole surface", "Show the whole surface under plain light, and take back cuts, marks and cells."},
+    {"inside", "What is inside?", "Cut the surface in the middle, and colour the cells within by their degree."},
+    {"worst", "Where is it worst?",
+     "Take a close look at the place at the surface where two cells disagree most, and list the next ones."},
+    {"torn", "Where is it torn?", "Mark the cracks of the surface, and list the places where cells disagree most."},
+    {"degrees", "Which degrees?", "Show a slice through the middle whose colours are the degrees of the polynomials."},
+    {"mesh", "How far off is it?",
+     "Colour the surface by its distance to the mesh or shape from which the field was made."}};
+
+/// Returns the line of script that shows a preset.
+std::string presetLine(Session& session, const std::string& name) {
+  const std::string plain =
+      "show surface ; surface offset=0 shown=true clip=none cracks=false defects=none ; plane in-space=false ; "
+      "cells none ; triangles shown=false ; arrows 0 ; worst mark=none ; ";
+  const std::string whole = plain + "camera 30,20,1.1 target=center ; ";
+  const std::string levels = "panel legend=true histograms=true worst=false statistics=false";
+  const std::string list =
+      "worst by=value on=surface page=1 ; panel legend=true worst=true histograms=false statistics=false";
+  const bool isUpY = explorerOf(session).view().camera.up == render::UpAxis::y;
+  if (name == "inside") return whole + fmt::format("surface clip={} ; color degree ; {}", isUpY ? "z" : "y", levels);
+  if (name == "worst")
+    return plain + fmt::format("color {} ; {} ; fly 1", session.knowsExact() ? "error" : "value-jump", list);
+  if (name == "torn") return whole + "surface cracks=true ; color normal ; " + list;
+  if (name == "degrees") return "show slice ; plane axis=z offset=auto zoom=1 target=center ; color degree ; " + levels;
+  if (name == "mesh") {
+    session.exact("");  // reports a missing mesh now, not at the next frame
+    return whole + "color error ; panel legend=true statistics=true histograms=false worst=false";
+  }
+  return whole + "color normal ; " + levels;
+}
+
+void runPreset(Session& session, const Arguments& arguments) {
+  session.current();  // throws `Error` if there is no field
+  explorerOf(session).changeBy(presetLine(session, arguments.text("name")));
+}
+
 void checkFly(const Arguments& arguments) {
   if (arguments.has("rank") == arguments.has("to"))
     throw Error("fly: expected either the rank of an interface or to=X,Y,Z");
@@ -161,14 +212,21 @@ void runShot(Session& session, const Arguments& arguments) {
 /// scrolled.
 std::vector<Parameter> panelParameters() {
   constexpr std::array kHelp = {"The buttons on top.",
-                                "What is shown.",
+                                "The left column.",
+                                "The right column.",
+                                "What the pointer is over.",
+                                "The list of keys and mouse actions, over the picture.",
+                                "Buttons that answer common questions.",
+                                "What is drawn, and where it is cut.",
+                                "What the colours show.",
+                                "Where the camera stands.",
                                 "Settings of the construction.",
                                 "What the colours mean.",
                                 "Shares of the volume by degree and depth.",
-                                "Figures of the whole field.",
                                 "The worst interfaces between cells.",
-                                "What the pointer is over."};
-  std::vector<Parameter> parameters = {{"all", flag(""), "Every part, before the others."}};
+                                "Figures of the whole field."};
+  static_assert(kHelp.size() == kPanels);
+  std::vector<Parameter> parameters = {{"all", flag(""), "Everything but the list of keys, before the others."}};
   for (std::size_t panel = 0; panel < kPanels; ++panel)
     parameters.push_back({kPanelNames[panel], flag(""), kHelp[panel]});
   for (const std::string side : {"left", "right"})
@@ -177,11 +235,31 @@ std::vector<Parameter> panelParameters() {
   return parameters;
 }
 
+void addPresetCommand(Registry& registry) {
+  std::vector<std::string> names;
+  std::string help;
+  for (const Preset& preset : kPresets) {
+    names.emplace_back(preset.name);
+    help += fmt::format("{}{}: {}", help.empty() ? "" : "\n\n", preset.name, preset.help);
+  }
+  registry.addForScripts({
+      .name = "preset",
+      .summary = "Show a view that answers a common question.",
+      .help = help + "\n\nIt sets the view, the colours and the sections of the panels; 'undo' takes all of it back.",
+      .examples = {"preset worst", "preset inside ; shot output=inside.png"},
+      .parameters = {{"name", choice(names).positional().required(), "The view."}},
+      .action = runPreset,
+  });
+}
+
 void addFrameCommands(Registry& registry) {
   registry.addForScripts({
       .name = "panel",
-      .summary = "Open or close parts of the explorer's frame.",
-      .help = "What is not given stays as it is. The picture takes the room that closed parts leave.",
+      .summary = "Open or close parts of the explorer's frame, unfold or fold the sections of its columns.",
+      .help =
+          "What is not given stays as it is. The picture takes the room that closed parts leave. The sections of the "
+          "left column are questions, shown, colors, camera and build, those of the right one legend, histograms, "
+          "worst and statistics; a section that is unfolded opens its column.",
       .examples = {"panel all=false", "panel build=false worst=true"},
       .parameters = panelParameters(),
       .action = changing(changePanel),
@@ -220,7 +298,8 @@ void addHistoryCommands(Registry& registry) {
       .name = "undo",
       .summary = "Take back the last change of what the explorer shows.",
       .help = "Changes by show (but for the frame's size and renderer), camera, surface, plane, cells, arrows, "
-              "triangles, color, panel, worst and fly; what the mouse does in one go is one change. The field itself "
+              "triangles, color, panel, worst, fly and preset; what the mouse does in one go is one change. The field "
+              "itself "
               "is not changed back.",
       .examples = {"undo"},
       .action = runUndo,
@@ -279,8 +358,11 @@ void addFieldAndShotCommands(Registry& registry) {
 
 }  // namespace
 
+std::span<const Preset> presets() { return kPresets; }
+
 void addExplorerCommands(Registry& registry) {
   addExplorerPictureCommands(registry);
+  addPresetCommand(registry);
   addFrameCommands(registry);
   addHistoryCommands(registry);
   addFieldAndShotCommands(registry);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "explorer/view_state.h"
@@ -10,6 +11,14 @@ namespace hpsdf::app {
 
 /// Adds all commands of the explorer (show, camera, plane, color, panel, …) except `ui`.
 void addExplorerCommands(Registry& registry);
+
+/// A view that answers a common question. The command `preset` shows it.
+struct Preset {
+  const char* name;
+  const char* question;  ///< label of its button
+  const char* help;
+};
+std::span<const Preset> presets();
 
 /// Adds the command `ui`, with which a script sends mouse and keyboard events to the explorer.
 void addUiCommand(Registry& registry);

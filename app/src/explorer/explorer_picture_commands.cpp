@@ -5,6 +5,7 @@
 #include "explorer/explorer.h"
 #include "explorer/explorer_commands.h"
 #include "pictures/picture_arguments.h"
+#include "pictures/up_axis.h"
 #include "session/field_operands.h"
 
 namespace hpsdf::app {
@@ -31,7 +32,16 @@ void changeShow(ViewState& view, const Arguments& arguments, Session&) {
   if (arguments.given("cpu") || arguments.given("gl")) view.backend = backend(arguments);
 }
 
-void changeCamera(ViewState& view, const Arguments& arguments, Session&) {
+/// Sets the axis that points up, or leaves it to a guess for the current field and for later ones.
+void changeUp(ViewState& view, const std::string& up, Session& session) {
+  view.guessesUp = up == "auto";
+  if (!view.guessesUp)
+    view.camera.up = up == "z" ? render::UpAxis::z : render::UpAxis::y;
+  else if (session.hasField())
+    view.camera.up = guessedUp(session.current().field);
+}
+
+void changeCamera(ViewState& view, const Arguments& arguments, Session& session) {
   render::OrbitCamera& camera = view.camera;
   if (arguments.given("orbit")) {
     const auto n = arguments.numbers("orbit");
@@ -41,7 +51,7 @@ void changeCamera(ViewState& view, const Arguments& arguments, Session&) {
   }
   if (arguments.given("view") && arguments.text("view") != "any") turnTo(camera, arguments.text("view"));
   if (arguments.given("target")) camera.target = targetOf(arguments);
-  if (arguments.given("up")) camera.up = arguments.text("up") == "z" ? render::UpAxis::z : render::UpAxis::y;
+  if (arguments.given("up")) changeUp(view, arguments.text("up"), session);
   if (arguments.given("projection"))
     camera.projection = arguments.text("projection") == "orthographic" ? render::Projection::orthographic
                                                                        : render::Projection::perspective;
@@ -194,14 +204,18 @@ void addSurfaceCommands(Registry& registry) {
           "It looks at the surface in space. What is not given stays as it is; 'copy-view' tells how it stands. With "
           "the mouse: drag to turn, drag with the right button to move the target, wheel to go nearer.",
       .examples = {"camera 120,10,0.9", "camera view=front target=0.2,0.6,-0.1"},
-      .parameters = {{"orbit", numbers("AZIMUTH,ELEVATION,DISTANCE", {3}).positional(),
-                      "Azimuth and elevation in degrees, and the eye's distance from the target in diagonals of the "
-                      "domain; 30,20,1.1 at first."},
-                     {"view", choice(directions).under(kCamera), "A named direction instead; any leaves it."},
-                     targetParameter("The point in the picture's middle; center is the domain's."),
-                     {"up", choice({"y", "z"}).under(kCamera).advanced(), "The axis that points up."},
-                     {"projection", choice({"perspective", "orthographic"}).under(kCamera).advanced(),
-                      "How rays run: from the eye, or parallel."}},
+      .parameters =
+          {{"orbit", numbers("AZIMUTH,ELEVATION,DISTANCE", {3}).positional(),
+            "Azimuth and elevation in degrees, and the eye's distance from the target in diagonals of the "
+            "domain; 30,20,1.1 at first."},
+           {"view", choice(directions).under(kCamera), "A named direction instead; any leaves it."},
+           targetParameter("The point in the picture's middle; center is the domain's."),
+           {"up", choice({"auto", "y", "z"}).under(kCamera).advanced(),
+            "The axis that points up; auto guesses it for this field and for each later one: z if the surface has "
+            "twice as large a flat base below z as below y, otherwise y. The window begins with auto, scripts "
+            "with y."},
+           {"projection", choice({"perspective", "orthographic"}).under(kCamera).advanced(),
+            "How rays run: from the eye, or parallel."}},
       .action = changing(changeCamera),
       .check = checkCamera,
   });

@@ -102,7 +102,7 @@ void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
   for (const auto& [name, count, color] : legend.defects) drawSwatch(color, name + ": " + count);
   for (const auto& [name, color] : legend.lines) drawSwatch(color, name);
   if (legend.title.empty()) {
-    if (legend.defects.empty()) ui.text("light only: choose a color", true);
+    if (legend.defects.empty()) ui.text("only light: choose a colour on the left", true);
     return;
   }
   ui.text(legend.title);
@@ -130,12 +130,49 @@ void drawHistograms(Ui& ui, Explorer& explorer) {
 
 namespace {
 
+using Facts = std::vector<std::pair<std::string, std::string>>;
+
+/// Draws facts under a title, or nothing if there are none.
+void drawFacts(Ui& ui, const char* title, const Facts& facts) {
+  if (facts.empty()) return;
+  ui.text(title);
+  ui.facts(facts);
+  ImGui::Dummy({0, 0.2F * ImGui::GetFontSize()});
+}
+
+Facts sizes(const FieldStatistics& figures) {
+  Facts facts = {{"cells", grouped(figures.leaves)},
+                 {"coefficients", grouped(figures.coefficients)},
+                 {"memory", bytesText(double(figures.bytes))}};
+  if (figures.exact.leaves > 0) {
+    facts.emplace_back("exact cells", grouped(figures.exact.leaves));
+    facts.emplace_back("exact triangles", grouped(figures.exact.triangles));
+  }
+  return facts;
+}
+
+Facts aims(const Field& field) {
+  if (hasTolerance(field)) return {{"tolerance", shortNumber(field.metadata().settings.tolerance)}};
+  if (!field.metadata().hasEstimate()) return {};
+  return {{"target error τ", shortNumber(field.metadata().settings.targetError.weighted())},
+          {"weighted estimate", shortNumber(field.metadata().totalError)}};
+}
+
+Facts measurements(const Field& field) {
+  const std::optional<Measurement>& m = field.metadata().measurement;
+  if (!m) return {};
+  return {{"near the surface, RMS", shortNumber(m->near.rms)},
+          {"near the surface, greatest", shortNumber(m->near.max)},
+          {"whole domain, RMS", shortNumber(m->domain.rms)},
+          {"whole domain, greatest", shortNumber(m->domain.max)},
+          {"torn surface, %", shortNumber(100 * m->tornShare)}};
+}
+
 /// Returns what is known of a contour: how fine it is, and how far it and the surface are from each other.
-std::vector<std::pair<std::string, std::string>> contourFacts(const Contour& contour) {
-  std::vector<std::pair<std::string, std::string>> rows = {
-      {"triangles", grouped(contour.mesh.triangles.size())},
-      {"greatest gap, mesh to surface", shortNumber(contour.greatestValue)},
-      {"greatest gap, surface to mesh", shortNumber(contour.greatestGap)}};
+Facts contourFacts(const Contour& contour) {
+  Facts rows = {{"number", grouped(contour.mesh.triangles.size())},
+                {"greatest gap to surface", shortNumber(contour.greatestValue)},
+                {"greatest gap from surface", shortNumber(contour.greatestGap)}};
   if (contour.unresolved > 0) rows.emplace_back("places beyond the tolerance", grouped(contour.unresolved));
   if (contour.lostParts > 0) rows.emplace_back("cells with lost parts", grouped(contour.lostParts));
   return rows;
@@ -145,35 +182,18 @@ std::vector<std::pair<std::string, std::string>> contourFacts(const Contour& con
 /// null if the picture shows none.
 void drawStatisticsOf(Ui& ui, const Field& field, const FieldStatistics& figures, const Jumps* jumps,
                       const Contour* contour) {
-  std::vector<std::pair<std::string, std::string>> rows = {
-      {"cells", grouped(figures.leaves)},
-      {"coefficients", grouped(figures.coefficients)},
-      {"memory", bytesText(double(figures.bytes))},
-  };
-  if (hasTolerance(field)) {
-    rows.emplace_back("tolerance", shortNumber(field.metadata().settings.tolerance));
-  } else if (field.metadata().hasEstimate()) {
-    rows.emplace_back("target error τ", shortNumber(field.metadata().settings.targetError.weighted()));
-    rows.emplace_back("weighted estimate (τ)", shortNumber(field.metadata().totalError));
-  }
-  if (const std::optional<Measurement>& m = field.metadata().measurement) {
-    rows.emplace_back("RMS error near surface", shortNumber(m->near.rms));
-    rows.emplace_back("greatest near surface", shortNumber(m->near.max));
-    rows.emplace_back("RMS error over domain", shortNumber(m->domain.rms));
-    rows.emplace_back("greatest over domain", shortNumber(m->domain.max));
-    rows.emplace_back("torn surface, %", shortNumber(100 * m->tornShare));
-  }
-  if (figures.exact.leaves > 0) {
-    rows.emplace_back("exact cells", grouped(figures.exact.leaves));
-    rows.emplace_back("exact triangles", grouped(figures.exact.triangles));
-  }
-  if (jumps != nullptr) {
-    rows.emplace_back("jump of f, RMS", shortNumber(jumps->value.rms));
-    rows.emplace_back("jump of gradient, RMS", shortNumber(jumps->gradient.rms));
-  }
-  if (contour != nullptr)
-    for (auto& row : contourFacts(*contour)) rows.push_back(std::move(row));
-  ui.facts(rows);
+  drawFacts(ui, "Size", sizes(figures));
+  drawFacts(ui, "Asked for, and estimated", aims(field));
+  drawFacts(ui, "Measured error", measurements(field));
+  if (jumps != nullptr)
+    drawFacts(ui, "Jumps between cells, RMS",
+              {{"of f", shortNumber(jumps->value.rms)}, {"of its gradient", shortNumber(jumps->gradient.rms)}});
+  if (contour != nullptr) drawFacts(ui, "Triangles", contourFacts(*contour));
+}
+
+/// Returns how many decimals tell apart places that are a thousandth of the domain apart.
+int decimalsFor(const Box& domain) {
+  return std::clamp(2 - int(std::floor(std::log10(domain.sizes().maxCoeff()))), 0, 9);
 }
 
 }  // namespace
@@ -196,24 +216,33 @@ void drawWorst(const Controls& controls, Explorer& explorer) {
   const Jumps& jumps = explorer.session().jumps();
   controls.choice("worst/by", "jump of", {"value", "gradient"}, view.worstBy == JumpKind::value ? "value" : "gradient",
                   "worst by=");
-  controls.choice("worst/on", "where", {"all", "surface"}, view.worstOnSurface ? "surface" : "all", "worst on=");
+  controls.choice("worst/on", "places", {"all", "surface"}, view.worstOnSurface ? "surface" : "all", "worst on=");
+  const Field& field = explorer.session().current().field;
   const std::size_t first = std::size_t(view.worstPage) * kWorstRows;
   const auto& worst = explorer.worst(first + kWorstRows + 1);  // one more tells whether there is a next page
   const std::size_t last = std::min(worst.size(), first + kWorstRows);
+  const int decimals = decimalsFor(field.domain());
   for (std::size_t rank = first; rank < last; ++rank) {
     const Interface& face = jumps.interfaces[worst[rank]];
     const Vector3& x = face.worst;
-    const std::array cells = {fmt::format("{}. {}", rank + 1, shortNumber(jumpOf(face, view.worstBy).max)),
-                              std::string(isTorn(explorer.session().current().field, face) ? "torn" : "")};
-    if (controls.ui.row(fmt::format("worst/{}", rank - first + 1), cells, 90))
-      controls.commands.push_back(fmt::format("fly {}", rank + 1));
+    const std::array cells = {
+        fmt::format("{}.", rank + 1), shortNumber(jumpOf(face, view.worstBy).max),
+        std::string(isTorn(field, face) ? "torn" : ""),
+        fmt::format("{:.{}f}, {:.{}f}, {:.{}f}", x.x(), decimals, x.y(), decimals, x.z(), decimals)};
+    constexpr std::array kColumns = {0.0, 3.0, 10.5, 14.5};
+    const std::string fly = fmt::format("fly {}", rank + 1);
     // The shortest numbers that are read back as the same floats: they can be typed after 'fly to='.
-    controls.ui.text(fmt::format("{},{},{}", float(x.x()), float(x.y()), float(x.z())), true);
+    controls.describe(
+        fly,
+        fmt::format("Take a close look at this place:\n{},{},{}", float(x.x()), float(x.y()), float(x.z())).c_str());
+    if (controls.ui.row(fmt::format("worst/{}", rank - first + 1), cells, kColumns)) controls.commands.push_back(fly);
   }
   const auto page = [](int number) { return fmt::format("worst page={}", number); };
-  controls.button("worst/previous", "previous", page(view.worstPage).c_str(), view.worstPage > 0);
+  controls.button("worst/previous", "previous", page(view.worstPage).c_str(), view.worstPage > 0,
+                  "Turn back to the places before these.");
   ImGui::SameLine();
-  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < worst.size());
+  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < worst.size(),
+                  "Turn to the places that follow.");
 }
 
 }  // namespace hpsdf::app

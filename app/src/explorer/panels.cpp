@@ -2,46 +2,139 @@
 
 #include "explorer/panels.h"
 
+#include <algorithm>
+#include <sstream>
+
+#include "explorer/gizmo.h"
 #include "pictures/picture_arguments.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
 namespace {
 
-/// Draws a panel if it is open: its heading with a button that closes the panel, and its content.
+/// Draws a section: its heading, which folds and unfolds it, and its content if it is unfolded.
 template <typename Content>
 void section(const Controls& controls, const ViewState& view, Panel panel, const char* title, const Content& content) {
-  if (!view.isOpen(panel)) return;
   const std::string name = kPanelNames[static_cast<std::size_t>(panel)];
-  if (controls.ui.heading(name + "/close", title)) controls.commands.push_back("panel " + name + "=false");
-  content();
+  const bool isUnfolded = view.isOpen(panel);
+  const std::string command = fmt::format("panel {}={}", name, !isUnfolded);
+  controls.describe(command, isUnfolded ? "Fold this section." : "Unfold this section.");
+  if (controls.ui.heading(name + "/fold", title, isUnfolded)) controls.commands.push_back(command);
+  if (isUnfolded) content();
 }
 
-void nextTo(float space) { ImGui::SameLine(0, space); }
+void nextTo(float spaces) { ImGui::SameLine(0, spaces * ImGui::GetFontSize()); }
 
 void drawKinds(const Controls& controls, const ViewState& view) {
-  if (controls.ui.button("bar/surface", "surface", !view.slice)) controls.commands.emplace_back("show surface");
-  nextTo(2);
-  if (controls.ui.button("bar/slice", "slice", view.slice)) controls.commands.emplace_back("show slice");
+  const auto button = [&](const char* path, const char* label, const char* command, bool pressed, const char* help) {
+    controls.describe(command, help);
+    if (controls.ui.button(path, label, pressed)) controls.commands.emplace_back(command);
+  };
+  button("bar/surface", "surface", "show surface", !view.slice, "Show the surface in space. Key: s");
+  nextTo(0.15F);
+  button("bar/slice", "slice", "show slice", view.slice, "Show the flat picture of a plane. Key: p");
 }
 
 void drawBar(const Controls& controls, const Explorer& explorer) {
-  Ui& ui = controls.ui;
-  std::vector<std::string>& commands = controls.commands;
   const ViewState& view = explorer.view();
   drawKinds(controls, view);
-  nextTo(24);
-  for (std::size_t panel = 1; panel < kPanels; ++panel) {  // panel 0 is the bar itself, which needs no button
-    const char* name = kPanelNames[panel];
-    if (ui.button(fmt::format("bar/{}", name), name, view.open[panel]))
-      commands.push_back(fmt::format("panel {}={}", name, !view.open[panel]));
-    nextTo(panel + 1 < kPanels ? 2 : 24);
+  nextTo(1.5F);
+  controls.button("bar/undo", "undo", "undo", explorer.canUndo(), "Take back the last change of the view. Key: Ctrl+Z");
+  nextTo(0.15F);
+  controls.button("bar/redo", "redo", "redo", explorer.canRedo(), "Do again what undo took back. Key: Ctrl+Y");
+  nextTo(1.5F);
+  controls.button("bar/copy-view", "copy view", "copy-view", true,
+                  "Copy the lines of script that lead to this view. Key: Ctrl+C");
+  nextTo(1.5F);
+  const bool anyColumn = view.isOpen(Panel::left) || view.isOpen(Panel::right);
+  const std::string columns = fmt::format("panel left={0} right={0}", !anyColumn);
+  controls.describe(columns, "Show or hide the columns beside the picture.");
+  if (controls.ui.button("bar/columns", "columns", anyColumn)) controls.commands.push_back(columns);
+  nextTo(0.15F);
+  const std::string keys = fmt::format("panel keys={}", !view.isOpen(Panel::keys));
+  controls.describe(keys, "Tell what keys and mouse do. Keys: ? and F1");
+  if (controls.ui.button("bar/keys", "?", view.isOpen(Panel::keys))) controls.commands.push_back(keys);
+}
+
+using Lines = std::vector<std::pair<const char*, const char*>>;
+
+/// A table of two columns with a title, in the list of keys.
+struct KeyTable {
+  const char* title;
+  Lines lines;
+
+  static float em() { return ImGui::GetFontSize(); }
+  static float second() { return 9.5F * em(); }
+  static float width() { return 27 * em(); }
+  static float heightOf(const char* what) {
+    return ImGui::CalcTextSize(what, nullptr, false, width() - second()).y + 0.2F * em();
   }
-  controls.button("bar/undo", "undo", "undo", explorer.canUndo());
-  nextTo(2);
-  controls.button("bar/redo", "redo", "redo", explorer.canRedo());
-  nextTo(24);
-  controls.button("bar/copy-view", "copy view", "copy-view");
+
+  float height() const {
+    float height = 1.6F * em();
+    for (const auto& [key, what] : lines) height += heightOf(what);
+    return height;
+  }
+
+  void draw(ImDrawList& list, const ImVec2& at) const {
+    float y = at.y + 1.6F * em();
+    list.AddText(at, kInk, title);
+    list.AddLine({at.x, at.y + 1.3F * em()}, {at.x + width(), at.y + 1.3F * em()}, kSoftInk);
+    for (const auto& [key, what] : lines) {
+      list.AddText({at.x, y}, kInk, key);
+      list.AddText(ImGui::GetFont(), em(), {at.x + second(), y}, kSoftInk, what, nullptr, width() - second());
+      y += heightOf(what);
+    }
+  }
+};
+
+/// Draws the list of keys and mouse actions over the picture, in two columns if there is room for them.
+void drawKeys(const ViewState& view) {
+  static const KeyTable kMouse = {"Mouse",
+                                  {{"drag", "turn the surface, move the slice"},
+                                   {"right drag", "move the surface"},
+                                   {"wheel", "nearer or farther; over a column, scroll it"},
+                                   {"hover", "read out what is there"},
+                                   {"click", "why the cell there is as it is"},
+                                   {"axes, top right", "click an end to look along it"},
+                                   {"Ctrl+click", "type the number of a slider"}}};
+  static const KeyTable kPlaces = {"Where to find what",
+                                   {{"what is here?", "point at it; the line below the picture"},
+                                    {"how wrong is it?", "Questions: how far off; Statistics"},
+                                    {"where is it torn?", "Questions; Worst interfaces"},
+                                    {"what is inside?", "Questions; cut across, or the slice"},
+                                    {"a finer field?", "Construction: target error, rebuild"},
+                                    {"two fields?", "Surface: beside, the other one's file"}}};
+  static const KeyTable kKeys = {"Keys",
+                                 {{"s, p", "surface, slice"},
+                                  {"1 2 3 4", "from the front, back, left, right"},
+                                  {"5 6 7", "from the top, bottom, corner"},
+                                  {"Ctrl+Z, Ctrl+Y", "undo, redo"},
+                                  {"Ctrl+C", "copy the view as lines of script"},
+                                  {"Tab, Shift+Tab", "next control, the one before"},
+                                  {"Enter, Space", "press it; Enter types into a slider"},
+                                  {"arrows", "change a slider or a list"},
+                                  {"F12", "write a picture of the window"},
+                                  {"?, F1", "this list"},
+                                  {"Escape", "cancel, close, leave a text"},
+                                  {"Ctrl+Q", "close the window"}}};
+  constexpr const char* kManual = "The manual is docs/explorer.md and docs/window.md.";
+  const float em = ImGui::GetFontSize(), pad = 1.4F * em, column = KeyTable::width();
+  const auto width = static_cast<float>(view.width), height = static_cast<float>(view.height);
+  const bool two = width > 2 * column + 3 * pad;
+  const float left = kMouse.height() + pad + kPlaces.height(), right = kKeys.height() + pad + em;
+  const float w = (two ? 2 * column + pad : column) + 2 * pad;
+  const float h = (two ? std::max(left, right) : left + pad + right) + 2 * pad;
+  const ImVec2 from(std::round((width - w) / 2), std::round(std::max(0.0F, (height - h) / 2)));
+  ImDrawList& list = *ImGui::GetForegroundDrawList();
+  list.AddRectFilled({0, 0}, {width, height}, IM_COL32(40, 43, 54, 90));
+  list.AddRectFilled(from, {from.x + w, from.y + h}, IM_COL32(252, 252, 250, 255), 0.4F * em);
+  ImVec2 at(from.x + pad, from.y + pad);
+  kMouse.draw(list, at);
+  kPlaces.draw(list, {at.x, at.y + kMouse.height() + pad});
+  at = two ? ImVec2(at.x + column + pad, at.y) : ImVec2(at.x, at.y + left + pad);
+  kKeys.draw(list, at);
+  list.AddText({at.x, at.y + kKeys.height() + pad}, kSoftInk, kManual);
 }
 
 /// Draws a line between the two halves of the picture, and the name of a field into each half.
@@ -136,17 +229,21 @@ void drawReadout(Ui& ui, Explorer& explorer) {
     return;
   }
   if (!explorer.picture()) return;
+  const ViewState& view = explorer.view();
   const auto describe = [&](const std::string& name, const render::Drawn& drawn) {
     std::string line = fileName(name);
     for (const std::string& detail : drawn.details) line += "   " + detail;
+    if (!view.slice && view.guessesUp) line += "   up axis guessed: " + upName(view.camera);
     ui.text(line);
   };
   describe(explorer.session().current().name, *explorer.picture());
   if (explorer.pictureBeside())
-    describe(explorer.view().beside, *explorer.pictureBeside());
+    describe(view.beside, *explorer.pictureBeside());
   else
-    ui.text("drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there   click: why",
-            true);
+    ui.text(
+        "drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there   click: why   ?: all "
+        "keys",
+        true);
 }
 
 /// Writes what `why` said into the lower left corner of the picture, above the axes.
@@ -187,10 +284,33 @@ void drawPanelsWithoutField(const Controls& controls, Explorer& explorer, const 
   ui.addArea("canvas", layout.canvas);
 }
 
+/// Returns what the registry says of the parameter at the end of a line of script such as "plane zoom=", or of the
+/// command if there is none.
+std::string helpOf(const Registry& registry, const std::string& line) {
+  std::istringstream words(line);
+  std::string name, last;
+  words >> name;
+  for (std::string word; words >> word;) last = word;
+  const Command& command = registry.command(name);
+  const Parameter* parameter = nullptr;
+  if (line.ends_with('='))
+    parameter = findParameter(command, last.substr(0, last.size() - 1));
+  else if (const auto found = std::ranges::find(command.parameters, true, &Parameter::isPositional);
+           line.ends_with(' ') && found != command.parameters.end())
+    parameter = &*found;
+  return parameter != nullptr ? parameter->help : command.summary;
+}
+
 }  // namespace
 
+void Controls::describe(const std::string& command, const char* help) const {
+  const bool isUnfinished = command.ends_with('=') || command.ends_with(' ');
+  ui.help(fmt::format("{}\nIn scripts: {}{}", help != nullptr ? help : helpOf(registry, command), command,
+                      isUnfinished ? "…" : ""));
+}
+
 void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) {
-  const Controls controls{ui, commands};
+  const Controls controls{ui, explorer.session().registry(), commands};
   const ViewState& view = explorer.view();
   const Layout layout = layoutOf(view);
   ui.freeze(explorer.work.has_value());
@@ -202,19 +322,28 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
   if (explorer.work && !explorer.session().hasField()) return drawPanelsWithoutField(controls, explorer, layout);
   if (layout.bar.width() > 0) ui.column("bar", layout.bar, {}, [&] { drawBar(controls, explorer); });
   scrolling("left", layout.left, view.scroll[0], [&] {
-    section(controls, view, Panel::view, view.slice ? "Slice" : "Surface", [&] { drawViewPanel(controls, explorer); });
+    section(controls, view, Panel::questions, "Questions", [&] { drawQuestions(controls); });
+    section(controls, view, Panel::shown, view.slice ? "Slice" : "Surface", [&] { drawShown(controls, explorer); });
+    section(controls, view, Panel::colors, "Colours", [&] { drawColors(controls, explorer); });
+    section(controls, view, Panel::camera, view.slice ? "Part of the plane" : "Camera",
+            [&] { drawCamera(controls, explorer); });
     section(controls, view, Panel::build, "Construction", [&] { drawBuildPanel(controls, explorer); });
   });
   scrolling("right", layout.right, view.scroll[1], [&] {
     section(controls, view, Panel::legend, "Legend", [&] { drawLegend(ui, explorer.picture()); });
-    section(controls, view, Panel::histograms, "Histograms", [&] { drawHistograms(ui, explorer); });
-    section(controls, view, Panel::statistics, "Statistics", [&] { drawStatistics(ui, explorer); });
+    section(controls, view, Panel::histograms, "Degrees and depths", [&] { drawHistograms(ui, explorer); });
     section(controls, view, Panel::worst, "Worst interfaces", [&] { drawWorst(controls, explorer); });
+    section(controls, view, Panel::statistics, "Statistics", [&] { drawStatistics(ui, explorer); });
   });
   if (layout.readout.width() > 0) ui.column("readout", layout.readout, {}, [&] { drawReadout(ui, explorer); });
   drawMark(explorer, layout);
   drawFieldNames(explorer, layout);
   drawExplanation(explorer, layout);
+  drawGizmo(ui, view, layout.canvas, commands);
+  if (view.isOpen(Panel::keys)) {
+    drawKeys(view);
+    ui.hideTip();
+  }
   ui.addArea("canvas", layout.canvas);
   if (layout.beside.width() > 0) ui.addArea("beside", layout.beside);
 }

@@ -34,29 +34,39 @@ inline void textAt(float x, float y, const std::string& text, ImU32 color) {
 
 /// The controls of the explorer's panels. Each control shows a part of the explorer's state. When a person uses a
 /// control, the control does not change the state but appends a line of script to `commands`. The line consists of the
-/// control's parameter `command` and the chosen value.
+/// control's parameter `command` and the chosen value. The tooltip of a control is `help`, or else what the registry
+/// says of the command and its parameter.
 struct Controls {
   Ui& ui;
+  const Registry& registry;
   std::vector<std::string>& commands;
 
-  void button(const std::string& path, const char* label, const char* command, bool enabled = true) const {
+  /// Sets the tooltip of the next control.
+  void describe(const std::string& command, const char* help = nullptr) const;
+
+  void button(const std::string& path, const char* label, const char* command, bool enabled = true,
+              const char* help = nullptr, double width = 0) const {
+    describe(command, help);
     ui.enable(enabled);
-    if (ui.button(path, label)) commands.emplace_back(command);
+    if (ui.button(path, label, false, width)) commands.emplace_back(command);
     ui.enable(true);
   }
 
   void slider(const std::string& path, const char* label, double value, double low, double high,
               const std::string& command, const char* format = "%.4g") const {
+    describe(command);
     if (const auto chosen = ui.slider(path, label, value, low, high, format))
       commands.push_back(command + number(*chosen));
   }
 
   void checkbox(const std::string& path, const char* label, bool value, const char* command) const {
+    describe(command);
     if (const auto chosen = ui.checkbox(path, label, value)) commands.push_back(fmt::format("{}{}", command, *chosen));
   }
 
   void choice(const std::string& path, const char* label, const std::vector<std::string>& names,
               const std::string& current, const std::string& command) const {
+    describe(command);
     if (const auto chosen = ui.combo(path, label, names, current)) commands.push_back(command + *chosen);
   }
 
@@ -64,13 +74,20 @@ struct Controls {
   /// word is "none".
   void field(const std::string& path, const char* label, const std::string& value, const std::string& command,
              bool orNone = false) const {
+    describe(command);
     if (const auto text = ui.field(path, label, value))
       commands.push_back(command + (orNone ? wordOrNone(*text) : scriptWord(*text)));
   }
 };
 
-/// Draws the controls of the picture: the camera or the slice plane, the cells and the colours.
-void drawViewPanel(const Controls& controls, Explorer& explorer);
+/// Draws buttons that answer common questions, each by the command `preset`.
+void drawQuestions(const Controls& controls);
+/// Draws the controls of what the picture shows: offset and cut of the surface, the slice's plane, cells, triangles.
+void drawShown(const Controls& controls, Explorer& explorer);
+/// Draws the controls of the colours and of their scale.
+void drawColors(const Controls& controls, Explorer& explorer);
+/// Draws the controls of the camera or, for a slice, of the part of the plane that is seen.
+void drawCamera(const Controls& controls, Explorer& explorer);
 /// Draws the parameters of the next construction, its progress while it runs, and the button that starts it.
 void drawBuildPanel(const Controls& controls, Explorer& explorer);
 

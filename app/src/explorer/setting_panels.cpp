@@ -1,5 +1,6 @@
 // The panels of the explorer's left column.
 
+#include "explorer/explorer_commands.h"
 #include "explorer/panels.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/detail/build_settings.h"
@@ -13,7 +14,14 @@ namespace {
 
 std::string axisName(int axis) { return {"xyz"[axis]}; }
 
-void drawCamera(const Controls& controls, const render::OrbitCamera& c) {
+void drawUp(const Controls& controls, const ViewState& view) {
+  const std::string axis = upName(view.camera);
+  controls.choice("view/up", "up", {"auto", "y", "z"}, view.guessesUp ? "auto" : axis, "camera up=");
+  if (view.guessesUp) controls.ui.text("up axis guessed: " + axis, true);
+}
+
+void drawOrbit(const Controls& controls, const ViewState& view) {
+  const render::OrbitCamera& c = view.camera;
   std::vector<std::string> directions = viewNames();
   directions.insert(directions.begin(), "any");
   controls.choice("view/direction", "direction", directions, viewName(c), "camera view=");
@@ -21,25 +29,26 @@ void drawCamera(const Controls& controls, const render::OrbitCamera& c) {
     controls.commands.push_back(fmt::format("camera {},{},{}", number(azimuth), number(elevation), number(distance)));
   };
   Ui& ui = controls.ui;
+  controls.describe("camera ");
   if (const auto v = ui.slider("view/azimuth", "azimuth", std::remainder(c.azimuthDegrees, 360), -180, 180, "%.1f°"))
     turn(*v, c.elevationDegrees, c.distance);
+  controls.describe("camera ");
   if (const auto v = ui.slider("view/elevation", "elevation", c.elevationDegrees, -90, 90, "%.1f°"))
     turn(c.azimuthDegrees, *v, c.distance);
+  controls.describe("camera ");
   if (const auto v = ui.slider("view/distance", "distance", c.distance, 0.05, 3, "%.3g"))
     turn(c.azimuthDegrees, c.elevationDegrees, *v);
   controls.choice("view/projection", "projection", {"perspective", "orthographic"},
                   c.projection == render::Projection::perspective ? "perspective" : "orthographic",
                   "camera projection=");
-  controls.choice("view/up", "up", {"y", "z"}, c.up == render::UpAxis::y ? "y" : "z", "camera up=");
-  controls.button("view/center", "back to the center", "camera target=center", c.target.has_value());
+  drawUp(controls, view);
+  controls.button("view/center", "back to the centre", "camera target=center", c.target.has_value(),
+                  "Put the middle of the domain into the middle of the picture.");
 }
 
 void drawSurface(const Controls& controls, const ViewState& view, const Box& domain) {
   const double span = 0.15 * domain.diagonal().norm();
   controls.slider("view/offset", "offset", view.surfaceOffset, -span, span, "surface offset=");
-  controls.checkbox("view/shadows", "shadows", view.shadows, "surface shadows=");
-  controls.checkbox("view/edges", "edges", view.edges, "surface edges=");
-  controls.checkbox("view/cracks", "mark cracks", view.cracks, "surface cracks=");
   controls.choice("view/clip", "cut across", {"none", "x", "y", "z"}, view.clip ? axisName(view.clip->axis) : "none",
                   "surface clip=");
   if (view.clip)
@@ -54,23 +63,33 @@ void drawPlaneOffset(const Controls& controls, const ViewState& view, const Fiel
                   domain.min()[view.axis], domain.max()[view.axis], "plane offset=");
 }
 
+void drawZoom(const Controls& controls, const ViewState& view) {
+  controls.slider("view/zoom", "zoom", view.zoom, 1, 32, "plane zoom=", "%.3g");
+  controls.button("view/whole", "whole section", "plane zoom=1 target=center", view.sliceTarget || view.zoom != 1,
+                  "Show the whole section of the domain again.");
+}
+
 void drawPlane(const Controls& controls, const ViewState& view, const Field& field) {
   drawPlaneOffset(controls, view, field);
-  controls.slider("view/zoom", "zoom", view.zoom, 1, 32, "plane zoom=", "%.3g");
-  controls.button("view/whole", "whole section", "plane zoom=1 target=center", view.sliceTarget || view.zoom != 1);
   controls.field("view/operands", "operands", view.operands, "plane operands=", true);
 }
 
 /// Draws the controls that show or hide the surface, a plane and the cells of the octree in the picture of a surface.
 void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Field& field) {
+  const float left = ImGui::GetCursorPosX(), third = widthLeft() / 3;
   controls.checkbox("view/surface", "surface", view.surface, "surface shown=");
-  ImGui::SameLine();
+  ImGui::SameLine(left + third);
+  controls.checkbox("view/cracks", "cracks", view.cracks, "surface cracks=");
+  ImGui::SameLine(left + 2 * third);
   controls.checkbox("view/plane", "plane", view.planeInSpace, "plane in-space=");
+  controls.checkbox("view/shadows", "shadows", view.shadows, "surface shadows=");
+  ImGui::SameLine(left + third);
+  controls.checkbox("view/edges", "edges", view.edges, "surface edges=");
   if (view.planeInSpace) drawPlaneOffset(controls, view, field);
   controls.choice("view/cells", "cells", {"none", "lines", "boxes"}, cellStyleName(view.cells.style), "cells ");
   if (view.cells.style == render::CellStyle::none) return;
-  controls.field("view/degrees", "of degrees", levelText(view.cells.degrees), "cells degrees=");
-  controls.field("view/depths", "of depths", levelText(view.cells.depths), "cells depths=");
+  controls.field("view/degrees", "their degrees", levelText(view.cells.degrees), "cells degrees=");
+  controls.field("view/depths", "their depths", levelText(view.cells.depths), "cells depths=");
 }
 
 /// Draws the controls of the triangles that the command `contour` would write.
@@ -85,11 +104,13 @@ void drawTriangles(const Controls& controls, const ViewState& view) {
 /// Draws the controls for the limits of the colour scale. `automatic` holds the limits that the present picture uses.
 void drawColorRange(const Controls& controls, const Coloring& colors,
                     const std::optional<std::array<double, 2>>& automatic) {
+  controls.describe(fmt::format("color {} range=", colorName(colors.by)),
+                    "Keep the ends of the colour scale while the view changes, and set them.");
   const auto pin = [&](const std::string& range) {
     controls.commands.push_back(fmt::format("color {} range={}", colorName(colors.by), range));
   };
   const auto limits = [&](const std::string& low, const std::string& high) { pin(scriptWord(low + "," + high)); };
-  if (const auto pinned = controls.ui.checkbox("view/pinned", "pinned range", colors.scale.limits.has_value())) {
+  if (const auto pinned = controls.ui.checkbox("view/pinned", "fixed range", colors.scale.limits.has_value())) {
     if (!*pinned)
       pin("auto");
     else if (automatic)
@@ -97,14 +118,20 @@ void drawColorRange(const Controls& controls, const Coloring& colors,
   }
   if (!colors.scale.limits) return;
   const auto [low, high] = *colors.scale.limits;
+  controls.describe("color range=");
   if (const auto text = controls.ui.field("view/low", "from", shortNumber(low))) limits(*text, fmt::format("{}", high));
+  controls.describe("color range=");
   if (const auto text = controls.ui.field("view/high", "to", shortNumber(high))) limits(fmt::format("{}", low), *text);
 }
 
-void drawColors(const Controls& controls, const ViewState& view, const std::optional<render::Drawn>& picture) {
+}  // namespace
+
+void drawColors(const Controls& controls, Explorer& explorer) {
+  const ViewState& view = explorer.view();
+  const std::optional<render::Drawn>& picture = explorer.picture();
   const Coloring& colors = view.colors();
   const render::ColorBy without = view.slice ? render::ColorBy::normal : render::ColorBy::distance;
-  controls.choice("view/color", "color", colorNames(without), std::string(colorName(colors.by)), "color ");
+  controls.choice("view/color", "colour by", colorNames(without), std::string(colorName(colors.by)), "color ");
   const std::string command = fmt::format("color {} ", colorName(colors.by));
   if (colors.by == render::ColorBy::difference)
     controls.field("view/other", "other field", colors.other, command + "other=", true);
@@ -115,6 +142,8 @@ void drawColors(const Controls& controls, const ViewState& view, const std::opti
                   command + "scale=");
   drawColorRange(controls, colors, picture ? picture->scale.limits : std::nullopt);
 }
+
+namespace {
 
 /// The controls for the parameters of `build`. Each control shows its parameter's value in `settings`, or the value of
 /// the current field if `settings` does not contain the parameter.
@@ -128,20 +157,25 @@ struct BuildControls {
   }
 
   void field(const char* name, const std::string& ofField) const {
-    controls.field(path(name), name, value(name, ofField), command(name));
+    controls.field(path(name), label(name).c_str(), value(name, ofField), command(name));
   }
 
   void slider(const char* name, double ofField, double low, double high, const char* format) const {
     const double current = parseNumber(value(name, number(ofField))).value_or(ofField);
-    controls.slider(path(name), name, current, low, high, command(name), format);
+    controls.slider(path(name), label(name).c_str(), current, low, high, command(name), format);
   }
 
   void choice(const char* name, const std::vector<std::string>& names, const std::string& ofField) const {
-    controls.choice(path(name), name, names, value(name, ofField), command(name));
+    controls.choice(path(name), label(name).c_str(), names, value(name, ofField), command(name));
   }
 
  private:
   static std::string path(const char* name) { return fmt::format("build/{}", name); }
+  /// Returns the name of the parameter in plain words.
+  static std::string label(std::string name) {
+    std::ranges::replace(name, '-', ' ');
+    return name;
+  }
   static std::string command(const char* name) { return fmt::format("settings {}=", name); }
 };
 
@@ -163,6 +197,7 @@ void drawProgress(Ui& ui, Explorer& explorer) {
   if (!explorer.work->cancellable) return;
   ui.freeze(false);
   ui.enable(true);
+  ui.help("Stop, and keep the field that there was before.");
   if (ui.button("build/cancel", "cancel")) explorer.cancelWanted = true;
   ui.freeze(true);
   ui.enable(true);
@@ -170,21 +205,36 @@ void drawProgress(Ui& ui, Explorer& explorer) {
 
 }  // namespace
 
-void drawViewPanel(const Controls& controls, Explorer& explorer) {
+void drawShown(const Controls& controls, Explorer& explorer) {
   const ViewState& view = explorer.view();
   const Field& field = explorer.session().current().field;
   if (view.slice) {
     drawPlane(controls, view, field);
   } else {
-    drawCamera(controls, view.camera);
-    drawSurface(controls, view, field.domain());
     drawPlaneAndCells(controls, view, field);
+    drawSurface(controls, view, field.domain());
   }
   drawTriangles(controls, view);
+  controls.describe("arrows ");
   if (const auto v = controls.ui.slider("view/arrows", "arrows", view.arrows, 0, 120, "%.0f"))
     controls.commands.push_back(fmt::format("arrows {:.0f}", *v));
-  drawColors(controls, view, explorer.picture());
   controls.field("view/beside", "beside", view.beside, "beside ", true);
+}
+
+void drawCamera(const Controls& controls, Explorer& explorer) {
+  const ViewState& view = explorer.view();
+  view.slice ? drawZoom(controls, view) : drawOrbit(controls, view);
+}
+
+void drawQuestions(const Controls& controls) {
+  const float gap = ImGui::GetStyle().ItemSpacing.x, width = (widthLeft() - gap) / 2;
+  bool second = false;
+  for (const Preset& preset : presets()) {
+    if (second) ImGui::SameLine();
+    const std::string path = fmt::format("questions/{}", preset.name), command = fmt::format("preset {}", preset.name);
+    controls.button(path, preset.question, command.c_str(), true, preset.help, width);
+    second = !second;
+  }
 }
 
 /// Draws the settings of Algorithm 1, which have no effect on a construction within a tolerance.
@@ -219,10 +269,12 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer) {
   if (explorer.work) return drawProgress(controls.ui, explorer);
   if (const auto all = explorer.allSteps()) {
     const auto steps = double(field.metadata().steps.value_or(*all));
+    controls.describe("rebuild max-steps=");
     if (const auto v = controls.ui.slider("build/steps", "steps", steps, 0, double(*all), "%.0f", When::released))
       controls.commands.push_back(fmt::format("rebuild max-steps={:.0f}", *v));
   }
-  controls.button("build/rebuild", "rebuild", "rebuild", !build.value("mesh", current.madeFrom()).empty());
+  controls.button("build/rebuild", "rebuild", "rebuild", !build.value("mesh", current.madeFrom()).empty(), nullptr,
+                  widthLeft());
 }
 
 }  // namespace hpsdf::app

@@ -64,7 +64,10 @@ void runUi(Session& session, const Arguments& arguments) {
     return;
   }
   if (action == "key") {
-    explorer.input({.kind = Input::Kind::key, .key = *keyNamed(target), .control = arguments.flag("control")});
+    explorer.input({.kind = Input::Kind::key,
+                    .key = *keyNamed(target),
+                    .control = arguments.flag("control"),
+                    .shift = arguments.flag("shift")});
     return;
   }
   const Point at = targetPixel(explorer, target, action == "type");
@@ -129,7 +132,8 @@ void addUiCommand(Registry& registry) {
                      {"target", text("WIDGET|X,Y|KEY").positional(), "The widget, the pixel, or the key."},
                      {"value", text().positional(), "What drag, type and wheel do."},
                      {"button", choice({"left", "right"}).byDefault("left"), "Of the mouse."},
-                     {"control", flag(), "With the Ctrl key held down."}},
+                     {"control", flag(), "With the Ctrl key held down."},
+                     {"shift", flag(), "With the Shift key held down, for key."}},
       .action = runUi,
       .check = checkUi,
   });

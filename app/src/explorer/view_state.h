@@ -12,10 +12,29 @@
 
 namespace hpsdf::app {
 
-/// The parts of the explorer's frame that surround its picture. Each part can be closed.
-enum class Panel : std::uint8_t { bar, view, build, legend, histograms, statistics, worst, readout };
-constexpr std::array kPanelNames = {"bar", "view", "build", "legend", "histograms", "statistics", "worst", "readout"};
+/// The parts of the explorer's frame that surround its picture, the overlay that tells keys and mouse actions, and the
+/// sections of the two columns. A part is open or closed, a section unfolded or folded to its heading.
+enum class Panel : std::uint8_t {
+  bar,
+  left,
+  right,
+  readout,
+  keys,
+  questions,  // sections of the left column
+  shown,
+  colors,
+  camera,
+  build,
+  legend,  // sections of the right column
+  histograms,
+  worst,
+  statistics
+};
+constexpr std::array kPanelNames = {"bar",    "left",   "right", "readout", "keys",       "questions", "shown",
+                                    "colors", "camera", "build", "legend",  "histograms", "worst",     "statistics"};
 constexpr std::size_t kPanels = kPanelNames.size();
+constexpr bool isSection(Panel panel) { return panel >= Panel::questions; }
+constexpr Panel columnOf(Panel section) { return section < Panel::legend ? Panel::left : Panel::right; }
 
 /// The quantity that the picture's colours show, and the colour scale.
 struct Coloring {
@@ -41,6 +60,7 @@ struct ViewState {
   std::optional<Vector3> sliceTarget;  ///< centre of the slice's picture; by default the centre of the section
 
   render::OrbitCamera camera;
+  bool guessesUp = false;    ///< each new field sets `camera.up` to a guess; `scriptOf` writes only the axis
   double surfaceOffset = 0;  ///< value of the level set that is drawn, world units
   std::optional<render::ClipPlane> clip;
   bool cracks = false;       ///< marks pixels where a ray meets a jump of the field
@@ -63,7 +83,10 @@ struct ViewState {
   int worstPage = 0;                   ///< page of the list of interfaces, from 0
   std::optional<Vector3> mark;         ///< point that is marked in the picture, world units
 
-  std::array<bool, kPanels> open = {true, true, true, true, true, true, true, true};
+  /// The parts that are open and the sections that are unfolded. At first the sections are folded in which a view is
+  /// set up with numbers, and those that list figures.
+  std::array<bool, kPanels> open = {true, true,  true,  true, false, true,  true,
+                                    true, false, false, true, true,  false, false};
   std::array<double, 2> scroll = {0, 0};  ///< scroll positions of the left and the right column, pixels
   int width = 1280;                       ///< size of the whole frame, pixels
   int height = 720;
@@ -71,6 +94,8 @@ struct ViewState {
   Backend backend;
 
   bool isOpen(Panel panel) const { return open[static_cast<std::size_t>(panel)]; }
+  /// True if the content of a section is drawn, provided that the frame has room for its column.
+  bool isUnfolded(Panel section) const { return isOpen(columnOf(section)) && isOpen(section); }
   const Coloring& colors() const { return slice ? sliceColors : surfaceColors; }
 };
 

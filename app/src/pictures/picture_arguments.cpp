@@ -108,6 +108,8 @@ std::string viewName(const render::OrbitCamera& camera) {
   return {};
 }
 
+std::string upName(const render::OrbitCamera& camera) { return camera.up == render::UpAxis::y ? "y" : "z"; }
+
 std::vector<std::string> colorNames(std::optional<ColorBy> without) {
   std::vector<std::string> names;
   for (const render::ColorMode& mode : render::colorModes())
@@ -148,7 +150,7 @@ std::string levelText(const std::vector<int>& levels) {
 
 std::string cameraLine(const render::OrbitCamera& camera) {
   return fmt::format("camera {},{},{} target={} up={} projection={}\n", camera.azimuthDegrees, camera.elevationDegrees,
-                     camera.distance, targetText(camera.target), camera.up == render::UpAxis::y ? "y" : "z",
+                     camera.distance, targetText(camera.target), upName(camera),
                      camera.projection == render::Projection::perspective ? "perspective" : "orthographic");
 }
 

@@ -32,6 +32,9 @@ void turnTo(render::OrbitCamera& camera, std::string_view view);
 /// Returns the name of the camera's direction, or "" if the direction has no name.
 std::string viewName(const render::OrbitCamera& camera);
 
+/// Returns the name of the axis that points up.
+std::string upName(const render::OrbitCamera& camera);
+
 /// Returns the style in which cells are drawn, by its name: none, lines or boxes.
 render::CellStyle cellStyle(std::string_view name);
 std::string cellStyleName(render::CellStyle style);

@@ -20,15 +20,20 @@ struct NamedKey {
   Key key;
   ImGuiKey code;
 };
+const ImVec4 kAccent(0.20F, 0.36F, 0.62F, 1);
 constexpr NamedKey kKeys[] = {{"enter", Key::enter, ImGuiKey_Enter},
                               {"escape", Key::escape, ImGuiKey_Escape},
                               {"backspace", Key::backspace, ImGuiKey_Backspace},
                               {"delete", Key::remove, ImGuiKey_Delete},
                               {"left", Key::left, ImGuiKey_LeftArrow},
                               {"right", Key::right, ImGuiKey_RightArrow},
+                              {"up", Key::up, ImGuiKey_UpArrow},
+                              {"down", Key::down, ImGuiKey_DownArrow},
                               {"home", Key::home, ImGuiKey_Home},
                               {"end", Key::end, ImGuiKey_End},
                               {"tab", Key::tab, ImGuiKey_Tab},
+                              {"space", Key::space, ImGuiKey_Space},
+                              {"f1", Key::f1, ImGuiKey_COUNT},  // Dear ImGui has no name for it
                               {"a", Key::a, ImGuiKey_A},
                               {"c", Key::c, ImGuiKey_C},
                               {"v", Key::v, ImGuiKey_V},
@@ -52,7 +57,6 @@ void setStyle() {
   style.FrameRounding = 2;
   style.GrabRounding = 2;
   style.GrabMinSize = 8;
-  const ImVec4 accent(0.20F, 0.36F, 0.62F, 1);
   const auto set = [&](ImGuiCol what, ImVec4 color) { style.Colors[what] = color; };
   set(ImGuiCol_WindowBg, gray(0.965F));
   set(ImGuiCol_PopupBg, gray(0.99F));
@@ -68,13 +72,15 @@ void setStyle() {
   set(ImGuiCol_Header, {0.80F, 0.87F, 0.97F, 1});
   set(ImGuiCol_HeaderHovered, {0.86F, 0.91F, 0.98F, 1});
   set(ImGuiCol_HeaderActive, {0.72F, 0.80F, 0.93F, 1});
-  set(ImGuiCol_CheckMark, accent);
+  set(ImGuiCol_CheckMark, kAccent);
   set(ImGuiCol_SliderGrab, {0.74F, 0.82F, 0.93F, 1});
-  set(ImGuiCol_SliderGrabActive, accent);
+  set(ImGuiCol_SliderGrabActive, kAccent);
   set(ImGuiCol_PlotHistogram, {0.45F, 0.58F, 0.78F, 1});
   set(ImGuiCol_Separator, gray(0.86F));
   set(ImGuiCol_ScrollbarBg, gray(0.94F));
 }
+
+UiRect rectOf(const ImVec2& low, const ImVec2& high) { return {low.x, low.y, high.x, high.y}; }
 
 UiRect visiblePart(const ImVec2& low, const ImVec2& high) {
   const ImDrawList& list = *ImGui::GetWindowDrawList();
@@ -103,6 +109,14 @@ struct Ui::State {
   std::string clipboard;
   std::string idText;
   std::pair<std::string, double> held;  ///< path and value of a held slider that reports its value on release
+  std::optional<Key> key;               ///< key that was pressed in this frame for the control with the focus
+  bool focusMoved = false;              ///< the focus has moved in this frame
+  double scrollBy = 0;                  ///< distance by which a column must scroll to show the control with the focus
+  struct Tip {
+    std::string text;
+    UiRect widget, column;  ///< the widget with its label, and the column that it stands in
+  };
+  std::optional<Tip> hovered, chosen;  ///< tooltips of the widget under the pointer and of the one with the focus
 };
 
 Ui::Ui() : state_(std::make_unique<State>()) {
@@ -113,7 +127,8 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   io.ConfigInputTextCursorBlink = false;
   io.MouseDoubleClickTime = 0;  // fast clicks of a script must not become double clicks
   io.MouseDrawCursor = false;
-  for (const NamedKey& known : kKeys) io.KeyMap[known.code] = static_cast<int>(known.key);
+  for (const NamedKey& known : kKeys)
+    if (known.code != ImGuiKey_COUNT) io.KeyMap[known.code] = static_cast<int>(known.key);
   io.ClipboardUserData = &state_->clipboard;
   io.SetClipboardTextFn = [](void* clipboard, const char* text) { *static_cast<std::string*>(clipboard) = text; };
   io.GetClipboardTextFn = [](void* clipboard) { return static_cast<std::string*>(clipboard)->c_str(); };
@@ -145,6 +160,7 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
   io.MouseWheel = 0;
   if (input != nullptr) {
     const Input& event = *input;
+    takeKey(event);
     io.KeyCtrl = event.control;
     io.KeyShift = event.shift;
     if (event.kind == Input::Kind::move) pointer_ = event.at;
@@ -152,11 +168,17 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
     if (event.kind == Input::Kind::release) io.MouseDown[event.button] = false;
     if (event.kind == Input::Kind::wheel) io.MouseWheel = float(event.turn);
     if (event.kind == Input::Kind::type) io.AddInputCharactersUTF8(event.text.c_str());
-    if (event.kind == Input::Kind::key) io.KeysDown[static_cast<int>(event.key)] = true;
+    if (event.kind == Input::Kind::key && event.key != Key::tab) io.KeysDown[static_cast<int>(event.key)] = true;
   }
   io.MousePos = {float(pointer_[0]), float(pointer_[1])};
   widgets_.clear();
+  order_.clear();
+  state_->hovered.reset();
+  state_->chosen.reset();
   const auto end = [&] {
+    state_->key.reset();
+    state_->focusMoved = false;
+    help_.clear();
     ImGui::Render();
     if (input != nullptr && input->kind == Input::Kind::key) io.KeysDown[static_cast<int>(input->key)] = false;
     if (input == nullptr || input->kind != Input::Kind::press) io.KeyCtrl = io.KeyShift = false;
@@ -170,7 +192,71 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
     end();
     throw;
   }
+  drawTip(width, height);
   end();
+}
+
+void Ui::takeKey(const Input& input) {
+  if (input.kind == Input::Kind::press) focus_.clear();
+  if (input.kind != Input::Kind::key || input.control) return;
+  if (input.key == Key::tab) return moveFocus(input.shift ? -1 : 1);
+  if (editing()) return;
+  if (input.key == Key::escape) focus_.clear();
+  if (!focus_.empty()) state_->key = input.key;
+}
+
+void Ui::moveFocus(int step) {
+  if (editing()) ImGui::ClearActiveID();
+  if (order_.empty()) return;
+  const auto count = std::ptrdiff_t(order_.size());
+  const auto found = std::ranges::find(order_, focus_) - order_.begin();
+  const auto from = found < count ? found : step > 0 ? -1 : count;
+  focus_ = order_[std::size_t((from + step + count) % count)];
+  state_->focusMoved = true;
+}
+
+bool Ui::pressedByKey(const std::string& path) const {
+  return path == focus_ && !state_->disabled && (state_->key == Key::enter || state_->key == Key::space);
+}
+
+int Ui::stepByKey(const std::string& path) const {
+  if (path != focus_ || state_->disabled || !state_->key) return 0;
+  if (state_->key == Key::right || state_->key == Key::down) return 1;
+  return state_->key == Key::left || state_->key == Key::up ? -1 : 0;
+}
+
+void Ui::hideTip() {
+  state_->hovered.reset();
+  state_->chosen.reset();
+}
+
+/// Draws a tooltip: beside the column of its widget, or else below or above the widget. It covers neither the widget
+/// nor, unless there is no other place, other widgets of the column.
+void Ui::drawTip(int width, int height) {
+  const auto& tip = state_->chosen ? state_->chosen : state_->hovered;
+  if (!tip || tip->text.empty() || holds(0) || holds(1) || holds(2)) return;
+  if (ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel)) return;
+  const float em = ImGui::GetFontSize(), pad = 0.5F * em, gap = 0.4F * em;
+  const ImVec2 text = ImGui::CalcTextSize(tip->text.c_str(), nullptr, false, 22 * em);
+  const float w = text.x + 2 * pad, h = text.y + 2 * pad;
+  const UiRect &item = tip->widget, &column = tip->column;
+  ImVec2 at(std::clamp(float(item.x0), 0.0F, std::max(0.0F, float(width) - w)),
+            std::clamp(float(item.y0), 0.0F, std::max(0.0F, float(height) - h)));
+  if (float(column.x1) + gap + w <= float(width))
+    at.x = float(column.x1) + gap;
+  else if (float(column.x0) - gap - w >= 0)
+    at.x = float(column.x0) - gap - w;
+  else if (float(item.y1) + gap + h <= float(height))
+    at.y = float(item.y1) + gap;
+  else if (float(item.y0) - gap - h >= 0)
+    at.y = float(item.y0) - gap - h;
+  else
+    return;  // the frame has no room
+  at = {std::round(at.x), std::round(at.y)};
+  ImDrawList& list = *ImGui::GetForegroundDrawList();
+  list.AddRectFilled(at, {at.x + w, at.y + h}, IM_COL32(40, 43, 54, 245), 0.25F * em);
+  list.AddText(ImGui::GetFont(), em, {at.x + pad, at.y + pad}, IM_COL32(245, 245, 242, 255), tip->text.c_str(), nullptr,
+               22 * em + 1);
 }
 
 void Ui::paint(render::Image& image) const {
@@ -186,7 +272,10 @@ ImGuiIO& Ui::activate() const {
 bool Ui::wantsMouse() const { return activate().WantCaptureMouse; }
 bool Ui::busy() const { return holds(0) || holds(1) || holds(2) || ImGui::IsAnyItemActive(); }
 bool Ui::holds(int button) const { return activate().MouseDown[button]; }
-bool Ui::editing() const { return activate().WantTextInput; }
+bool Ui::editing() const {
+  activate();
+  return ImGui::GetActiveID() != 0 && ImGui::GetInputTextState(ImGui::GetActiveID()) != nullptr;
+}
 
 const std::string& Ui::clipboard() const { return state_->clipboard; }
 void Ui::setClipboard(const std::string& text) { state_->clipboard = text; }
@@ -202,20 +291,60 @@ double Ui::column(const char* name, const UiRect& rect, std::optional<double> sc
       ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
           ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoBringToFrontOnFocus |
           (scrolls ? ImGuiWindowFlags_None : ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse));
-  if (std::abs(ImGui::GetScrollY() - scroll) > 0.5 && ImGui::GetIO().MouseWheel == 0 && !ImGui::IsMouseDown(0))
-    ImGui::SetScrollY(float(scroll));
-  ImGui::PushItemWidth(0.52F * ImGui::GetContentRegionAvail().x);
+  const bool isByUser = ImGui::GetIO().MouseWheel != 0 || ImGui::IsMouseDown(0);
+  const double scrolledTo = isByUser ? double(ImGui::GetScrollY()) : scroll;
+  if (std::abs(ImGui::GetScrollY() - scrolledTo) > 0.5) ImGui::SetScrollY(float(scrolledTo));  // at the next frame
   enable(true);
+  state_->scrollBy = 0;
   content();
   setDisabled(false);
-  ImGui::PopItemWidth();
-  const double now = std::min(ImGui::GetScrollY(), ImGui::GetScrollMaxY());
+  const double most = ImGui::GetScrollMaxY();
+  const double now = std::clamp(std::min(scrolledTo, most) + state_->scrollBy, 0.0, most);
   ImGui::End();
   return now;
 }
 
-void Ui::note(const std::string& path, bool takesText) {
-  widgets_[path] = {visiblePart(ImGui::GetItemRectMin(), ImGui::GetItemRectMax()), !state_->disabled, takesText};
+void Ui::note(const std::string& path, bool takesText, std::optional<double> from) {
+  const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
+  const ImVec2 labelled(from ? float(*from) : low.x, low.y);
+  const UiRect rect = visiblePart(low, high);
+  widgets_[path] = {.rect = rect, .enabled = !state_->disabled, .takesText = takesText, .help = help_};
+  const ImGuiWindow& window = *ImGui::GetCurrentWindow();
+  const UiRect column = rectOf(window.Pos, {window.Pos.x + window.Size.x, window.Pos.y + window.Size.y});
+  const bool hovered = ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled) ||
+                       (ImGui::IsWindowHovered() && ImGui::IsMouseHoveringRect(labelled, high));
+  if (hovered) state_->hovered = {help_, rectOf(labelled, high), column};
+  if (!state_->disabled) order_.push_back(path);
+  if (path == focus_ && !state_->disabled) {
+    state_->chosen = {help_, rectOf(labelled, high), column};
+    ImGui::GetWindowDrawList()->AddRect({low.x - 1, low.y - 1}, {high.x + 1, high.y + 1}, ImGui::GetColorU32(kAccent),
+                                        ImGui::GetStyle().FrameRounding, 0, 2);
+    const double room = 0.5 * ImGui::GetFontSize(), top = window.InnerRect.Min.y, bottom = window.InnerRect.Max.y;
+    if (state_->focusMoved && high.y + room > bottom) state_->scrollBy = high.y + room - bottom;
+    if (state_->focusMoved && low.y - room < top) state_->scrollBy = low.y - room - top;
+  }
+  help_.clear();
+}
+
+bool Ui::addControl(const std::string& path, const UiRect& rect, std::string help) {
+  const bool over = !wantsMouse() && rect.contains(pointer_[0], pointer_[1]);
+  if (over) state_->hovered = {help, rect, rect};
+  if (path == focus_) state_->chosen = {help, rect, rect};
+  widgets_[path] = {.rect = rect, .enabled = !state_->frozen, .help = std::move(help)};
+  if (!state_->frozen) order_.push_back(path);
+  return !state_->frozen && pressedByKey(path);
+}
+
+double Ui::label(const char* text) {
+  const double from = ImGui::GetCursorScreenPos().x;
+  if (*text != '\0') {
+    const float width = ImGui::CalcTextSize(text).x, left = 0.42F * ImGui::GetContentRegionAvail().x;
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextUnformatted(text);
+    ImGui::SameLine(0, std::max(left - width, ImGui::GetStyle().ItemInnerSpacing.x));
+  }
+  ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
+  return from;
 }
 
 const char* Ui::id(const std::string& path, const char* label) {
@@ -233,85 +362,119 @@ void Ui::enable(bool enabled) { setDisabled(!enabled || state_->frozen); }
 
 void Ui::freeze(bool frozen) { state_->frozen = frozen; }
 
-bool Ui::heading(const std::string& path, const char* label) {
-  ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted(label);
-  const float width = ImGui::CalcTextSize("×").x + 8;
-  ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - width);
-  ImGui::PushStyleVar(ImGuiStyleVar_FrameBorderSize, 0);
-  ImGui::PushStyleColor(ImGuiCol_Button, {0, 0, 0, 0});
-  const bool closed = ImGui::Button(id(path, "×"), {width, 0});
+bool Ui::heading(const std::string& path, const char* label, bool unfolded) {
+  const float em = ImGui::GetFontSize(), height = ImGui::GetFrameHeight();
+  const bool isFirst = ImGui::GetCursorPosY() <= ImGui::GetWindowContentRegionMin().y + 0.5F;
+  if (!isFirst) ImGui::Dummy({0, 0.2F * em});
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  const bool pressed = ImGui::InvisibleButton(id(path, ""), {ImGui::GetContentRegionAvail().x, height});
+  const ImVec2 to = ImGui::GetItemRectMax();
+  const ImGuiCol color = ImGui::IsItemHovered() ? ImGuiCol_HeaderHovered : ImGuiCol_Separator;
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  list.AddRectFilled(from, to, ImGui::GetColorU32(color), ImGui::GetStyle().FrameRounding);
+  const float y = from.y + 0.5F * (height - em);
+  const ImU32 ink = ImGui::GetColorU32(ImGuiCol_Text);
+  ImGui::RenderArrow(&list, {from.x + 0.3F * em, y + 0.1F * em}, ink, unfolded ? ImGuiDir_Down : ImGuiDir_Right, 0.8F);
+  list.AddText({from.x + 1.5F * em, y}, ink, label);
   note(path);
-  ImGui::PopStyleColor();
-  ImGui::PopStyleVar();
-  ImGui::Separator();
-  return closed;
+  return pressed || pressedByKey(path);
 }
 
-bool Ui::button(const std::string& path, const char* label, bool pressed) {
+bool Ui::button(const std::string& path, const char* label, bool pressed, double width) {
   if (pressed) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_Header));
-  const bool clicked = ImGui::Button(id(path, label));
+  const bool clicked = ImGui::Button(id(path, label), {float(width), 0});
   if (pressed) ImGui::PopStyleColor();
   note(path);
-  return clicked;
+  return clicked || pressedByKey(path);
 }
 
 std::optional<bool> Ui::checkbox(const std::string& path, const char* label, bool value) {
-  const bool changed = ImGui::Checkbox(id(path, label), &value);
+  const bool byKey = pressedByKey(path);
+  bool changed = ImGui::Checkbox(id(path, label), &value);
+  if (byKey) {
+    changed = true;
+    value = !value;
+  }
   note(path);
   return changed ? std::optional(value) : std::nullopt;
 }
 
-std::optional<std::string> Ui::combo(const std::string& path, const char* label, std::span<const std::string> items,
+std::optional<std::string> Ui::combo(const std::string& path, const char* text, std::span<const std::string> items,
                                      const std::string& current) {
   std::optional<std::string> chosen;
-  const std::string& shown = std::ranges::find(items, current) != items.end() ? current : items.front();
-  const bool open = ImGui::BeginCombo(id(path, label), shown.c_str(), ImGuiComboFlags_HeightLargest);
-  note(path);
-  if (!open) return chosen;
+  const auto found = std::ranges::find(items, current);
+  const auto now = found == items.end() ? 0 : found - items.begin();
+  const std::string& shown = items[std::size_t(now)];
+  const double from = label(text);
+  const bool open = ImGui::BeginCombo(id(path, ""), shown.c_str(), ImGuiComboFlags_HeightLargest);
+  note(path, false, from);
+  const auto count = std::ptrdiff_t(items.size());
+  if (pressedByKey(path)) chosen = items[std::size_t((now + 1) % count)];
+  if (const int step = stepByKey(path))
+    chosen = items[std::size_t(std::clamp(now + step, std::ptrdiff_t{0}, count - 1))];
+  if (!open) return chosen == shown ? std::nullopt : chosen;
   for (const std::string& item : items) {
     const std::string itemPath = path + "/" + item;
     if (ImGui::Selectable(id(itemPath, item.c_str()), item == shown)) chosen = item;
     note(itemPath);
+    if (!pressedByKey(itemPath)) continue;
+    chosen = item;
+    ImGui::CloseCurrentPopup();
   }
   ImGui::EndCombo();
   return chosen;
 }
 
-std::optional<double> Ui::slider(const std::string& path, const char* label, double value, double low, double high,
+/// Begins to type into the widget that was drawn last, at the next frame.
+void Ui::typeInto(const std::string& path, bool atOnce) {
+  const bool wanted = state_->key == Key::enter || (atOnce && state_->focusMoved);
+  if (path != focus_ || state_->disabled || !wanted) return;
+  ImGuiContext& context = *ImGui::GetCurrentContext();
+  context.NavNextActivateId = ImGui::GetItemID();
+  context.NavNextActivateFlags = ImGuiActivateFlags_PreferInput;
+}
+
+std::optional<double> Ui::slider(const std::string& path, const char* text, double value, double low, double high,
                                  const char* format, When when) {
-  const double before = value;
+  const double before = value, from = label(text);
   if (when == When::released && state_->held.first == path) value = state_->held.second;
-  bool changed = ImGui::SliderScalar(id(path, label), ImGuiDataType_Double, &value, &low, &high, format);
+  bool changed = ImGui::SliderScalar(id(path, ""), ImGuiDataType_Double, &value, &low, &high, format);
   if (when == When::released) {
     if (ImGui::IsItemActive()) state_->held = {path, value};
     changed = ImGui::IsItemDeactivatedAfterEdit();
     if (changed) value = state_->held.second;
     if (!ImGui::IsItemActive() && state_->held.first == path) state_->held = {};
   }
-  note(path, true);
+  if (const int step = stepByKey(path)) {
+    const bool whole = std::string_view(format).starts_with("%.0f");
+    value = std::clamp(value + step * (whole ? 1 : (high - low) / 100), low, high);
+    changed = true;
+  }
+  typeInto(path, false);
+  note(path, true, from);
   return changed && value != before ? std::optional(value) : std::nullopt;
 }
 
-std::optional<std::string> Ui::field(const std::string& path, const char* label, const std::string& value) {
+std::optional<std::string> Ui::field(const std::string& path, const char* text, const std::string& value) {
   std::array<char, 1024> buffer{};
   value.copy(buffer.data(), buffer.size() - 1);
-  const bool entered = ImGui::InputText(id(path, label), buffer.data(), buffer.size(),
+  const double from = label(text);
+  const bool entered = ImGui::InputText(id(path, ""), buffer.data(), buffer.size(),
                                         ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
-  note(path, true);
+  typeInto(path, true);
+  note(path, true, from);
   return entered && buffer.data() != value ? std::optional<std::string>(buffer.data()) : std::nullopt;
 }
 
-bool Ui::row(const std::string& path, std::span<const std::string> cells, double cellWidth) {
+bool Ui::row(const std::string& path, std::span<const std::string> cells, std::span<const double> columns) {
+  const ImVec2 at = ImGui::GetCursorScreenPos();
   const bool clicked = ImGui::Selectable(id(path, ""));
   note(path);
-  ImVec2 at = ImGui::GetItemRectMin();
-  at.y += 0.5F * ImGui::GetStyle().ItemSpacing.y;
-  for (const std::string& cell : cells) {
-    ImGui::GetWindowDrawList()->AddText(at, ImGui::GetColorU32(ImGuiCol_Text), cell.c_str());
-    at.x += float(cellWidth);
-  }
-  return clicked;
+  const float digit = ImGui::CalcTextSize("0").x;
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    ImGui::GetWindowDrawList()->AddText({std::round(at.x + digit * float(columns[i])), at.y},
+                                        ImGui::GetColorU32(ImGuiCol_Text), cells[i].c_str());
+  return clicked || pressedByKey(path);
 }
 
 void Ui::text(const std::string& line, bool soft) {
@@ -333,7 +496,8 @@ void Ui::facts(std::span<const std::pair<std::string, std::string>> rows) {
 
 void Ui::progress(const std::string& path, const std::string& task, double fraction) {
   ImGui::ProgressBar(float(fraction), {-1, 0}, task.c_str());
-  note(path);
+  addArea(path, visiblePart(ImGui::GetItemRectMin(), ImGui::GetItemRectMax()));
+  widgets_[path].enabled = !state_->disabled;
 }
 
 }  // namespace hpsdf::app

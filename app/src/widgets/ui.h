@@ -1,6 +1,7 @@
 #pragma once
 // The widgets of the panels, drawn with Dear ImGui without a window. Input arrives as single events. Every
-// widget has a path by which scripts find the widget. Nothing depends on the clock.
+// widget has a path by which scripts find the widget, and the keyboard reaches every control. Nothing depends on the
+// clock.
 
 #include <array>
 #include <functional>
@@ -18,7 +19,27 @@ struct ImGuiIO;
 
 namespace hpsdf::app {
 
-enum class Key : std::uint8_t { enter, escape, backspace, remove, left, right, home, end, tab, a, c, v, x, y, z };
+enum class Key : std::uint8_t {
+  enter,
+  escape,
+  backspace,
+  remove,
+  left,
+  right,
+  up,
+  down,
+  home,
+  end,
+  tab,
+  space,
+  f1,
+  a,
+  c,
+  v,
+  x,
+  y,
+  z
+};
 
 /// Returns the names of all keys as scripts spell them: "enter", "escape", ….
 std::vector<std::string> keyNames();
@@ -49,6 +70,8 @@ struct Widget {
   UiRect rect;             ///< visible part; empty if the widget is scrolled out of its column
   bool enabled = true;     ///< false while the widget takes no input
   bool takesText = false;  ///< true for text fields and sliders
+  bool isControl = true;   ///< false for areas and displays, which the keyboard does not reach
+  std::string help = {};   ///< text of the tooltip
 };
 
 /// When a slider returns its value: at each movement, or once it is released.
@@ -78,19 +101,33 @@ class Ui {
   /// gesture.
   bool busy() const;
   bool holds(int button) const;
+  /// True while a text is being typed.
   bool editing() const;
+  /// The path of the control that the keyboard has chosen, or "". Tab and Shift+Tab move on to the next and the
+  /// previous control; then Enter and Space press it, arrows change a slider or a list, Enter begins to type into a
+  /// slider. A press of the mouse and Escape end the choice.
+  const std::string& focus() const { return focus_; }
+  void clearFocus() { focus_.clear(); }
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
 
   // The following functions draw widgets. Only the function `widgets`, the argument of `frame`, may call them. Each
-  // function returns the change that the user made in this frame. A path has the form panel/name. A label may be empty.
+  // function returns the change that the user made in this frame. A path has the form panel/name. A label may be empty;
+  // it stands on the left of the widget.
+
+  /// Sets the tooltip of the next widget. A tooltip is shown beside its column while the pointer rests on the widget
+  /// and no mouse button is down, and for the control that the keyboard has chosen.
+  void help(std::string text) { help_ = std::move(text); }
+  /// Hides the tooltip of this frame, because something else lies over the frame.
+  void hideTip();
 
   /// Draws the background of a panel and calls `content` to fill the panel. `scroll` is the scroll position in
   /// pixels, or std::nullopt for a panel that never scrolls. Returns the new scroll position.
   double column(const char* name, const UiRect& rect, std::optional<double> scroll,
                 const std::function<void()>& content);
-  bool heading(const std::string& path, const char* label);
-  bool button(const std::string& path, const char* label, bool pressed = false);
+  /// Draws the heading of a section that is unfolded or folded. Returns true if it was pressed.
+  bool heading(const std::string& path, const char* label, bool unfolded);
+  bool button(const std::string& path, const char* label, bool pressed = false, double width = 0);
   std::optional<bool> checkbox(const std::string& path, const char* label, bool value);
   /// Draws a list of the names `items`. If `current` is not one of these names, the list shows the first name.
   std::optional<std::string> combo(const std::string& path, const char* label, std::span<const std::string> items,
@@ -99,7 +136,8 @@ class Ui {
                                const char* format = "%.4g", When when = When::moved);
   /// Draws a text field. Returns the text of the field when Enter is pressed, and std::nullopt otherwise.
   std::optional<std::string> field(const std::string& path, const char* label, const std::string& value);
-  bool row(const std::string& path, std::span<const std::string> cells, double cellWidth);
+  /// Draws a row of a table, with its cells from `columns` on, measured in widths of a digit.
+  bool row(const std::string& path, std::span<const std::string> cells, std::span<const double> columns);
   void text(const std::string& line, bool soft = false);
   void facts(std::span<const std::pair<std::string, std::string>> rows);
   void progress(const std::string& path, const std::string& task, double fraction);
@@ -110,18 +148,36 @@ class Ui {
 
   /// Registers a rectangle that no function of this class draws, such as the picture, as a widget, so that
   /// scripts find it by its path.
-  void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {rect, true}; }
+  void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {.rect = rect, .isControl = false}; }
+
+  /// Registers a rectangle that no function of this class draws as a control with a tooltip. Returns true if it was
+  /// pressed by the keyboard; presses of the mouse are the caller's.
+  bool addControl(const std::string& path, const UiRect& rect, std::string help);
 
  private:
   /// Makes this object's context the current context of Dear ImGui.
   ImGuiIO& activate() const;
-  void note(const std::string& path, bool takesText = false);
+  /// Registers the widget that was drawn last. `from` is the left end of its label.
+  void note(const std::string& path, bool takesText = false, std::optional<double> from = {});
+  /// Draws the label of the next widget. Returns the position of its left end.
+  double label(const char* text);
+  void typeInto(const std::string& path, bool atOnce);
+  void takeKey(const Input& input);
+  void moveFocus(int step);
+  /// True if the key that was pressed in this frame presses the control.
+  bool pressedByKey(const std::string& path) const;
+  /// Returns 1 for the keys right and down, -1 for left and up, if they are pressed for this control, otherwise 0.
+  int stepByKey(const std::string& path) const;
+  void drawTip(int width, int height);
   void setDisabled(bool disabled);
   const char* id(const std::string& path, const char* label);
 
   struct State;
   std::unique_ptr<State> state_;
   std::map<std::string, Widget> widgets_;
+  std::vector<std::string> order_;  ///< paths of the controls that take input, in the order in which they are drawn
+  std::string focus_;
+  std::string help_;  ///< tooltip of the next widget
   std::array<double, 2> pointer_ = {-1, -1};
 };
 

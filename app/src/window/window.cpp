@@ -32,6 +32,7 @@ constexpr double kPollSeconds = 0.2;     // longest wait for an event, because C
 constexpr double kRestSeconds = 0.06;    // time without an event after which a slow picture is drawn in full
 constexpr double kStillSeconds = 0.3;    // the same while work runs, which full pictures would slow down
 constexpr double kSmoothSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
+constexpr const char* kGuessUp = "camera up=auto";    // files of meshes do not say which axis points up
 constexpr int kLeastSize = 64, kGreatestSize = 8192;  // range of frame sizes, pixels
 
 /// Returns the description of GLFW's last error.
@@ -129,11 +130,12 @@ std::optional<Key> keyOf(int key, int scancode) {
     int code;
     Key key;
   };
-  static constexpr Code kCodes[] = {{GLFW_KEY_ENTER, Key::enter},   {GLFW_KEY_KP_ENTER, Key::enter},
-                                    {GLFW_KEY_ESCAPE, Key::escape}, {GLFW_KEY_BACKSPACE, Key::backspace},
-                                    {GLFW_KEY_DELETE, Key::remove}, {GLFW_KEY_LEFT, Key::left},
-                                    {GLFW_KEY_RIGHT, Key::right},   {GLFW_KEY_HOME, Key::home},
-                                    {GLFW_KEY_END, Key::end},       {GLFW_KEY_TAB, Key::tab}};
+  static constexpr Code kCodes[] = {
+      {GLFW_KEY_ENTER, Key::enter},         {GLFW_KEY_KP_ENTER, Key::enter}, {GLFW_KEY_ESCAPE, Key::escape},
+      {GLFW_KEY_BACKSPACE, Key::backspace}, {GLFW_KEY_DELETE, Key::remove},  {GLFW_KEY_LEFT, Key::left},
+      {GLFW_KEY_RIGHT, Key::right},         {GLFW_KEY_UP, Key::up},          {GLFW_KEY_DOWN, Key::down},
+      {GLFW_KEY_HOME, Key::home},           {GLFW_KEY_END, Key::end},        {GLFW_KEY_TAB, Key::tab},
+      {GLFW_KEY_SPACE, Key::space},         {GLFW_KEY_F1, Key::f1}};
   if (const auto* known = std::ranges::find(kCodes, key, &Code::code); known != std::end(kCodes)) return known->key;
   const char* letter = glfwGetKeyName(key, scancode);
   return letter == nullptr ? std::nullopt : keyNamed(letter);
@@ -142,7 +144,7 @@ std::optional<Key> keyOf(int key, int scancode) {
 /// Removes the script position from the beginning of an error message, because users do not know the explorer's
 /// internal scripts.
 std::string withoutPosition(std::string message) {
-  for (const std::string_view script : {"panel:1:", "rebuild:1:"})
+  for (const std::string_view script : {"panel:1:", "rebuild:1:", "preset:1:"})
     if (message.starts_with(script)) message.erase(0, message.find(": ") + 2);
   return message;
 }
@@ -165,7 +167,8 @@ class Window {
     const auto size = screen_.size().value_or(std::array{options.width, options.height});
     const std::string show = fmt::format("show size={}x{} {}", size[0], size[1], backendText(options.backend));
     explorer_.run(show);
-    recording_.emplace(explorer_, std::vector{options.opening});
+    explorer_.run(kGuessUp);
+    recording_.emplace(explorer_, std::vector{std::string(kGuessUp), options.opening});
     openField(options.opening);
     explorer_.run(show);
   }
