@@ -107,6 +107,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"triangles", "triangles shown=true tolerance=1% simplify=true; shot output=$out/shot.png"},
     {"beside", "beside $field; color difference other=$field; shot output=$out/shot.png; beside none"},
     {"panel", "show slice size=480x360; panel all=true; shot output=$out/shot.png"},
+    {"preset", "show slice size=480x360; preset degrees; shot output=$out/shot.png"},
     {"worst", "show slice size=480x360; panel worst=true; worst by=gradient page=1; shot output=$out/shot.png"},
     {"fly", "fly to=0.3,0,0.25; shot output=$out/shot.png"},
     {"undo", "color degree; undo; shot output=$out/shot.png"},

@@ -198,7 +198,8 @@ TEST(Recording, anotherScriptGivesAnotherFrame) {
 
 TEST(Explorer, aTextThatIsNoNumberIsAnErrorOfTheCommand) {
   Desk desk;
-  desk.run(std::string(kFirst) + "\nshow slice ; color value-jump range=1e-6,1e-2 ; panel questions=false right-scroll=0");
+  desk.run(std::string(kFirst) +
+           "\nshow slice ; color value-jump range=1e-6,1e-2 ; panel questions=false right-scroll=0");
   desk.explorer().frame();
   desk.click("view/low");
   desk.type("many");
