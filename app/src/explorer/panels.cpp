@@ -313,7 +313,7 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
   const Controls controls{ui, explorer.session().registry(), commands};
   const ViewState& view = explorer.view();
   const Layout layout = layoutOf(view);
-  ui.freeze(explorer.work.has_value());
+  ui.freeze(explorer.work.has_value() || view.isOpen(Panel::keys));  // a click anywhere closes the list of keys
   const auto scrolling = [&](const char* name, const UiRect& rect, double scroll, const auto& content) {
     if (rect.width() <= 0) return;
     const double now = ui.column(name, rect, scroll, content);
