@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <iostream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "console/interrupt.h"
@@ -24,10 +25,22 @@ void occupyClosedStreams() {
     }
 }
 
+/// Tells whether the standard output is a terminal with 24-bit colours whose user wants colours (no-color.org).
+bool showsColors() {
+  const auto valueOf = [](const char* name) {
+    const char* const value = std::getenv(name);
+    return std::string_view(value == nullptr ? "" : value);
+  };
+  const std::string_view colors = valueOf("COLORTERM");
+  return isatty(STDOUT_FILENO) == 1 && valueOf("NO_COLOR").empty() && (colors == "truecolor" || colors == "24bit");
+}
+
 int run(const std::vector<std::string>& words) {
   if (hpsdf::app::asksForReading(words)) return hpsdf::app::readForOtherProcess(words);
   const bool terminal = isatty(STDERR_FILENO) == 1;
-  return hpsdf::app::runProgram(words, {std::cin, std::cout, std::cerr, terminal, nullptr, hpsdf::app::ownProgram()});
+  hpsdf::app::Console console{std::cin, std::cout, std::cerr, terminal, nullptr, hpsdf::app::ownProgram()};
+  console.showsColors = showsColors();
+  return hpsdf::app::runProgram(words, console);
 }
 
 }  // namespace

@@ -1,8 +1,13 @@
 // Tests help texts, the reference page and misspelled words in a call.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "cli_fixture.h"
+#include "hpsdf/render/color_maps.h"
+#include "hpsdf/render/picture_settings.h"
+#include "pictures/colors_help.h"
+#include "text/text.h"
 
 namespace hpsdf::app {
 namespace cli_help_test {
@@ -24,6 +29,21 @@ TEST_F(HelpCommand, helpAndVersionArePrinted) {
   EXPECT_THAT(verb.out, HasSubstr("--plane PX,PY,PZ,NX,NY,NZ"));
   EXPECT_THAT(run({{"build", "--help"}}).out, HasSubstr("τ·(L/2)^5"));
   EXPECT_THAT(run({{"--version"}}).out, testing::MatchesRegex("hpsdf [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST_F(HelpCommand, colorsAreListedWithTheirMaps) {
+  const Outcome listed = run({{"help", "colors"}});
+  EXPECT_EQ(listed.status, 0);
+  EXPECT_THAT(listed.out, Not(HasSubstr("\x1b"))) << "the output is no terminal";
+  for (const render::ColorMode& mode : render::colorModes()) EXPECT_THAT(listed.out, HasSubstr(mode.name));
+  for (const render::ColorMap& map : render::colorMaps()) {
+    EXPECT_THAT(listed.out, HasSubstr("\n  " + map.name + " "));
+    EXPECT_THAT(listed.out, HasSubstr(colorText(render::colorsOf(map, 5)[3])));
+  }
+  for (const int level : {0, 3, kExactDegree}) EXPECT_THAT(listed.out, HasSubstr(colorText(render::levelColor(level))));
+  const std::string bars = colorsHelp(true);
+  const render::Color third = render::levelColor(3);
+  EXPECT_THAT(bars, HasSubstr(fmt::format("\x1b[48;2;{};{};{}m    \x1b[0m", third[0], third[1], third[2])));
 }
 
 TEST_F(HelpCommand, referencePageIsWrittenCompletelyOrNotAtAll) {

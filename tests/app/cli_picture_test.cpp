@@ -137,6 +137,11 @@ TEST_F(Pictures, quantitiesColourSlicesAndSurfaces) {
   EXPECT_GT(greatest, 1e-6F);
   EXPECT_LT(greatest, 0.1F);
 
+  expectRefused({{"slice", field(), "-o", at("x.png"), "--map", "heat"}}, "map: color degree has no map",
+                namesIn(folder_.path()));
+  expectRefused({{"slice", field(), "-o", at("x.png"), "--color", "distance", "--map", "heat"}},
+                "map: heat does not suit color distance; choose one of blue-red, purple-green, brown-teal",
+                namesIn(folder_.path()));
   expectRefused({{"slice", field(), "-o", at("x.png"), "--range", "1,2"}}, "range", namesIn(folder_.path()));
   expectRefused({{"slice", field(), "-o", at("x.png"), "--color", "slope", "--range", "2,1", "--cpu"}}, "range",
                 namesIn(folder_.path()));

@@ -61,7 +61,7 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
             "cells boxes degrees=2,4-6 depths=0-2 ; arrows 31 ; plane in-space=true operands=builtin:box\n"
             "triangles shown=true tolerance=2.5% simplify=true\n"
             "plane through=0.1,0,0,1,0.5,0.25 zoom=2.5 target=0.1,-0.3,0.7\n"
-            "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear\n"
+            "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear map=heat\n"
             "worst by=gradient on=surface page=2 mark=0.1,0.25,-0.5 ; panel build=true worst=true shown=false "
             "bar=false left=false keys=true left-scroll=3\n"
             "show slice samples=2 size=640x400");
@@ -339,7 +339,7 @@ TEST(Explorer, aMarkShowsTheSpotAScaleAndTheExactOutline) {
     for (int x = 0; x < 300; ++x) {
       const Vector3 p = render::pixelPoint(view, x, y, 300, 300);
       const double pixel = view.right.norm() / 300, toMark = (p - Vector3(0.6, 0.1, 0)).norm() / pixel;
-      if (marked.at(x, y) == kExactOutline && toMark > 14) {
+      if (marked.at(x, y) == render::levelColor(kExactDegree) && toMark > 14) {
         ++outline;
         EXPECT_LT(std::abs(std::abs(std::hypot(p.x(), p.y()) - 0.7) - 0.3), 1.5 * pixel);
       }

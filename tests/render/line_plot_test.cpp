@@ -92,10 +92,9 @@ TEST(LinePlot, hasBandsInTheColorsOfTheFieldsLevels) {
   const PixelRect& last = layout.charts.back();
   const auto at = [&](double t) { return last.x0 + int(t * last.width()); };
   const int y = last.y1 + 20;  // within the band of degree colours, but not on a number
-  const LevelMap map(std::vector<int>{0, 1});
-  EXPECT_EQ(image.at(at(0.3), y), encodeSrgb(map(0)));
-  EXPECT_EQ(image.at(at(0.7), y), encodeSrgb(map(1)));
-  EXPECT_NE(image.at(at(0.1), y), encodeSrgb(map(0))) << "outside of the domain";
+  EXPECT_EQ(image.at(at(0.3), y), levelColor(0));
+  EXPECT_EQ(image.at(at(0.7), y), levelColor(1));
+  EXPECT_NE(image.at(at(0.1), y), levelColor(0)) << "outside of the domain";
   EXPECT_NE(image.at(at(0.1), y), paperColor());
 }
 

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <tuple>
@@ -12,12 +11,14 @@
 #include "coloring/color_view.h"
 #include "expect_tidy.h"
 #include "hpsdf/error.h"
+#include "picture/cracks.h"
 #include "picture/describe.h"
 #include "picture/legend.h"
 
 namespace hpsdf::render {
 namespace picture_test {
 
+const ColorMap& kDistanceMap = colorMap(MapKind::diverging, "");
 constexpr double kPlane = 0.125;  // the test field's surface is at x = kPlane; points below are inside
 
 // Returns the field x − kPlane over [−1, 1]³ with 2 × 2 × 2 base cells, of which the last is divided once. `degrees`:
@@ -148,15 +149,14 @@ std::string messageOf(const std::function<void()>& action) {
 TEST(DegreeSlice, hasTheColorsOfItsCells) {
   const Field field = planeField();
   FakeRenderer renderer(field);
-  const LevelMap map(std::vector<int>{2, 3, 5});
   for (int samples : {1, 3}) {
     const SlicePicture picture = slice(ColorBy::degree, 640, 360, samples);
     const Image image = draw(renderer, field, picture);
     EXPECT_EQ(image.width, 640);
     EXPECT_EQ(image.height, 360);
-    EXPECT_EQ(colorAt(image, field, picture, {-0.5, 0.5, 0.5}), encodeSrgb(map(2)));
-    EXPECT_EQ(colorAt(image, field, picture, {0.6, -0.5, 0.5}), encodeSrgb(map(3)));
-    EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), encodeSrgb(map(5)));
+    EXPECT_EQ(colorAt(image, field, picture, {-0.5, 0.5, 0.5}), levelColor(2));
+    EXPECT_EQ(colorAt(image, field, picture, {0.6, -0.5, 0.5}), levelColor(3));
+    EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), levelColor(5));
     EXPECT_GT(lightnessOf(colorAt(image, field, picture, {kPlane, -0.6, 0.5})), 0.9) << "no line where the surface is";
     EXPECT_EQ(image.at(3, 3), paperColor()) << "outside of the domain";
   }
@@ -167,8 +167,8 @@ TEST(DepthSlice, showsDepths) {
   FakeRenderer renderer(field);
   const SlicePicture picture = slice(ColorBy::depth);
   const Image image = draw(renderer, field, picture);
-  EXPECT_EQ(colorAt(image, field, picture, {-0.5, 0.5, 0.5}), encodeSrgb(orderedColor(0)));
-  EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), encodeSrgb(orderedColor(1)));
+  EXPECT_EQ(colorAt(image, field, picture, {-0.5, 0.5, 0.5}), levelColor(0));
+  EXPECT_EQ(colorAt(image, field, picture, {0.75, 0.75, 0.5}), levelColor(1));
 }
 
 TEST(DistancePicture, isBlueInsideRedOutsideAndDarkAtZero) {
@@ -207,11 +207,11 @@ TEST(SurfacePicture, marksCracksOnRequest) {
     SurfacePicture picture{.camera = {}, .width = 320, .height = 240, .samples = samples};
     const ViewSize view = viewSize(320, 240);
     const Color unmarked = draw(renderer, field, picture).at(view.width - 1, view.height - 1);
-    EXPECT_NE(unmarked, (Color{255, 0, 255}));
+    EXPECT_NE(unmarked, kCrackColor);
     picture.cracks = true;
     const Image marked = draw(renderer, field, picture);
-    EXPECT_EQ(marked.at(view.width - 1, view.height - 1), (Color{255, 0, 255}));
-    EXPECT_NE(marked.at(view.width - 5, view.height - 5), (Color{255, 0, 255}));
+    EXPECT_EQ(marked.at(view.width - 1, view.height - 1), kCrackColor);
+    EXPECT_NE(marked.at(view.width - 5, view.height - 5), kCrackColor);
   }
 }
 
@@ -221,10 +221,9 @@ TEST(Legend, hasTheLevelsOfTheWholeFieldAndNoOthers) {
   SlicePicture picture = slice(ColorBy::degree);
   picture.plane = AxisPlane{2, -0.5};  // below the divided cell, so that no leaf of degree 5 is in the section
   const Image image = draw(renderer, field, picture);
-  const LevelMap map(std::vector<int>{2, 3, 5});
   const int panel = viewSize(640, 360).width / 2 + 160;  // columns right of the section, which is square
-  for (int level : map.levels()) EXPECT_TRUE(holds(image, encodeSrgb(map(level)), panel)) << level;
-  EXPECT_FALSE(holds(image, encodeSrgb(orderedColor(0.25)), panel));
+  for (const int level : {2, 3, 5}) EXPECT_TRUE(holds(image, levelColor(level), panel)) << level;
+  EXPECT_FALSE(holds(image, levelColor(4), panel));
 }
 
 /// A picture's scale gives the same pixels when it is applied again, and the same colours for another field.
@@ -260,7 +259,7 @@ TEST(Legend, namesEachLevelAndItsShare) {
   const std::map<int, double> shares = {{2, 0.14}, {3, 0.6396}, {5, 0.22}, {12, 0.0004}};
   Overlay overlay;
   static const std::string titles[] = {"polynomial degree", "degree"};
-  addLevelLegend(overlay, frame(1280, 720), titles, shares, LevelMap(std::vector<int>{2, 3, 5, 12}));
+  addLevelLegend(overlay, frame(1280, 720), titles, shares);
   std::vector<std::string> texts;
   for (const TextItem& item : overlay.texts) texts.push_back(item.text);
   EXPECT_EQ(texts, (std::vector<std::string>{"polynomial degree", "share of the volume", "12", "<0.1 %", "5", "22.0 %",
@@ -272,11 +271,11 @@ TEST(Legend, namesExactLeaves) {
   static const std::string titles[] = {"polynomial degree", "degree"};
   for (const int width : {640, 1280}) {
     Overlay overlay;
-    addLevelLegend(overlay, frame(width, width * 9 / 16), titles, shares, LevelMap(std::vector<int>{2, kExactDegree}));
+    addLevelLegend(overlay, frame(width, width * 9 / 16), titles, shares);
     const auto text = std::ranges::find(overlay.texts, "exact", &TextItem::text);
     ASSERT_NE(text, overlay.texts.end()) << width;
     const auto under = std::ranges::find_if(overlay.boxes, [&](const BoxItem& box) {
-      return box.color == encodeSrgb(exactColor()) && box.y0 <= text->baseline && text->baseline <= box.y1;
+      return box.color == levelColor(kExactDegree) && box.y0 <= text->baseline && text->baseline <= box.y1;
     });
     ASSERT_NE(under, overlay.boxes.end()) << width;
     EXPECT_GE(text->x, under->x0);
@@ -523,10 +522,8 @@ TEST(Layout, clipsAndOverlapsNothingAtAnySize) {
     for (int count : {1, 2, 5, 10, 21, 31}) {
       std::map<int, double> shares;
       for (int level = 0; level < count; ++level) shares[level] = 1.0 / count;
-      std::vector<int> levels(count);
-      std::iota(levels.begin(), levels.end(), 0);
       Overlay overlay;
-      addLevelLegend(overlay, f, titles, shares, LevelMap(levels));
+      addLevelLegend(overlay, f, titles, shares);
       const auto swatches = overlay.boxes.size();
       EXPECT_GE(swatches, f.panel.empty() ? 0U : std::size_t(count)) << size;
       addCaption(overlay, f, count % 2 ? longName : "bunny.obj", details);
@@ -543,7 +540,7 @@ TEST(Layout, clipsAndOverlapsNothingAtAnySize) {
         }
     for (double range : {1e-7, 3e-4, 0.0123, 1.108, 88.0, 3.7e5, 2e9}) {
       Overlay overlay;
-      addDistanceBar(overlay, f, distanceScale(-0.3 * range, range));
+      addDistanceBar(overlay, f, distanceScale(-0.3 * range, range), kDistanceMap);
       expectTidy(overlay, f, size + ", range " + std::to_string(range));
       if (f.panel.empty() || f.panel.height() < 100) continue;
       EXPECT_GE(overlay.texts.size(), 4U) << size << ": hardly a number beside the bar for range " << range;
@@ -552,7 +549,7 @@ TEST(Layout, clipsAndOverlapsNothingAtAnySize) {
     // The slice shows a small area far from the surface, so that the bar's range contains very many iso-lines.
     for (const double spread : {7e-2, 7e-3, 7e-5, 1e-16}) {
       Overlay overlay;
-      addDistanceBar(overlay, f, distanceScale(0.4648, 0.4648 + spread));
+      addDistanceBar(overlay, f, distanceScale(0.4648, 0.4648 + spread), kDistanceMap);
       expectTidy(overlay, f, size + ", spread " + std::to_string(spread));
       EXPECT_LT(overlay.boxes.size(), std::size_t(3 * f.height)) << size << ": all lines drawn";
     }
@@ -605,18 +602,16 @@ TEST(LevelLegend, hasEachNumberAtItsColor) {
        {std::tuple(1280, 720, 5), {1280, 720, 31}, {320, 240, 5}, {320, 240, 31}, {200, 1000, 9}}) {
     const Frame f = frame(width, height);
     std::map<int, double> shares;
-    std::vector<int> levels;
-    for (int level = 0; level < count; ++level) shares[level] = 1.0 / count, levels.push_back(level);
-    const LevelMap map(levels);
+    for (int level = 0; level < count; ++level) shares[level] = 1.0 / count;
     Overlay overlay;
-    addLevelLegend(overlay, f, titles, shares, map);
+    addLevelLegend(overlay, f, titles, shares);
     const Image image = painted(overlay, f);
     const int swatch = static_cast<int>(overlay.boxes.front().x0) + 1;
     std::set<int> seen;
     for (const TextItem& item : overlay.texts) {
       const auto level = numberOf(item.text);
       if (!level) continue;
-      EXPECT_EQ(image.at(swatch, int(middleOf(item))), encodeSrgb(map(int(*level)))) << item.text << " of " << count;
+      EXPECT_EQ(image.at(swatch, int(middleOf(item))), levelColor(int(*level))) << item.text << " of " << count;
       seen.insert(int(*level));
     }
     EXPECT_GE(seen.size(), std::min<std::size_t>(count, 8)) << width << "x" << height;
@@ -630,7 +625,7 @@ TEST(DistanceBar, hasEachNumberAtItsColor) {
                                        distanceScale(0.4648, 0.4715)}) {
       const Frame f = frame(width, height);
       Overlay overlay;
-      addDistanceBar(overlay, f, scale);
+      addDistanceBar(overlay, f, scale, kDistanceMap);
       const Image image = painted(overlay, f);
       std::vector<std::pair<double, double>> labels;  // pairs of value and row
       for (const TextItem& item : overlay.texts)
@@ -646,7 +641,7 @@ TEST(DistanceBar, hasEachNumberAtItsColor) {
           const int y = static_cast<int>(std::floor(row)) + beside;
           const double here = value - (y + 0.5 - row) * (highest - lowest) / (bottom - top);
           if (std::abs(here) >= scale.range) continue;
-          const LinearColor expected = divergingColor(here / scale.range);
+          const LinearColor expected = kDistanceMap.at(0.5 + 0.5 * here / scale.range);
           EXPECT_LT(colorDifference(toOklab(decodeSrgb(image.at(bar, y))), toOklab(expected)), 0.03)
               << value << " at " << width << "x" << height;
         }

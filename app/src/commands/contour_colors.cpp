@@ -13,7 +13,7 @@ namespace hpsdf::app {
 namespace {
 
 /// The parameters of `render` that `contour` has too.
-constexpr std::array kShared = {"range", "scale", "levels", "mesh", "other"};
+constexpr std::array kShared = {"range", "scale", "map", "mesh", "other"};
 
 }  // namespace
 

@@ -14,6 +14,7 @@
 #include "hpsdf/shapes.h"
 #include "language/help.h"
 #include "language/script.h"
+#include "pictures/colors_help.h"
 #include "session/backend.h"
 #include "session/session.h"
 #include "text/json.h"
@@ -167,6 +168,10 @@ void runHelp(Session& session, const Arguments& arguments) {
   const Registry& registry = session.registry();
   if (session.wantsJson(arguments)) return printJson(out, commandsJson(registry));
   const HelpDetail detail = arguments.flag("all") ? HelpDetail::all : HelpDetail::common;
+  if (arguments.textOr("command", "") == "colors") {
+    out << colorsHelp(session.console().showsColors);
+    return;
+  }
   out << (arguments.has("command") ? commandHelp(registry.command(arguments.text("command")), detail)
                                    : overviewHelp(registry));
 }
@@ -238,10 +243,13 @@ void addScriptCommands(Registry& registry) {
 void addHelpCommands(Registry& registry) {
   registry.add({
       .name = "help",
-      .summary = "Explain the program or a command.",
-      .help = "Without a command it prints an overview.",
-      .examples = {"hpsdf help", "hpsdf help build", "hpsdf help build --all"},
-      .parameters = {{"command", text("COMMAND").positional(), "Command to explain."},
+      .summary = "Explain the program, a command, or the colours of pictures.",
+      .help =
+          "Without a command it prints an overview. The word colors instead of a command shows the colour maps and the "
+          "colours of degrees and depths, as bars where the terminal has 24-bit colours (COLORTERM=truecolor), "
+          "unless NO_COLOR is set.",
+      .examples = {"hpsdf help", "hpsdf help build", "hpsdf help build --all", "hpsdf help colors"},
+      .parameters = {{"command", text("COMMAND").positional(), "Command to explain, or colors."},
                      {"all", flag(),
                       "Explains the advanced options of the command too, as 'hpsdf COMMAND --help-all' does."}},
       .action = runHelp,

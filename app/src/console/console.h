@@ -49,6 +49,7 @@ struct Console {
   const std::map<std::string, TriangleMesh, std::less<>>* meshes = nullptr;
   std::string work = {};       ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
   bool writesProgress = true;  ///< false if only the listener shows progress
+  bool showsColors = false;    ///< true if `out` is a terminal that shows 24-bit colours
 };
 
 /// Writes one line to the stream `err`, in place of a progress line. Any thread may call it. Control characters in

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "hpsdf/render/color_maps.h"
+#include "hpsdf/types.h"
+
 namespace hpsdf::app {
 namespace {
 
@@ -34,6 +37,7 @@ void drawExactOutline(render::Image& image, const render::SliceView& view, const
     for (int x = kBlock / 2; x < image.width + kBlock; x += kBlock) middles.push_back({x, y});
   const double pixel = std::max(view.right.norm() / image.width, view.up.norm() / image.height);
   const double reach = std::sqrt(2.0) * (kBlock / 2 + 2) * pixel;
+  const render::Color color = render::levelColor(kExactDegree);
   const std::vector<double> atMiddles = distancesAt(middles, image, view, exact);
   for (std::size_t i = 0; i < middles.size(); ++i) {
     if (!(std::abs(atMiddles[i]) <= reach)) continue;
@@ -47,7 +51,7 @@ void drawExactOutline(render::Image& image, const render::SliceView& view, const
       if (n % kSide == kBlock || n / kSide == kBlock || x >= image.width || y >= image.height) continue;
       const bool inside = values[std::size_t(n)] < 0;
       if (inside != (values[std::size_t(n + 1)] < 0) || inside != (values[std::size_t(n + kSide)] < 0))
-        image.at(x, y) = kExactOutline;
+        image.at(x, y) = color;
     }
   }
 }

@@ -7,9 +7,8 @@
 
 namespace hpsdf::app {
 
-inline constexpr render::Color kExactOutline = {214, 39, 40};
-
-/// Draws the curve in which the plane of `view` meets the surface: the pixels beside which the sign of `exact` changes.
+/// Draws, in the colour of exact leaves, the curve in which the plane of `view` meets the surface: the pixels beside
+/// which the sign of `exact` changes.
 void drawExactOutline(render::Image& image, const render::SliceView& view, const DistanceFunction& exact);
 
 }  // namespace hpsdf::app

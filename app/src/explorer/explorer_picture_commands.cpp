@@ -126,7 +126,10 @@ void changeColor(ViewState& view, const Arguments& arguments, Session&) {
   const render::ColorBy by = colorNamed(arguments.text("by"));
   if (by == (slice ? render::ColorBy::normal : render::ColorBy::distance))
     throw Error(fmt::format("by: {} is not for a {}; give another colour", colorName(by), slice ? "slice" : "surface"));
-  if (by != colors.by) colors.scale.limits.reset();  // the old limits are for another quantity
+  if (by != colors.by) {  // the old limits are for another quantity, and the old map may be for another kind
+    colors.scale.limits.reset();
+    colors.scale.map.clear();
+  }
   colors.by = by;
   if (arguments.given("other")) colors.other = textOrNone(arguments, "other");
   if (arguments.given("mesh")) colors.mesh = textOrNone(arguments, "mesh");
@@ -140,6 +143,10 @@ void changeColor(ViewState& view, const Arguments& arguments, Session&) {
     }
   }
   if (arguments.given("per-cell")) colors.scale.perCell = arguments.flag("per-cell");
+  if (arguments.given("map")) {
+    colors.scale.map = arguments.text("map") == "auto" ? "" : arguments.text("map");
+    checkMap(colors.scale.map, by);
+  }
   if (arguments.given("scale")) colors.scale.logarithmic = arguments.text("scale") == "log";
   if (colors.scale.limits && !((*colors.scale.limits)[0] < (*colors.scale.limits)[1]))
     throw Error("range: expected LOW,HIGH with LOW below HIGH");
@@ -244,6 +251,8 @@ void addSurfaceCommands(Registry& registry) {
 }
 
 void addPlaneAndColorCommands(Registry& registry) {
+  std::vector<std::string> maps = mapNames();
+  maps.insert(maps.begin(), "auto");
   registry.addForScripts({
       .name = "plane",
       .summary = "Choose the plane of the explorer's slice, and what of it is seen.",
@@ -281,6 +290,8 @@ void addPlaneAndColorCommands(Registry& registry) {
                       "Colour each cell by the greatest value that the picture shows of it."},
                      {"scale", choice({"log", "linear"}).under(kColours).advanced(),
                       "How such colours run between them; log at first."},
+                     {"map", choice(maps).under(kColours).advanced(),
+                      "The colour map, as in 'slice' and 'render'; auto is the standard one of the quantity."},
                      {"other", file("FIELD"), "For difference: the field to compare with, or none."},
                      {"mesh", text("MESH"),
                       "For error: what the field was made from, where it does not know that; or none."}},

@@ -137,6 +137,11 @@ void drawColors(const Controls& controls, Explorer& explorer) {
     controls.field("view/other", "other field", colors.other, command + "other=", true);
   if (colors.by == render::ColorBy::error)
     controls.field("view/mesh", "made from", colors.mesh, command + "mesh=", true);
+  std::vector<std::string> maps = mapNames(colors.by);
+  if (!maps.empty()) {
+    maps.insert(maps.begin(), "auto");
+    controls.choice("view/map", "map", maps, colors.scale.map.empty() ? "auto" : colors.scale.map, command + "map=");
+  }
   if (!render::isQuantity(colors.by)) return;
   controls.choice("view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
                   command + "scale=");

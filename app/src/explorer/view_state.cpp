@@ -31,10 +31,10 @@ std::string surfaceLine(const ViewState& view) {
 
 std::string colorLine(const Coloring& colors, const char* of) {
   const render::ScaleOptions& scale = colors.scale;
-  return fmt::format("color {} of={} range={} scale={} per-cell={} other={} mesh={}\n", colorName(colors.by), of,
+  return fmt::format("color {} of={} range={} scale={} per-cell={} map={} other={} mesh={}\n", colorName(colors.by), of,
                      scale.limits ? fmt::format("{},{}", (*scale.limits)[0], (*scale.limits)[1]) : "auto",
-                     scale.logarithmic ? "log" : "linear", scale.perCell, wordOrNone(colors.other),
-                     wordOrNone(colors.mesh));
+                     scale.logarithmic ? "log" : "linear", scale.perCell, scale.map.empty() ? "auto" : scale.map,
+                     wordOrNone(colors.other), wordOrNone(colors.mesh));
 }
 
 std::string cellsLine(const render::ShownCells& cells) {

@@ -209,10 +209,11 @@ std::string chartSvg(const Chart& chart) {
   return std::string(kTag) + " class=\"chart\"" + svg.substr(kTag.size());
 }
 
-std::string curveColor(std::size_t index) {
-  constexpr std::array kColors = {"#1683ab", "#d1721b", "#2a9d5c", "#b0479a",
-                                  "#c9a20a", "#6b7280", "#7d5ba6", "#a33a2c"};
-  return kColors[index % kColors.size()];
+std::span<const std::string> curveColors() {
+  static const std::vector<std::string> colors = {"#5198bd", "#bc6101", "#832f98", "#e7b91e", "#6b6b6e", "#9aa788"};
+  return colors;
 }
+
+std::string curveColor(std::size_t index) { return curveColors()[index % curveColors().size()]; }
 
 }  // namespace hpsdf::app

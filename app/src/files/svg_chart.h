@@ -2,6 +2,7 @@
 // Draws curves over two logarithmic axes, for HTML pages and as files of their own.
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,8 +29,11 @@ std::vector<std::string> writeChart(OutputFolder& folder, const std::string& nam
 /// Returns the chart as an SVG element. Axes and texts have the colour of the text around the element.
 std::string chartSvg(const Chart& chart);
 
-/// Returns a colour that distinguishes curve number `index` from the seven curves before it, also for readers with
-/// colour-blindness.
+/// Returns the colours of curves as "#rrggbb", which can be told apart with every kind of colour vision, on light and
+/// on dark pages.
+std::span<const std::string> curveColors();
+
+/// Returns the colour of curve number `index`. After the last of `curveColors`, the first one follows again.
 std::string curveColor(std::size_t index);
 
 }  // namespace hpsdf::app

@@ -222,7 +222,7 @@ Commands:
   }
   return text + R"(
 'hpsdf help COMMAND' or 'hpsdf COMMAND --help' explains a command and its common options, 'hpsdf COMMAND --help-all'
-all of its options. 'hpsdf --version' prints the version. A script writes an option --name value as name=value.
+all of its options. 'hpsdf help colors' shows the colours of pictures, 'hpsdf --version' prints the version. A script writes an option --name value as name=value.
 Exit status: 0 done, 1 a comparison failed, 2 bad input, 3 some meshes of a batch failed; after a signal 128 + its
 number: 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP, 141 the reader of standard output has gone.
 )";

@@ -27,6 +27,12 @@ std::string quantityNames() {
   return fmt::format("{} and {}", fmt::join(names, ", "), last);
 }
 
+/// Returns the kind of the colour maps that suit a colour mode. Returns std::nullopt if its colours are fixed.
+std::optional<render::MapKind> mapKind(ColorBy color) {
+  if (color == ColorBy::distance) return render::MapKind::diverging;
+  return render::isQuantity(color) ? std::optional(render::MapKind::ordered) : std::nullopt;
+}
+
 struct NamedView {
   std::string_view name;
   double azimuthDegrees, elevationDegrees;
@@ -126,6 +132,23 @@ std::string quantityHelp() {
 
 std::string_view colorName(ColorBy color) { return render::colorModes()[std::size_t(color)].name; }
 
+std::vector<std::string> mapNames(std::optional<ColorBy> color) {
+  std::vector<std::string> names;
+  for (const render::ColorMap& map : render::colorMaps())
+    if (!color || map.kind == mapKind(*color)) names.push_back(map.name);
+  return names;
+}
+
+void checkMap(const std::string& map, ColorBy color) {
+  if (map.empty()) return;
+  const std::vector<std::string> names = mapNames(color);
+  if (names.empty())
+    throw Error(fmt::format("map: color {} has no map; it is for distance, {}", colorName(color), quantityNames()));
+  if (std::ranges::find(names, map) == names.end())
+    throw Error(
+        fmt::format("map: {} does not suit color {}; choose one of {}", map, colorName(color), fmt::join(names, ", ")));
+}
+
 /// Returns the colour mode of this name. The search always succeeds, because the registry accepts only `colorNames`.
 ColorBy colorNamed(std::string_view name) {
   return std::ranges::find(render::colorModes(), name, &render::ColorMode::name)->color;
@@ -214,8 +237,8 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
   if (options.perCell && !render::isQuantity(color))
     throw Error(fmt::format("per-cell: the colours of {} have no greatest value; it is for {}", arguments.text("color"),
                             quantityNames()));
-  if (arguments.given("levels") && color != ColorBy::degree && color != ColorBy::depth)
-    throw Error(fmt::format("levels: is for color degree and depth, not {}", arguments.text("color")));
+  options.map = arguments.textOr("map", "");
+  checkMap(options.map, color);
   if (arguments.given("mesh") && color != ColorBy::error)
     throw Error(fmt::format("mesh: is for color error, not {}", arguments.text("color")));
   if (arguments.given("other") && color != ColorBy::difference)
@@ -225,11 +248,6 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
   if (arguments.given("range")) {
     const auto limits = arguments.numbers("range");
     options.limits = {limits[0], limits[1]};
-  }
-  if (arguments.given("levels")) {
-    const auto ends = arguments.numbers("levels");
-    for (int level = int(ends[0]); level <= int(ends[1]); ++level) options.levels.push_back(level);
-    if (options.levels.empty()) throw Error("levels: expected LOWEST,HIGHEST with LOWEST not above HIGHEST");
   }
   return options;
 }

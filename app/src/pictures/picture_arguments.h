@@ -19,6 +19,11 @@ namespace hpsdf::app {
 std::string_view colorName(render::ColorBy color);
 std::vector<std::string> colorNames(std::optional<render::ColorBy> without = {});
 
+/// Returns the names of the colour maps that suit a colour mode, or of all maps. Modes with fixed colours have none.
+std::vector<std::string> mapNames(std::optional<render::ColorBy> color = {});
+/// Throws `Error` unless the map suits the colour mode. The empty name, which means the default map, suits all.
+void checkMap(const std::string& map, render::ColorBy color);
+
 /// Returns a sentence for help texts. It explains the colour modes that show a quantity, such as the error.
 std::string quantityHelp();
 
@@ -59,7 +64,7 @@ Vector3 pointOf(const Arguments& arguments, const char* name);
 /// A placeholder for the result of `shownBox`, with which arguments can be checked before the field is loaded.
 inline const Box kAnyBox(Vector3::Constant(-1), Vector3::Constant(1));
 
-/// Returns the colour scale from the arguments `range`, `scale` and `levels`. Throws `Error` if one of them, or `mesh`
+/// Returns the colour scale from the arguments `range`, `scale` and `map`. Throws `Error` if one of them, or `mesh`
 /// or `other`, is not for the quantity that `color` names, or if that needs another argument.
 render::ScaleOptions scaleOptions(const Arguments& arguments);
 

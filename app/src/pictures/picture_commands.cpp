@@ -196,7 +196,7 @@ const std::vector<Parameter> kRenderDrawn = {
     {"clip-offset", number().in("world units"),
      "Coordinate at which the cut crosses that axis. When left out, the middle of the surface's box."},
     {"cracks", flag().advanced(),
-     "Marks cracks in magenta: pixels in which the field jumps across the drawn distance from one cell to the next. "
+     "Marks cracks in violet: pixels in which the field jumps across the drawn distance from one cell to the next. "
      "The caption names the widest jump."},
     {"defects", text("MESH|own").advanced(),
      "Marks the defects of this mesh as 'mesh --picture' does. own is the mesh from which the field was made, where "
@@ -231,9 +231,9 @@ std::vector<Parameter> colorParameters(ColorBy left, const std::string& ofCells,
        "Colours each cell by the greatest value that the picture shows of it, in place of each point by its own. Cells "
        "that are worse than others are then seen at once."},
       {"scale", choice({"log", "linear"}).byDefault("log").advanced(), "Scale of the colours between these values."},
-      {"levels", wholeNumbers("LOWEST,HIGHEST", {2}).within(0, kMaxDegree).advanced(),
-       "Degrees or depths that the legend shows in addition to those of the field. Use it to compare pictures of "
-       "several fields."},
+      {"map", choice(mapNames()).advanced(),
+       "Colours of a jump, slope or error, or of the distance: 'hpsdf help colors' shows these maps and which is for "
+       "what. Degrees and depths have colours of their own, the same in every picture."},
       {"mesh", text("MESH"),
        "The surface from which the field was made, for --color error. It is known already for built-in and "
        "analytic shapes, and for a mesh that was built in the same script."},

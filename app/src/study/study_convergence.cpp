@@ -32,8 +32,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kCurveColors = {"#1683ab", "#d1721b", "#6b7280"};
-
 /// Thrown to end a construction when its field has enough coefficients.
 struct LargeEnough {};
 
@@ -192,7 +190,7 @@ Chart convergenceChart(const Json& mesh) {
               .solid = "measured RMS",
               .dashed = "measured maximum"};
   for (const auto& [strategy, stages] : mesh["curves"].items()) {
-    ChartCurve rms{.name = strategy, .color = kCurveColors[chart.curves.size() / 2]}, greatest = rms;
+    ChartCurve rms{.name = strategy, .color = curveColor(chart.curves.size() / 2)}, greatest = rms;
     greatest.dashed = true;
     for (const Json& stage : stages) {
       const double coefficients = numberIn(stage, "coefficients");
@@ -232,7 +230,7 @@ std::string plotScript(const Json& mesh) {
   for (const auto& [strategy, stages] : mesh["curves"].items()) {
     for (const auto& [column, what, style] : kinds) {
       script += fmt::format("{}\"plot.dat\" index {} using 3:{} {} lc rgb \"{}\" title \"{}, {}\"", separator, n,
-                            column, style, kCurveColors[n], strategy, what);
+                            column, style, curveColor(n), strategy, what);
       separator = ", \\\n     ";
     }
     ++n;

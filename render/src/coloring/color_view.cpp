@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -227,10 +228,12 @@ LinearColor backdropColor(double fromTop) {
   return fromOklab({0.975 - 0.06 * fromTop * fromTop, -0.003, -0.006 - 0.004 * fromTop});
 }
 
-SampleColor levelColors(const ViewBuffers& buffers, LevelMap map, ColorBy color) {
+SampleColor levelColors(const ViewBuffers& buffers, ColorBy color) {
   if (color == ColorBy::normal) return {};
   const std::vector<std::uint8_t>& levels = color == ColorBy::degree ? buffers.degree : buffers.depth;
-  return [map = std::move(map), &levels](std::size_t i) { return map(levels[i]); };
+  std::array<LinearColor, 256> colors;
+  for (int level = 0; level < 256; ++level) colors[std::size_t(level)] = decodeSrgb(levelColor(level));
+  return [colors, &levels](std::size_t i) { return colors[levels[i]]; };
 }
 
 SampleColor quantityColors(std::vector<float> quantity, ColorScale scale) {
@@ -249,17 +252,19 @@ Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const
   });
 }
 
-SampleColor distanceColors(const ViewBuffers& buffers, const DistanceScale& scale) {
-  constexpr int kSteps = 2048;
-  std::vector<LinearColor> table(2 * kSteps + 1);
-  for (int i = -kSteps; i <= kSteps; ++i) table[i + kSteps] = divergingColor(double(i) / kSteps);
+SampleColor distanceColors(const ViewBuffers& buffers, const DistanceScale& scale, const ColorMap& map) {
+  constexpr int kSteps = 4096;
+  std::vector<LinearColor> table(kSteps + 1);
+  for (int i = 0; i <= kSteps; ++i) table[std::size_t(i)] = map.at(double(i) / kSteps);
   return [&buffers, table = std::move(table), range = scale.range](std::size_t i) {
-    return table[std::lround(std::clamp(buffers.value[i] / range, -1.0, 1.0) * kSteps) + kSteps];
+    const double t = std::clamp(0.5 + 0.5 * buffers.value[i] / range, 0.0, 1.0);
+    return table[static_cast<std::size_t>(t * kSteps + 0.5)];
   };
 }
 
-Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling) {
-  const SampleColor ground = distanceColors(buffers, scale);
+Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const ColorMap& map,
+                         const Sampling& sampling) {
+  const SampleColor ground = distanceColors(buffers, scale, map);
   const Contours contours(buffers);
   const LinearColor paper = decodeSrgb(sampling.paper.value_or(kPaper)), isoLine = decodeSrgb(kIsoLine);
   const LinearColor zeroLine = decodeSrgb(kZeroLine);

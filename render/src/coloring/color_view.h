@@ -27,13 +27,13 @@ using SampleColor = std::function<LinearColor(std::size_t)>;
 
 /// Returns a function that colours samples by degree or depth. The function is empty for `ColorBy::normal`.
 /// The buffers must outlive the function.
-SampleColor levelColors(const ViewBuffers& buffers, LevelMap map, ColorBy color);
+SampleColor levelColors(const ViewBuffers& buffers, ColorBy color);
 /// Returns a function that colours each sample by its value of a quantity.
 SampleColor quantityColors(std::vector<float> quantity, ColorScale scale);
 
-/// Returns a function that colours samples by distance with the diverging colour map. The buffers must outlive the
+/// Returns a function that colours samples by distance with a diverging colour map. The buffers must outlive the
 /// function.
-SampleColor distanceColors(const ViewBuffers& buffers, const DistanceScale& scale);
+SampleColor distanceColors(const ViewBuffers& buffers, const DistanceScale& scale, const ColorMap& map);
 
 /// Colours the samples of a slice without any lines.
 Image colorGround(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling);
@@ -42,9 +42,10 @@ Image colorGround(const ViewBuffers& buffers, const SampleColor& color, const Sa
 /// as a white line.
 Image colorCellSlice(const ViewBuffers& buffers, const SampleColor& color, const Sampling& sampling);
 
-/// Colours the distances of a slice with the diverging colour map. Draws iso-lines over the colours, and a
+/// Colours the distances of a slice with a diverging colour map. Draws iso-lines over the colours, and a
 /// bold line at distance zero.
-Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const Sampling& sampling);
+Image colorDistanceSlice(const ViewBuffers& buffers, const DistanceScale& scale, const ColorMap& map,
+                         const Sampling& sampling);
 
 /// Colours a view of a surface in front of the backdrop. The surface and boxes have soft shading and the colours of
 /// `look`. Sections and planes are unlit and show the outlines of cells. On a plane, the surface f = offset is drawn as

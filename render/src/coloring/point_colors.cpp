@@ -17,10 +17,9 @@ PointColors colorsOfLevels(const Field& field, std::span<const Vector3> points, 
   PointColors result{.colors = {}, .scale = options};
   result.scale.levels.clear();
   for (const auto& [level, share] : shares) result.scale.levels.push_back(level);
-  const LevelMap map(result.scale.levels);
   for (const Vector3& point : points) {
     const Cell cell = field.cellAt(point);
-    result.colors.push_back(encodeSrgb(map(color == ColorBy::degree ? cell.degree : cell.depth)));
+    result.colors.push_back(levelColor(color == ColorBy::degree ? cell.degree : cell.depth));
   }
   return result;
 }

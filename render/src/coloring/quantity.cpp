@@ -172,10 +172,10 @@ ColorScale colorScale(const ScaleOptions& options, const Field& field, const std
       throw Error("range: expected LOW,HIGH with LOW below HIGH");
     if (options.logarithmic && !(low > 0))
       throw Error("range: a logarithmic scale needs limits above 0; give others, or a linear scale");
-    return {low, high, options.logarithmic};
+    return {low, high, options.logarithmic, options.map};
   }
   const auto [least, greatest] = rangeWithoutOutliers(ofCells.empty() ? weighted(ofSamples) : weighted(field, ofCells));
-  return ColorScale::around(least, greatest, options.logarithmic);
+  return ColorScale::around(least, greatest, options.logarithmic, options.map);
 }
 
 }  // namespace hpsdf::render

@@ -8,9 +8,6 @@
 
 namespace hpsdf::render {
 
-/// A colour in linear sRGB, each channel 0 to 1.
-using LinearColor = Eigen::Vector3f;
-
 LinearColor decodeSrgb(Color color);
 
 /// Converts linear sRGB to 8-bit sRGB. Clamps channels to the range 0 to 1.

@@ -1,49 +1,25 @@
 #pragma once
-// Colour maps, and the scales that map numbers to positions on a colour map.
+// The scales that map numbers to positions on a colour map.
 
-#include <array>
-#include <span>
 #include <vector>
 
+#include "hpsdf/render/color_maps.h"
 #include "image/color.h"
 
 namespace hpsdf::render {
 
-/// The colour map for ordered values: dark violet at 0, then blue, teal and green, to pale yellow at 1. Its lightness
-/// rises monotonically.
-LinearColor orderedColor(double t);
-
-/// The colour of exact leaves: a brick red. It is far from all colours of the ordered colour map, and stays so for
-/// people with protanopia, deuteranopia or tritanopia.
-LinearColor exactColor();
-
-/// Colours for levels (polynomial degrees or octree depths, 0 to 255), spread evenly over the colour map. The degree of
-/// exact leaves, `kExactDegree`, has a colour of its own.
-class LevelMap {
- public:
-  explicit LevelMap(std::span<const int> levels);
-
-  /// The colour of a level. A level that is not in `levels` gets magenta, which the colour map does not contain, so
-  /// that a fault in the buffers becomes visible.
-  const LinearColor& operator()(int level) const { return colors_[static_cast<std::uint8_t>(level)]; }
-  const std::vector<int>& levels() const { return levels_; }
-
- private:
-  std::vector<int> levels_;
-  std::array<LinearColor, 256> colors_;
-};
-
-/// Maps values of a quantity to the ordered colour map. Values up to `low` get the dark end of the map, values
+/// Maps values of a quantity to an ordered colour map. Values up to `low` get the dark end of the map, values
 /// from `high` on get the light end.
 class ColorScale {
  public:
-  /// Requires low < high. A logarithmic scale also requires 0 < low.
-  ColorScale(double low, double high, bool logarithmic);
+  /// Requires low < high. A logarithmic scale also requires 0 < low. `map` is the name of an ordered map, or empty for
+  /// the default one; throws `Error` for any other name.
+  ColorScale(double low, double high, bool logarithmic, const std::string& map = "");
 
   /// A scale for values from `least` (above 0) to `greatest`. The ends of a logarithmic scale are powers of ten, at
   /// most six decades apart. A linear scale runs from 0 to `greatest`, rounded up to one or two digits, or to 1 if
   /// `greatest` is 0.
-  static ColorScale around(double least, double greatest, bool logarithmic);
+  static ColorScale around(double least, double greatest, bool logarithmic, const std::string& map = "");
 
   LinearColor operator()(double value) const {
     return table_[static_cast<std::size_t>(fraction(value) * kSteps + 0.5)];
@@ -54,11 +30,13 @@ class ColorScale {
   double low() const { return low_; }
   double high() const { return high_; }
   bool logarithmic() const { return logarithmic_; }
+  const ColorMap& map() const { return *map_; }
 
  private:
   static constexpr int kSteps = 1024;
   double low_, high_;
   bool logarithmic_;
+  const ColorMap* map_;
   std::vector<LinearColor> table_;
 };
 
@@ -71,9 +49,6 @@ double niceStep(double span, double lines);
 
 /// The largest power of ten that is at most x; x must be above 0.
 double powerOfTenBelow(double x);
-
-/// The diverging map for distances: deep blue at −1 (inside), white at 0, deep red at 1 (outside).
-LinearColor divergingColor(double t);
 
 /// The range of the colours and the spacing of the iso-lines that show distances in a slice.
 struct DistanceScale {

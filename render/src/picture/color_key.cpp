@@ -17,13 +17,6 @@ namespace {
 
 constexpr int kBarColors = 256;
 
-/// The colours of a legend's colour bar, from end to end. `colorAt` maps positions from 0 to 1 to colours.
-std::vector<Color> barOf(const std::function<LinearColor(double)>& colorAt) {
-  std::vector<Color> bar;
-  for (int i = 0; i < kBarColors; ++i) bar.push_back(encodeSrgb(colorAt(double(i) / (kBarColors - 1))));
-  return bar;
-}
-
 /// Replaces the value of each sample by the greatest value among the samples of its cell. Ignores values that are NaN.
 /// Returns these values of the cells.
 std::unordered_map<std::uint32_t, float> spreadOverCells(const ViewBuffers& buffers, std::vector<float>& values) {
@@ -51,7 +44,7 @@ ColorKey keyOfQuantity(Overlay& overlay, const Frame& frame, const Field& field,
 
   ColorKey key{.color = {}, .scale = options, .name = titles.back(), .range = describeGreatest(values)};
   if (options.perCell) key.name = "greatest " + key.name + " of each cell";
-  key.legend = {.title = titles.front(), .bar = barOf(orderedColor)};
+  key.legend = {.title = titles.front(), .bar = colorsOf(scale.map(), kBarColors)};
   for (const double value : scaleMarks(scale))
     key.legend.marks.push_back({scale.fraction(value), formatNumber(value, 3)});
   key.scale.limits = {scale.low(), scale.high()};
@@ -75,11 +68,12 @@ ColorKey keyOfLevels(Overlay& overlay, const Frame& frame, const FieldStatistics
   ColorKey key{.color = {}, .legend = {.title = titles.front()}, .scale = options, .name = titles.back(), .range = {}};
   key.scale.levels.clear();
   for (const auto& [level, share] : shares) key.scale.levels.push_back(level);
-  LevelMap map(key.scale.levels);
-  for (const auto& [level, share] : shares) key.legend.levels.push_back({level, encodeSrgb(map(level)), share});
-  addLevelLegend(overlay, frame, titles, shares, map);
-  key.cellColor = [map, color](const Cell& cell) { return map(color == ColorBy::degree ? cell.degree : cell.depth); };
-  key.color = levelColors(buffers, std::move(map), color);
+  for (const auto& [level, share] : shares) key.legend.levels.push_back({level, levelColor(level), share});
+  addLevelLegend(overlay, frame, titles, shares);
+  key.cellColor = [color](const Cell& cell) {
+    return decodeSrgb(levelColor(color == ColorBy::degree ? cell.degree : cell.depth));
+  };
+  key.color = levelColors(buffers, color);
   return key;
 }
 
@@ -111,8 +105,8 @@ DistanceScale distanceScaleFor(const ViewBuffers& buffers, const ScaleOptions& o
   return scale;
 }
 
-Legend distanceLegend(const DistanceScale& scale) {
-  Legend legend{.title = "signed distance", .bar = barOf([](double t) { return divergingColor(2 * t - 1); })};
+Legend distanceLegend(const DistanceScale& scale, const ColorMap& map) {
+  Legend legend{.title = "signed distance", .bar = colorsOf(map, kBarColors)};
   for (const double share : {-1.0, -0.5, 0.0, 0.5, 1.0})
     legend.marks.push_back({0.5 + 0.5 * share, formatNumber(share * scale.range, 3)});
   return legend;

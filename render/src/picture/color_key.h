@@ -31,6 +31,6 @@ ColorKey makeColorKey(Overlay& overlay, const Frame& frame, const Field& field, 
 /// scale.
 DistanceScale distanceScaleFor(const ViewBuffers& buffers, const ScaleOptions& options);
 
-Legend distanceLegend(const DistanceScale& scale);
+Legend distanceLegend(const DistanceScale& scale, const ColorMap& map);
 
 }  // namespace hpsdf::render

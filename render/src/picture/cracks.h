@@ -9,8 +9,8 @@
 
 namespace hpsdf::render {
 
-/// The colour of cracks: magenta, which differs from all colours of surfaces, also for colour-blind readers.
-constexpr Color kCrackColor = {255, 0, 255};
+/// The colour of cracks: a violet that differs from all colours of surfaces, also for colour-blind readers.
+constexpr Color kCrackColor = {169, 1, 239};
 
 /// The number of pixels with cracks in a view, and the greatest |f − offset| at a crack.
 struct Cracks {

@@ -14,7 +14,9 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr Color kMarkCasing = {24, 22, 34};
+// Light marks have dark casings, dark marks have white ones, so that marks are seen on every ground.
+constexpr Color kDarkCasing = {24, 22, 34};
+constexpr Color kLightCasing = {255, 255, 255};
 constexpr float kMarkCasingStrength = 0.7F;
 constexpr float kHiddenMark =
     0.7F;  // opacity of hidden marks; it can be high, because dashes show that the marks are hidden
@@ -32,11 +34,11 @@ constexpr int kGroupCell = 8;          // size of a grid cell in pixels; marks i
 /// The names and the colour of a kind of defects, as a row of the legend without a number.
 const Swatch& styleOf(DefectKind kind) {
   static const std::array<Swatch, kDefectKinds> styles = {
-      {{{"boundary edges", "boundary"}, "", {255, 208, 0}},
-       {{"non-manifold edges", "non-manifold", "of 3+ faces"}, "", {226, 0, 206}},
-       {{"inconsistent edges", "inconsistent", "opposed"}, "", {0, 176, 80}},
-       {{"pinched vertices", "pinched"}, "", {255, 255, 255}},
-       {{"pairs of faces that meet", "pairs meet"}, "", {232, 24, 24}}}};
+      {{{"boundary edges", "boundary"}, "", {146, 255, 1}},
+       {{"non-manifold edges", "non-manifold", "of 3+ faces"}, "", {12, 46, 118}},
+       {{"inconsistent edges", "inconsistent", "opposed"}, "", {11, 116, 101}},
+       {{"pinched vertices", "pinched"}, "", {169, 89, 2}},
+       {{"pairs of faces that meet", "pairs meet"}, "", {100, 1, 4}}}};
   return styles[static_cast<std::size_t>(kind)];
 }
 
@@ -61,10 +63,16 @@ class Painter {
   Painter(Image& picture, const ViewBuffers& buffers, int samples, double lineWidth)
       : picture_(picture), buffers_(buffers), samples_(samples), dash_(kDash * lineWidth) {}
 
-  /// Blends the strokes, widened by `border` on every side, over the picture. `color` replaces the strokes' own
-  /// colours unless it is null.
-  void paint(const std::vector<Stroke>& strokes, double border, const Color* color, float opacity) {
-    for (const Stroke& stroke : strokes) paint(stroke, border, decodeSrgb(color ? *color : stroke.color), opacity);
+  /// Blends the casings of the strokes, which are wider than these by `border` on every side, over the picture.
+  void paintCasings(const std::vector<Stroke>& strokes, double border) {
+    for (const Stroke& stroke : strokes) {
+      const bool isLight = toOklab(decodeSrgb(stroke.color)).lightness > 0.6;
+      paint(stroke, border, decodeSrgb(isLight ? kDarkCasing : kLightCasing), kMarkCasingStrength);
+    }
+  }
+
+  void paintCores(const std::vector<Stroke>& strokes) {
+    for (const Stroke& stroke : strokes) paint(stroke, 0, decodeSrgb(stroke.color), 1);
   }
 
  private:
@@ -247,8 +255,8 @@ void paintDefects(Image& picture, const Camera& camera, const ViewBuffers& buffe
 
   // Paint the casings of all marks before their cores, so that no casing covers the core of a neighbour.
   Painter painter(picture, buffers, samples, lineWidth);
-  painter.paint(strokes, kMarkCasingBorder * lineWidth, &kMarkCasing, kMarkCasingStrength);
-  painter.paint(strokes, 0, nullptr, 1);
+  painter.paintCasings(strokes, kMarkCasingBorder * lineWidth);
+  painter.paintCores(strokes);
 }
 
 }  // namespace hpsdf::render

@@ -16,8 +16,11 @@ namespace hpsdf::render {
 /// Titles of the legend of a mesh's defects, from the longest to the shortest.
 inline const std::array<std::string, 2> kDefectTitles = {"Defects of the mesh", "Defects"};
 
-/// The colour of a kind of defects. The colours of all kinds are distinguishable from each other on clay.
+/// The colour of a kind of defects, for its marks. Faces that cross others have the colour of `DefectKind::crossing`.
 Color defectColor(DefectKind kind);
+
+/// The colour of faces that are seen from behind. Faces seen from outside have the colour of surfaces.
+constexpr Color kBackColor = {133, 151, 169};
 
 /// The kinds of defects that the mesh has, with the number of defects of each kind.
 std::vector<Legend::Defects> defectLegend(const MeshDefects& defects);

@@ -59,8 +59,8 @@ std::string describeCamera(const OrbitCamera& camera) {
 
 std::string describeCracks(const Cracks& cracks) {
   if (cracks.pixels == 0) return "no cracks";
-  return "cracks (magenta) in " + formatCount(cracks.pixels) + (cracks.pixels == 1 ? " pixel" : " pixels") +
-         ", up to " + formatNumber(cracks.widest, 3);
+  return "cracks (violet) in " + formatCount(cracks.pixels) + (cracks.pixels == 1 ? " pixel" : " pixels") + ", up to " +
+         formatNumber(cracks.widest, 3);
 }
 
 std::string describeLevels(const std::map<int, double>& shares) {

@@ -44,11 +44,9 @@ struct Bar {
   double height() const { return bottom - top; }
 };
 
-// Adds a title and a colour bar. The colour of the bar is colorAt(t), with t = 0 at the top and 1 at the
-// bottom.
-template <typename ColorAt>
+// Adds a title and a colour bar, with the map's colour of 1 at the top and of 0 at the bottom.
 Bar addBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, double above, double below,
-           const ColorAt& colorAt) {
+           const ColorMap& map) {
   const double em = frame.textSize;
   const Column column(overlay, frame, titles);
   const double left = std::round(column.left), right = left + std::round(1.7 * em);
@@ -63,7 +61,7 @@ Bar addBar(Overlay& overlay, const Frame& frame, std::span<const std::string> ti
   // enlarged picture would show the paper.
   for (double y = bar.top; y < bar.bottom; ++y)
     overlay.boxes.push_back(
-        {bar.left, y, bar.right, bar.bottom, encodeSrgb(colorAt((y + 0.5 - bar.top) / bar.height()))});
+        {bar.left, y, bar.right, bar.bottom, encodeSrgb(map.at((bar.bottom - y - 0.5) / bar.height()))});
   return bar;
 }
 
@@ -103,16 +101,16 @@ double swatchWidth(const std::map<int, double>& shares, double size, bool roomy)
 // Adds a row for a level: a swatch with the level's name, and the level's share of the volume as text. In a roomy
 // picture, a grey bar shows the share too.
 void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, double size, double swatch,
-                double largestShare, bool roomy, const LinearColor& color) {
+                double largestShare, bool roomy) {
   const double left = std::round(column.left);
   const double gap = std::max(1.0, std::round(0.16 * row.height));
-  addSwatch(overlay, row, left, swatch, gap, encodeSrgb(color));
+  addSwatch(overlay, row, left, swatch, gap, levelColor(row.level));
   LevelRow box = row;
   box.height -= gap;
   const std::string name = levelName(row.level);
   const double baseline = std::round(box.baseline(size)), ofName = nameSize(row.level, size, roomy);
   addText(overlay, name, ofName, left + (swatch - advanceOf(name, ofName)) / 2, std::round(box.baseline(ofName)),
-          inkOn(color));
+          inkOn(decodeSrgb(levelColor(row.level))));
 
   const double shareRight = left + swatch + 0.5 * size + advanceOf("99.9 %", size);
   if (shareRight > column.right) return;
@@ -127,12 +125,12 @@ void addWideRow(Overlay& overlay, const Column& column, const LevelRow& row, dou
 
 // Adds one row per level, for a legend of so many levels that the rows are too low for a text in each row. The swatches
 // touch, and only some of them have the level's number beside them.
-void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<LevelRow>& rows, const LevelMap& map) {
+void addNarrowRows(Overlay& overlay, const Column& column, const std::vector<LevelRow>& rows) {
   const double left = std::round(column.left), swatch = std::round(0.35 * column.width());
   const double size = std::min(kSmallestText + 1, 1.1 * kSmallestText);
   double lastTop = -1e9;
   for (const LevelRow& row : rows) {
-    addSwatch(overlay, row, left, swatch, 0, encodeSrgb(map(row.level)));
+    addSwatch(overlay, row, left, swatch, 0, levelColor(row.level));
     const double baseline = std::round(row.baseline(size));
     if (baseline - capHeight(size) < lastTop + 1.5 * size || baseline > column.bottom) continue;
     if (baseline - capHeight(size) < column.top) continue;
@@ -234,7 +232,7 @@ Frame frame(int width, int height) {
 }
 
 void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
-                    const std::map<int, double>& shares, const LevelMap& map) {
+                    const std::map<int, double>& shares) {
   if (frame.panel.empty() || shares.empty()) return;
   const double em = frame.textSize;
   Column column(overlay, frame, titles);
@@ -253,18 +251,16 @@ void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::s
     rows.push_back({level->first, level->second, column.top + height * double(rows.size()), height});
     largestShare = std::max(largestShare, level->second);
   }
-  if (size < kSmallestText) return addNarrowRows(overlay, column, rows, map);
+  if (size < kSmallestText) return addNarrowRows(overlay, column, rows);
   const double swatch = swatchWidth(shares, size, frame.roomy);
-  for (const LevelRow& row : rows)
-    addWideRow(overlay, column, row, size, swatch, largestShare, frame.roomy, map(row.level));
+  for (const LevelRow& row : rows) addWideRow(overlay, column, row, size, swatch, largestShare, frame.roomy);
 }
 
-void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale) {
+void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale, const ColorMap& map) {
   if (frame.panel.empty()) return;
   const double em = frame.textSize, thin = std::max(1.0, em / 15);
   static const std::string titles[] = {"signed distance", "distance"};
-  const Bar bar =
-      addBar(overlay, frame, titles, 0.3 * em, 0.6 * em, [](double t) { return divergingColor(1 - 2 * t); });
+  const Bar bar = addBar(overlay, frame, titles, 0.3 * em, 0.6 * em, map);
 
   // Choose the iso-lines that get numbers: zero and every 1st, 2nd, 5th, 10th … line from zero, so that the
   // numbers have room.
@@ -289,7 +285,7 @@ void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& s
 void addScaleBar(Overlay& overlay, const Frame& frame, std::span<const std::string> titles, const ColorScale& scale) {
   if (frame.panel.empty()) return;
   const double em = frame.textSize, thin = std::max(1.0, em / 15);
-  const Bar bar = addBar(overlay, frame, titles, 0.5 * em, 0.8 * em, [](double t) { return orderedColor(1 - t); });
+  const Bar bar = addBar(overlay, frame, titles, 0.5 * em, 0.8 * em, scale.map());
 
   double lastLabel = std::numeric_limits<double>::infinity();  // y coordinate of the last number added
   const auto mark = [&](double value, bool labelled) {

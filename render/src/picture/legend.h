@@ -67,10 +67,10 @@ std::string fittingTitle(std::span<const std::string> titles, double size, doubl
 /// Adds a swatch for each level (degree or depth), the highest level on top, with the level's number and its share of
 /// the volume. Here and in the functions below, the panel's title is the first of `titles` that fits.
 void addLevelLegend(Overlay& overlay, const Frame& frame, std::span<const std::string> titles,
-                    const std::map<int, double>& shares, const LevelMap& map);
+                    const std::map<int, double>& shares);
 
 /// Adds a vertical colour bar for distances, with the iso-lines of the picture and their values.
-void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale);
+void addDistanceBar(Overlay& overlay, const Frame& frame, const DistanceScale& scale, const ColorMap& map);
 
 /// Adds a vertical colour bar for the scale of a quantity, with the high end on top and marks at powers of ten or at
 /// even steps.

@@ -21,12 +21,7 @@ namespace {
 /// Points of a curve; x is the distance along the line, y the value.
 using Points = std::vector<Eigen::Vector2d>;
 
-// The colours of curves differ in lightness as well as in hue, for colour-blind readers and for print.
-constexpr Color kBlue = {0, 68, 136};
-constexpr Color kAmber = {236, 160, 30};
-constexpr Color kRed = {187, 58, 82};
-constexpr Color kOutside = {238, 238, 240};
-constexpr Color kBorder = {176, 179, 190};
+constexpr Color kBlue = kCurveColors[0], kAmber = kCurveColors[1], kRed = kCurveColors[2], kBorder = kCurveColors[3];
 
 // A row of a chart's legend, with one curve or with many short curves.
 struct Series {
@@ -216,7 +211,7 @@ class Plotter {
 
   void shadeOutside() {
     for (const Piece& piece : line_.pieces)
-      if (!piece.cell) box(xOf(piece.tEnter), layout_.charts.front().y0, xOf(piece.tLeave), bottom_, kOutside);
+      if (!piece.cell) box(xOf(piece.tEnter), layout_.charts.front().y0, xOf(piece.tLeave), bottom_, kOutsideColor);
   }
 
   static double yOf(const PixelRect& chart, const Scale& scale, double value) {
@@ -252,26 +247,19 @@ class Plotter {
 
   void drawBands() {
     if (bands_.empty()) return;
-    const FieldStatistics figures = statistics(field_);
-    drawBand(bands_[0], "degree", figures.degreeVolume, [](const Cell& cell) { return cell.degree; });
-    drawBand(bands_[1], "depth", figures.depthVolume, [](const Cell& cell) { return cell.depth; });
+    drawBand(bands_[0], "degree", [](const Cell& cell) { return cell.degree; });
+    drawBand(bands_[1], "depth", [](const Cell& cell) { return cell.depth; });
     nameOutside(bands_[0]);
   }
 
-  // Draws the band of degrees or depths below the charts. Its colours depend on all levels of the field, as in pictures
-  // of slices. Its legend contains only the levels of cells on the line.
-  void drawBand(const PixelRect& band, const std::string& name, const std::map<int, double>& ofField,
-                const auto& levelOf) {
-    std::vector<int> levels;
-    for (const auto& [level, share] : ofField) levels.push_back(level);
-    const LevelMap map(levels);
+  // Draws the band of degrees or depths below the charts. Its legend contains only the levels of cells on the line.
+  void drawBand(const PixelRect& band, const std::string& name, const auto& levelOf) {
     std::set<int> seen;
     for (const Piece& piece : line_.pieces) {
       if (!piece.cell) continue;
       const int level = levelOf(*piece.cell);
       seen.insert(level);
-      swatch({xOf(piece.tEnter), double(band.y0), xOf(piece.tLeave), double(band.y1), encodeSrgb(map(level))}, level,
-             map);
+      swatch({xOf(piece.tEnter), double(band.y0), xOf(piece.tLeave), double(band.y1), levelColor(level)}, level);
     }
     text(name, small_, left_ - 0.5 * em_ - advanceOf(name, small_), baselineIn(band, small_), kInk);
     if (frame_.panel.empty()) return;
@@ -283,7 +271,7 @@ class Plotter {
     const double unit = std::min((frame_.panel.x1 - em_ - left) / widths, 1.8 * em_);
     for (const int level : seen) {
       const double right = left + widthsOf(level) * unit;
-      swatch({left, double(band.y0), right, double(band.y1), encodeSrgb(map(level))}, level, map);
+      swatch({left, double(band.y0), right, double(band.y1), levelColor(level)}, level);
       left = right;
     }
   }
@@ -299,13 +287,13 @@ class Plotter {
   }
 
   // Draws a box in a level's colour, with the level's name if it fits.
-  void swatch(const BoxItem& item, int level, const LevelMap& map) {
+  void swatch(const BoxItem& item, int level) {
     layout_.overlay.boxes.push_back(item);
     const std::string name = levelName(level);
     const double advance = advanceOf(name, small_);
     if (advance + 0.4 * em_ > item.x1 - item.x0) return;
     text(name, small_, (item.x0 + item.x1 - advance) / 2, (item.y0 + item.y1 + capHeight(small_)) / 2,
-         inkOn(map(level)));
+         inkOn(decodeSrgb(levelColor(level))));
   }
 
   static double baselineIn(const PixelRect& row, double size) { return (row.y0 + row.y1 + capHeight(size)) / 2; }

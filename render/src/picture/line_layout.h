@@ -3,6 +3,7 @@
 // check it.
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,12 @@
 #include "picture/legend.h"
 
 namespace hpsdf::render {
+
+/// The colours of curves and of the borders between cells. They differ in lightness as well as in hue, for colour-blind
+/// readers and for print.
+constexpr std::array<Color, 4> kCurveColors = {{{3, 68, 132}, {235, 158, 29}, {187, 57, 81}, {154, 159, 174}}};
+/// The background of a line plot outside of the domain.
+constexpr Color kOutsideColor = {238, 238, 240};
 
 /// A polyline through points in pixels, clipped to a rectangle.
 struct CurveItem {

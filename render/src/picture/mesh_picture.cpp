@@ -26,8 +26,6 @@ constexpr double kMeshBorder = 0.04;  // free border around a whole mesh, as a s
 /// The kinds of visible faces: front side, back side, or a face that crosses another. The values are indices of
 /// materials.
 enum Side : std::uint32_t { front, back, crossing };
-constexpr Color kBack = {78, 124, 190};
-constexpr Color kCrossing = {240, 146, 150};  // paler than the rings around crossings
 
 /// Maps a mesh to coordinates in which it is centred at the origin and its size is from 1 to 2. Without this
 /// map, devices that compute with floats would fail: squares overflow for lengths above 1e19 and vanish below
@@ -111,9 +109,9 @@ void setSides(const TriangleMesh& mesh, const MeshDefects& defects, const Camera
 std::vector<Swatch> swatchesOf(const MeshDefects& defects) {
   std::vector<Swatch> swatches = defectSwatches(defects);
   swatches.push_back({{"faces, seen from outside", "outside"}, "", surfaceColor()});
-  swatches.push_back({{"faces, seen from behind", "behind"}, "", kBack});
+  swatches.push_back({{"faces, seen from behind", "behind"}, "", kBackColor});
   if (defects.count(DefectKind::crossing) > 0)
-    swatches.push_back({{"faces that meet others", "meeting"}, "", kCrossing});
+    swatches.push_back({{"faces that meet others", "meeting"}, "", defectColor(DefectKind::crossing)});
   return swatches;
 }
 
@@ -144,8 +142,9 @@ Image drawMesh(const MakeBodyRenderer& make, const TriangleMesh& mesh, const Mes
   // Colour the view of the mesh in a picture, and mark the mesh's defects.
   Image image = backdropPicture(picture.width, picture.height, height);
   const Sampling sampling{samples, frame.lineWidth(), 1};
-  const SurfaceLook look{.bodies = {decodeSrgb(surfaceColor()), decodeSrgb(kBack), decodeSrgb(kCrossing)},
-                         .lightTilt = lightTiltOf(orbit.elevationDegrees)};
+  const SurfaceLook look{
+      .bodies = {decodeSrgb(surfaceColor()), decodeSrgb(kBackColor), decodeSrgb(defectColor(DefectKind::crossing))},
+      .lightTilt = lightTiltOf(orbit.elevationDegrees)};
   pasteView(image, colorSurface(buffers, camera, look, sampling));
   paintDefects(image, camera, buffers, samples, normalized(defects), sampling.lineWidth);
 

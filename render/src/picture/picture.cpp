@@ -215,6 +215,7 @@ void addFieldFacts(Overlay& overlay, const Frame& frame, const Field& field, con
 struct SliceColors {
   ColorKey key = {};
   std::optional<DistanceScale> distances = {};
+  const ColorMap* map = nullptr;  ///< the colour map of distances
 };
 
 /// Chooses the colours of a slice. Adds their legend to the overlay, and to `drawn` the legend, the scale and the first
@@ -227,11 +228,12 @@ SliceColors sliceColors(Overlay& overlay, const Frame& frame, const Field& field
   if (picture.color == ColorBy::distance) {
     const DistanceScale scale = distanceScaleFor(buffers, picture.scale);
     if (!drawn.scale.limits) drawn.scale.limits = {scale.minimum, scale.maximum};
-    addDistanceBar(overlay, frame, scale);
-    drawn.legend = distanceLegend(scale);
+    colors.map = &colorMap(MapKind::diverging, picture.scale.map);
+    addDistanceBar(overlay, frame, scale, *colors.map);
+    drawn.legend = distanceLegend(scale, *colors.map);
     drawn.details = {"distance", plane, formatNumber(scale.minimum) + " to " + formatNumber(scale.maximum),
                      "lines every " + formatNumber(scale.step)};
-    colors.key.color = distanceColors(buffers, scale);
+    colors.key.color = distanceColors(buffers, scale, *colors.map);
     colors.distances = scale;
     return colors;
   }
@@ -255,6 +257,7 @@ std::vector<VectorLayer> layersOfSlice(SliceContent slice, const SliceColors& co
   });
   slice.cellColor = colors.key.cellColor;
   slice.distances = colors.distances ? &*colors.distances : nullptr;
+  slice.map = colors.map;
   std::vector<VectorLayer> layers = sliceLayers(slice);
   const int width = slice.ground.width, height = slice.ground.height;
   const double lineWidth = slice.sampling.lineWidth;
@@ -407,7 +410,7 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
     Image image(enlargedLength(picture.width, picture.form), enlargedLength(picture.height, picture.form),
                 paper.value_or(paperColor()));
     sampling.paper = paper;
-    pasteView(image, colors.distances ? colorDistanceSlice(buffers, *colors.distances, sampling)
+    pasteView(image, colors.distances ? colorDistanceSlice(buffers, *colors.distances, *colors.map, sampling)
                                       : colorCellSlice(buffers, colors.key.color, sampling));
     paintSliceLines(image, field, view, section, width, height, reference, sampling.lineWidth);
     addArrows(image, arrows, buffers, sampling);

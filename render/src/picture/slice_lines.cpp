@@ -11,6 +11,7 @@
 #include "coloring/color_view.h"
 #include "image/color.h"
 #include "image/strokes.h"
+#include "picture/cracks.h"
 #include "vector/paths.h"
 
 namespace hpsdf::render {
@@ -22,7 +23,6 @@ constexpr float kOutlineCasingStrength = 0.8F;
 // Vector pictures are mixed in sRGB values instead of linear light: there, this opacity has the effect of the strength
 // on most colours.
 constexpr double kOutlineCasingOpacity = 0.6;
-constexpr Color kMeshLine = {255, 0, 255};  // the colour of cracks, which no colour map contains
 // The following lengths are in multiples of the width of a thin line.
 constexpr double kOutlineWidth = 2.6;
 constexpr double kOutlineCasingBorder = 1.3;
@@ -162,7 +162,7 @@ void paintMesh(Image& picture, const std::vector<FlatLine>& lines, const PixelRe
     for (const Eigen::Vector2d& end : {line.from, line.to})
       distances.add({end, end}, kMeshDotRadius * lineWidth - halfWidth);
   }
-  distances.paint(picture, kMeshLine, halfWidth, 1);
+  distances.paint(picture, kCrackColor, halfWidth, 1);
 }
 
 }  // namespace
@@ -219,16 +219,18 @@ std::vector<FlatLine> sectionOf(const TriangleMesh& mesh, const SliceView& view,
   return lines;
 }
 
-Color outlineColor(std::size_t index) {
-  constexpr std::array<Color, 7> kColors = {
-      {{230, 159, 0}, {86, 180, 233}, {204, 121, 167}, {240, 228, 66}, {0, 158, 115}, {213, 94, 0}, {0, 114, 178}}};
-  return kColors[index % kColors.size()];
+std::span<const Color> outlineColors() {
+  static constexpr std::array<Color, 5> kColors = {
+      {{250, 214, 6}, {84, 188, 252}, {188, 132, 24}, {11, 124, 97}, {160, 166, 167}}};
+  return kColors;
 }
+
+Color outlineColor(std::size_t index) { return outlineColors()[index % outlineColors().size()]; }
 
 std::vector<Legend::Line> lineLegend(const ReferenceData& reference) {
   std::vector<Legend::Line> lines;
   for (const OutlinedSolid& solid : reference.outlined) lines.push_back({solid.name, outlineColor(lines.size())});
-  if (reference.mesh.mesh != nullptr) lines.push_back({"triangles", kMeshLine});
+  if (reference.mesh.mesh != nullptr) lines.push_back({"triangles", kCrackColor});
   return lines;
 }
 
@@ -281,8 +283,8 @@ std::vector<VectorShape> sliceLineShapes(const Field& field, const SliceView& vi
     shapes.emplace_back(std::move(line));
   }
   if (reference.mesh.mesh == nullptr) return shapes;
-  StrokedShape mesh{{}, kMeshLineWidth * lineWidth, kMeshLine, 1, true};
-  StrokedShape dots{{}, 2 * kMeshDotRadius * lineWidth, kMeshLine, 1, true};
+  StrokedShape mesh{{}, kMeshLineWidth * lineWidth, kCrackColor, 1, true};
+  StrokedShape dots{{}, 2 * kMeshDotRadius * lineWidth, kCrackColor, 1, true};
   for (const FlatLine& line : sectionOf(*reference.mesh.mesh, view, width, height)) {
     mesh.lines.push_back({line.from, line.to});
     if ((line.to - line.from).norm() < kDottedLength * lineWidth) continue;

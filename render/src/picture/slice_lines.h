@@ -1,6 +1,7 @@
 #pragma once
 // Lines that are painted over the finished view of a slice: outlines of solids, and the section of a mesh.
 
+#include <span>
 #include <vector>
 
 #include "hpsdf/render/image.h"
@@ -24,8 +25,10 @@ std::vector<FlatLine> outlineOf(const DistanceFunction& distance, const SliceVie
 /// Returns the lines in which a plane cuts the triangles of a mesh, in a view of width × height pixels.
 std::vector<FlatLine> sectionOf(const TriangleMesh& mesh, const SliceView& view, int width, int height);
 
-/// Returns the colour of the outline with this index. The colours of up to seven outlines can be told apart also with a
-/// colour vision deficiency (Okabe and Ito, "Color universal design", 2008).
+/// Returns the colours of outlines, which can be told apart with every kind of colour vision.
+std::span<const Color> outlineColors();
+
+/// Returns the colour of the outline with this index. After the last of `outlineColors`, the first one follows again.
 Color outlineColor(std::size_t index);
 
 /// Returns the names and colours of the lines that `paintSliceLines` paints.

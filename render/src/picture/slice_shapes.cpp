@@ -137,7 +137,7 @@ VectorLayer isoLineLayer(const SliceContent& slice, const Eigen::AlignedBox2d& w
   for (double line = first; line <= last && last - first <= kMostIsoLines; ++line) {
     if (line == 0) continue;
     MatchingOpacity opacity(kIsoLine, kIsoStrength);
-    opacity.add(divergingColor(line * scale.step / scale.range));
+    opacity.add(slice.map->at(0.5 + 0.5 * line * scale.step / scale.range));
     layer.shapes.emplace_back(StrokedShape{contourLines(slice.buffers, slice.sampling.samples, line * scale.step),
                                            slice.sampling.lineWidth, kIsoLine, opacity.best(), true});
   }

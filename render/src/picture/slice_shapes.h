@@ -22,6 +22,7 @@ struct SliceContent {
   std::function<LinearColor(const Cell&)> cellColor = {};  ///< colour of a cell; empty if colours vary within cells
   Image ground = {};                                       ///< the view in colours alone, without lines
   const DistanceScale* distances = nullptr;                ///< the iso-lines of a slice of distances, without cells
+  const ColorMap* map = nullptr;                           ///< the colour map of distances
 };
 
 /// Returns the layers of a slice, from the bottom to the top. Cells of one colour are areas whose borders are exact. If

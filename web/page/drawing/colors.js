@@ -1,4 +1,6 @@
-// The program's colours (render/src/image/colormap.cpp), as linear light.
+// The program's colours (render/src/image/color_maps.cpp), as linear light.
+
+import { EXACT_DEGREE } from "../field/field_file.js";
 
 /** @typedef {[number, number, number]} Color  red, green and blue from 0 to 1 */
 
@@ -7,6 +9,22 @@
  */
 function encodeChannel(x) {
   return x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
+}
+
+/**
+ * @param {number} x  encoded light
+ */
+function decodeChannel(x) {
+  return x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4;
+}
+
+/**
+ * @param {string} hex  "#rrggbb"
+ * @returns {Color}
+ */
+function fromHex(hex) {
+  const channel = (/** @type {number} */ at) => decodeChannel(parseInt(hex.slice(at, at + 2), 16) / 255);
+  return [channel(1), channel(3), channel(5)];
 }
 
 /**
@@ -60,17 +78,25 @@ function fromOklch(lightness, chroma, hue) {
 }
 
 /**
- * A colour of the scale from dark violet (0) over teal to yellow (1).
+ * A colour of the scale from dark violet (0) over teal to golden yellow (1).
  * @param {number} t
  */
 export function orderedColor(t) {
   const at = Math.min(Math.max(t, 0), 1);
-  return fromOklch(0.385 + 0.565 * at, 0.103 + 0.034 * (2 * at - 1) ** 2, 302 - 204 * at ** 0.92);
+  const chroma = 0.103 + (at < 0.5 ? 0.034 : 0.067) * (2 * at - 1) ** 2;
+  return fromOklch(0.385 + 0.445 * at, chroma, 302 - 227 * at ** 0.8);
 }
 
-/** The colour of exact cells. */
-export function exactColor() {
-  return fromOklch(0.51, 0.2, 30);
+const LEVELS = ["#271478", "#652a3a", "#636f7c", "#c8761d", "#57b48d", "#c097ff", "#f6d44a"];
+
+/**
+ * The colour of a level, which is a degree or a depth, or of exact cells.
+ * @param {number} level
+ */
+export function levelColor(level) {
+  if (level === EXACT_DEGREE) return fromHex("#ab000b");
+  if (level < LEVELS.length) return fromHex(LEVELS[level]);
+  return fromOklch(0.45 + 0.47 * 0.86 ** (level - LEVELS.length), 0.15, 130);
 }
 
 /**

@@ -1,8 +1,8 @@
 // Turns the buffers of a view into colours on a canvas.
 
-import { EXACT_DEGREE, degreeOf, isLeaf } from "../field/field_file.js";
+import { degreeOf, isLeaf } from "../field/field_file.js";
 import { forEachLeaf } from "../field/leaves.js";
-import { divergingColor, exactColor, orderedColor } from "./colors.js";
+import { divergingColor, levelColor, orderedColor } from "./colors.js";
 import { FieldRenderer, NO_CELL, shownBox } from "./renderer.js";
 import { CellLines } from "./cell_lines.js";
 import { worldPoint } from "../field/query.js";
@@ -49,11 +49,7 @@ function sharesOf(field, levelOf) {
  */
 function levelsOf(shares) {
   const levels = [...new Set(shares.flatMap((own) => [...own.keys()]))].sort((a, b) => a - b);
-  const ordered = levels.filter((level) => level !== EXACT_DEGREE);
-  return levels.map((level) => {
-    const at = ordered.length === 1 ? 0.5 : ordered.indexOf(level) / (ordered.length - 1);
-    return { level, share: shares[0].get(level) ?? 0, color: level === EXACT_DEGREE ? exactColor() : orderedColor(at) };
-  });
+  return levels.map((level) => ({ level, share: shares[0].get(level) ?? 0, color: levelColor(level) }));
 }
 
 /**

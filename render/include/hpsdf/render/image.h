@@ -1,6 +1,7 @@
 #pragma once
 // Pictures in memory and as PNG files.
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -11,6 +12,9 @@ namespace hpsdf::render {
 
 /// An sRGB colour with 8 bits per channel.
 using Color = std::array<std::uint8_t, 3>;
+
+/// A colour in linear sRGB, each channel 0 to 1.
+using LinearColor = Eigen::Vector3f;
 
 /// Pixels of a screen to an inch, as browsers count them.
 constexpr double kScreenDpi = 96;

@@ -15,6 +15,7 @@
 #include "hpsdf/jumps.h"
 #include "hpsdf/mesh_report.h"
 #include "hpsdf/render/bodies.h"
+#include "hpsdf/render/color_maps.h"
 #include "hpsdf/render/image.h"
 #include "hpsdf/render/shown_cells.h"
 #include "hpsdf/render/view.h"
@@ -87,8 +88,12 @@ struct ScaleOptions {
   bool logarithmic = true;
   /// Colours each cell by the greatest value that the picture shows of it, in place of each point by its own.
   bool perCell = false;
-  /// Degrees or depths that the legend contains in addition to those of the field; 0 to 255, in ascending order.
+  /// Degrees or depths that the legend contains in addition to those of the field; 0 to 255, in ascending order. Films
+  /// and pictures side by side thus have one legend.
   std::vector<int> levels = {};
+  /// The name of the colour map (`colorMaps`) for a quantity or for distances; empty for the default one. Levels have
+  /// colours of their own (`levelColor`).
+  std::string map = {};
 };
 
 struct AxisPlane {
