@@ -64,7 +64,7 @@ TEST(Explorer, aCopiedViewIsRestoredExactly) {
             "color depth of=surface ; color slope of=slice range=1e-3,0.5 scale=linear map=heat\n"
             "worst by=gradient on=surface page=2 mark=0.1,0.25,-0.5 ; panel build=true worst=true shown=false "
             "bar=false left=false keys=true left-scroll=3\n"
-            "show slice samples=2 size=640x400");
+            "show slice samples=2 size=640x400 scale=1.25");
   const ViewState wanted = bench.view();
   bench.out.str("");
   bench.run("copy-view");
@@ -239,7 +239,8 @@ TEST(Explorer, eachKindOfWidgetRunsItsCommand) {
 
 TEST(Explorer, missingAndDisabledWidgetsAreErrors) {
   Bench bench;
-  EXPECT_THAT(bench.failure("ui click bar/slice"), HasSubstr("no field"));
+  EXPECT_THAT(bench.failure("ui click bar/slice"), HasSubstr("the frame has no widget 'bar/slice'"));
+  EXPECT_THAT(bench.failure("shot output=none.png"), HasSubstr("no field"));
   bench.run(kTorus);
   EXPECT_THAT(bench.failure("ui click view/colour"), HasSubstr("no widget 'view/colour'; did you mean 'view/color'?"));
   EXPECT_THAT(bench.failure("ui click view/color/depth"), HasSubstr("no widget 'view/color/depth'")) << "not open";
@@ -762,7 +763,7 @@ TEST(Explorer, scriptLinesAreStepsWhileATextFieldIsEdited) {
 TEST(Explorer, aFrameThatFailsIsEnded) {
   Ui ui;
   const auto widgets = [&](bool fails) {
-    ui.frame(300, 200, nullptr, [&] {
+    ui.frame({300, 200}, nullptr, [&] {
       ui.column("left", {0, 0, 300, 200}, 0.0, [&] {
         ui.button("a", "a");
         ui.enable(false);

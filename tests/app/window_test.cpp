@@ -19,6 +19,7 @@
 
 #include "commands/commands.h"
 #include "explorer/explorer.h"
+#include "file_drop.h"
 #include "files/other_program.h"
 #include "hpsdf/render/image.h"
 #include "language/script.h"
@@ -60,9 +61,11 @@ class Child {
     std::vector<std::string> environment;
     for (char** variable = environ; *variable != nullptr; ++variable)
       if (!std::string_view(*variable).starts_with("DISPLAY=") &&
-          !std::string_view(*variable).starts_with("WAYLAND_DISPLAY="))
+          !std::string_view(*variable).starts_with("WAYLAND_DISPLAY=") &&
+          !std::string_view(*variable).starts_with("XDG_STATE_HOME="))
         environment.emplace_back(*variable);
     if (!display.empty()) environment.push_back("DISPLAY=" + display);
+    environment.push_back("XDG_STATE_HOME=" + folder.string());
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
@@ -156,7 +159,7 @@ class WindowTest : public testing::Test {
     if (!missing.empty()) GTEST_SKIP() << missing;
     fs::create_directory(folder_ / "x");
     server_.emplace(std::vector<std::string>{"Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-fbdir",
-                                             (folder_ / "x").string(), "-nolisten", "tcp"},
+                                             (folder_ / "x").string(), "-nolisten", "tcp", "-noreset"},
                     folder_ / "x", "");
     ASSERT_TRUE(comesTrue([&] { return server_->out().ends_with('\n') || server_->ended(); }));
     ASSERT_FALSE(server_->ended()) << server_->err();
@@ -176,18 +179,22 @@ class WindowTest : public testing::Test {
     return status;
   }
 
-  void open(const std::string& field, bool waits = true) {
-    const std::string size = std::to_string(kWidth) + "x" + std::to_string(kHeight);
-    window_.emplace(std::vector<std::string>{HPSDF_PROGRAM, "view", field, "--size", size, "--gl", "software",
-                                             "--record", "session.hps", "--shot", "last.png"},
-                    folder_.path(), display_);
+  /// Opens a window with a field or, for "", without one.
+  void open(const std::string& field, bool waits = true, int width = kWidth, int height = kHeight) {
+    std::vector<std::string> words = {
+        HPSDF_PROGRAM, "view",     "--size",   std::to_string(width) + "x" + std::to_string(height),
+        "--gl",        "software", "--record", "session.hps",
+        "--shot",      "last.png"};
+    if (!field.empty()) words.insert(words.begin() + 2, field);
+    window_.emplace(words, folder_.path(), display_);
     id_ = desktop({"search", "--sync", "--onlyvisible", "--name", "hpsdf$"});
     ASSERT_FALSE(id_.empty()) << window_->err();
     id_.pop_back();
     // The title tells the field's error once there is a field; until then the window takes no other input than Escape.
-    if (waits) desktop({"search", "--sync", "--onlyvisible", "--name", "weighted estimate.*hpsdf$"});
+    if (waits) waitForTitle("weighted estimate.*hpsdf$");
     desktop({"windowfocus", "--sync", id_});
   }
+  void waitForTitle(const std::string& pattern) { desktop({"search", "--sync", "--onlyvisible", "--name", pattern}); }
 
   /// Closes the window by Ctrl+Q or by another event.
   int close() {
@@ -197,6 +204,10 @@ class WindowTest : public testing::Test {
 
   std::string desktop(std::vector<std::string> words) {
     words.insert(words.begin(), "xdotool");
+    return onDisplay(std::move(words));
+  }
+  /// Runs a program on the virtual display and returns its output.
+  std::string onDisplay(std::vector<std::string> words) {
     Child child(std::move(words), folder_ / "x", display_);
     EXPECT_EQ(child.wait(), 0) << child.err();
     return child.out();
@@ -307,7 +318,8 @@ TEST_F(WindowTest, aSessionOfMouseAndKeyboardReplaysToTheSamePixels) {
 
   const std::string script = contents(file("session.hps"));
   for (const char* line :
-       {"camera up=auto\nbuild builtin:torus\nshow size=960x640 gl=software\ncamera 6,8,1.1\ncamera target=",
+       {"camera up=auto\nbuild builtin:torus\nshow size=960x640 scale=1 samples=2 gl=software\ncamera 6,8,1.1\ncamera "
+        "target=",
         "\nshow slice\n", "\ncolor depth\n",
         "\nplane zoom=4\npanel worst=true\nundo\npanel questions=false\npanel colors=false\npanel build=true\nsettings "
         "target-error=1e-4\nrebuild\nui hover ",
@@ -331,6 +343,8 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
   const std::string field = "analytic:torus";
   ASSERT_NO_FATAL_FAILURE(open(field));
   Follower follower(field);
+  click(follower.middleOf("shown/fold"));
+  follower.run("panel shown=false");
   click(follower.middleOf("questions/fold"));  // makes room for the construction
   follower.run("panel questions=false");
   click(follower.middleOf("build/fold"));
@@ -370,6 +384,79 @@ TEST_F(WindowTest, itShowsTheProgressOfTheFirstConstructionAndClosingCancelsIt) 
   }
 }
 
+/// Text has as many points on a desktop with more pixels per inch.
+TEST_F(WindowTest, theFrameFollowsTheDesktopsScale) {
+  if (!findProgram("xprop")) GTEST_SKIP() << "xprop is not installed";
+  int plain = 0;
+  for (const double scale : {1.0, 1.5, 2.0}) {
+    onDisplay({"xprop", "-root", "-f", "RESOURCE_MANAGER", "8s", "-set", "RESOURCE_MANAGER",
+               "Xft.dpi: " + std::to_string(int(96 * scale))});
+    ASSERT_NO_FATAL_FAILURE(open("analytic:torus", true, 600, 400));
+    ASSERT_EQ(close(), 0) << window_->err();
+    const render::Image frame = render::loadPng(file("last.png"));
+    EXPECT_EQ(frame.width, int(600 * scale));
+    EXPECT_EQ(frame.height, int(400 * scale));
+    int rows = 0;  // with the ink of the first button's text
+    for (int y = int(5 * scale); y < int(25 * scale); ++y) {
+      bool isInked = false;
+      for (int x = int(12 * scale); x < int(36 * scale); ++x) isInked |= frame.at(x, y)[0] < 110;
+      rows += isInked;
+    }
+    if (scale == 1) plain = rows;
+    EXPECT_GE(plain, 7);
+    EXPECT_NEAR(rows / scale, plain, 1) << scale;
+    EXPECT_THAT(contents(file("session.hps")), HasSubstr(" samples=2 "));
+  }
+}
+
+/// A window without a field invites to open one. What is opened is in the recording, and is offered the next time.
+TEST_F(WindowTest, filesAreOpenedInTheWindow) {
+  ASSERT_EQ(program({"build", "analytic:torus", "-o", "one.hpsdf", "--target-error", "1e-2"}), 0) << said_;
+  ASSERT_EQ(program({"build", "builtin:box", "-o", "two.hpsdf", "--target-error", "1e-2"}), 0) << said_;
+  ASSERT_NO_FATAL_FAILURE(open("", false));
+  desktop({"key", "ctrl+o"});
+  type("nowhere.hpsdf");
+  desktop({"key", "ctrl+o"});
+  type("one.hpsdf");
+  waitForTitle("^one.hpsdf.*hpsdf$");
+  desktop({"key", "ctrl+s"});
+  type("frame.png");
+  EXPECT_TRUE(comesTrue([&] { return fs::exists(file("frame.png")); })) << window_->err();
+#ifdef HPSDF_X11
+  EXPECT_TRUE(dropFile(display_, std::stoul(id_), file("two.hpsdf").string()));
+  waitForTitle("two.hpsdf.*hpsdf$");
+#endif
+  ASSERT_EQ(close(), 0) << window_->err();
+  EXPECT_THAT(window_->err(), HasSubstr("nowhere.hpsdf"));
+  const std::string script = contents(file("session.hps"));
+  EXPECT_THAT(script, AllOf(HasSubstr("show size=960x640 scale=1 samples=2 gl=software\nopen one.hpsdf\n"),
+                            HasSubstr("\nshot output=frame.png\n")));
+  EXPECT_THAT(script, Not(HasSubstr("nowhere")));
+  EXPECT_THAT(contents(file("hpsdf/recent")), HasSubstr("/one.hpsdf\n"));
+  const std::string first = contents(file("frame.png")), last = contents(file("last.png"));
+  ASSERT_EQ(program({"run", "-e", "include session.hps", "-e", "shot output=replay.png"}), 0) << said_;
+  EXPECT_TRUE(contents(file("frame.png")) == first);
+  EXPECT_TRUE(contents(file("replay.png")) == last);
+
+  // The files are offered in the next window, whose first entry is the last one.
+  fs::remove(file("last.png"));
+  ASSERT_NO_FATAL_FAILURE(open("", false));
+  desktop({"key", "ctrl+o"});
+  desktop({"key", "Down"});
+  desktop({"key", "Return"});
+  waitForTitle("(one|two).hpsdf.*hpsdf$");
+  ASSERT_EQ(close(), 0) << window_->err();
+  EXPECT_TRUE(fs::exists(file("last.png")));
+}
+
+TEST_F(WindowTest, aWindowThatIsClosedWithoutAFieldWritesNothing) {
+  std::ofstream(file("hpsdf")) << "no folder for recent files";
+  ASSERT_NO_FATAL_FAILURE(open("", false));
+  ASSERT_EQ(close(), 0) << window_->err();
+  EXPECT_EQ(window_->out() + window_->err(), "");
+  EXPECT_FALSE(fs::exists(file("last.png")) || fs::exists(file("session.hps")));
+}
+
 TEST_F(WindowTest, aSurfaceThatCannotBeOpenedIsAnError) {
   EXPECT_EQ(program({"view", "nowhere.obj"}, display_), 2);
   EXPECT_THAT(said_, HasSubstr("hpsdf: error: nowhere.obj"));
@@ -382,7 +469,8 @@ TEST_F(WindowTest, anotherSizeIsRecorded) {
   desktop({"key", "F12"});  // takes a screenshot, so that the window has drawn a frame before it is closed
   ASSERT_TRUE(comesTrue([&] { return fs::exists(file("hpsdf-0001.png")); })) << window_->err();
   ASSERT_EQ(close(), 0) << window_->err();
-  EXPECT_THAT(contents(file("session.hps")), HasSubstr("show size=960x640 gl=software\nshow size=700x500\n"));
+  EXPECT_THAT(contents(file("session.hps")),
+              HasSubstr("show size=960x640 scale=1 samples=2 gl=software\nshow size=700x500\n"));
   const render::Image last = render::loadPng(file("last.png"));
   EXPECT_EQ(last.width, 700);
   EXPECT_EQ(last.height, 500);

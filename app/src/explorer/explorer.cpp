@@ -9,6 +9,7 @@
 
 #include "console/console.h"
 #include "console/interrupt.h"
+#include "construction/file_kind.h"
 #include "explorer/exact_outline.h"
 #include "explorer/gizmo.h"
 #include "explorer/worst_places.h"
@@ -23,9 +24,11 @@
 namespace hpsdf::app {
 namespace {
 
+// Sizes in points.
 constexpr double kBarHeight = 30, kReadoutHeight = 46, kColumnWidth = 268;
 constexpr double kSmallestCanvas = 160;
-constexpr double kDegreesPerPixel = 0.4;
+constexpr double kClick = 3;  // distance that the pointer may move during a click
+constexpr double kDegreesPerPoint = 0.4;
 
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
@@ -48,22 +51,58 @@ std::string kindOf(const std::string& line) {
   return kind;
 }
 
-/// Returns `view` with the frame size, the renderer and the list of keys of the state `frame`, which undo leaves alone.
+/// Returns `view` with the frame's size, scale and samples, the renderer and the list of keys of the state `frame`,
+/// which undo leaves alone.
 ViewState withFrameOf(const ViewState& frame, ViewState view) {
   view.width = frame.width;
   view.height = frame.height;
+  view.scale = frame.scale;
+  view.samples = frame.samples;
   view.backend = frame.backend;
   view.open[static_cast<std::size_t>(Panel::keys)] = frame.isOpen(Panel::keys);
+  return view;
+}
+
+/// Returns `view` without what belongs to one field alone: places, cuts, marks and other fields.
+ViewState wholeOf(ViewState view) {
+  view.planeOffset.reset();
+  view.plane.reset();
+  view.zoom = 1;
+  view.operands.clear();
+  view.sliceTarget.reset();
+  view.camera.target.reset();
+  view.camera.distance = render::OrbitCamera{}.distance;
+  view.surfaceOffset = 0;
+  view.clip.reset();
+  view.defects.clear();
+  view.beside.clear();
+  for (Coloring* colors : {&view.surfaceColors, &view.sliceColors}) {
+    if (colors->by == render::ColorBy::difference || colors->by == render::ColorBy::error)
+      colors->by = colors == &view.sliceColors ? render::ColorBy::degree : render::ColorBy::normal;
+    colors->scale.limits.reset();
+    colors->other.clear();
+    colors->mesh.clear();
+  }
+  view.worstPage = 0;
+  view.mark.reset();
   return view;
 }
 
 /// Enlarges a picture by repeating its pixels.
 render::Image enlarged(const render::Image& image, int width, int height) {
   render::Image result(width, height, {});
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      result.at(x, y) = image.at(std::min(image.width - 1, x * image.width / width),
-                                 std::min(image.height - 1, y * image.height / height));
+  std::vector<int> columns(std::size_t(width), 0);
+  for (int x = 0; x < width; ++x) columns[std::size_t(x)] = std::min(image.width - 1, x * image.width / width);
+  const auto rowOf = [&](int y) { return std::min(image.height - 1, y * image.height / height); };
+  for (int y = 0; y < height; ++y) {
+    if (y > 0 && rowOf(y) == rowOf(y - 1)) {
+      std::copy_n(&result.at(0, y - 1), width, &result.at(0, y));
+      continue;
+    }
+    const render::Color* const from = &image.at(0, rowOf(y));
+    render::Color* const to = &result.at(0, y);
+    for (int x = 0; x < width; ++x) to[x] = from[columns[std::size_t(x)]];
+  }
   return result;
 }
 
@@ -71,21 +110,30 @@ render::Image enlarged(const render::Image& image, int width, int height) {
 
 Layout layoutOf(const ViewState& view) {
   const double width = view.width, height = view.height;
+  const double bar = std::round(kBarHeight * view.scale), readout = std::round(kReadoutHeight * view.scale);
+  const double column = std::round(kColumnWidth * view.scale), smallest = kSmallestCanvas * view.scale;
   const auto open = [&](Panel panel) { return view.isOpen(panel); };
   Layout layout;
   double top = 0, bottom = height, left = 0, right = width;
-  if (open(Panel::bar) && height >= kSmallestCanvas) layout.bar = {0, 0, width, top = kBarHeight};
-  if (open(Panel::readout) && bottom - top - kReadoutHeight >= kSmallestCanvas)
-    layout.readout = {0, bottom -= kReadoutHeight, width, height};
-  const auto roomForColumn = [&] { return right - left - kColumnWidth >= kSmallestCanvas; };
-  if (open(Panel::left) && roomForColumn()) layout.left = {0, top, left = kColumnWidth, bottom};
-  if (open(Panel::right) && roomForColumn()) layout.right = {right -= kColumnWidth, top, width, bottom};
+  if (open(Panel::bar) && height >= smallest) layout.bar = {0, 0, width, top = bar};
+  if (open(Panel::readout) && bottom - top - readout >= smallest)
+    layout.readout = {0, bottom -= readout, width, height};
+  const auto roomForColumn = [&] { return right - left - column >= smallest; };
+  if (open(Panel::left) && roomForColumn()) layout.left = {0, top, left = column, bottom};
+  if (open(Panel::right) && roomForColumn()) layout.right = {right -= column, top, width, bottom};
   layout.canvas = {left, top, right, bottom};
   if (!view.beside.empty()) {
     const double half = std::floor((right - left) / 2);
     layout.canvas.x1 = left + half;
     layout.beside = {right - half, top, right, bottom};
   }
+  return layout;
+}
+
+Layout layoutInPoints(const ViewState& view) {
+  Layout layout = layoutOf(view);
+  for (UiRect* rect : {&layout.bar, &layout.left, &layout.right, &layout.readout, &layout.canvas, &layout.beside})
+    *rect = rect->times(1 / view.scale);
   return layout;
 }
 
@@ -199,7 +247,7 @@ void Explorer::removeWithoutEffect(std::map<std::string, std::string>& settings)
     continuity->second = "exact";
 }
 
-void Explorer::rebuild(std::optional<int> maxSteps) {
+void Explorer::rebuild(std::optional<int> maxSteps, bool keeps) {
   std::map<std::string, std::string> settings = settingsOfField();
   if (settings_.contains("margin") || settings_.contains("normalize")) settings.erase("domain");
   removeWithoutEffect(settings);
@@ -217,6 +265,8 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
   std::string line = "build " + scriptWord(surface);
   for (const auto& [name, value] : settings)
     if (name != "mesh") line += " " + name + "=" + scriptWord(value);
+  std::optional<Field> before;
+  if (keeps) before = session_.current().field;
   rebuilding_ = maxSteps ? Rebuilding::steps : Rebuilding::whole;
   try {
     runScript(session_, parseScript(session_.registry(), "rebuild", line, {}));
@@ -225,6 +275,11 @@ void Explorer::rebuild(std::optional<int> maxSteps) {
     throw;
   }
   rebuilding_ = Rebuilding::no;
+  if (!before) return;
+  session_.keep(std::move(*before));
+  ViewState next = view_;
+  next.beside = Session::kKept;
+  change(std::move(next));
 }
 
 void Explorer::fieldChanged() {
@@ -302,8 +357,37 @@ void Explorer::open(const std::string& line) {
   } catch (...) {
     preview_ = {};
     shown_.clear();
+    later_.clear();
     throw;
   }
+  tellLater();
+}
+
+/// Tells of the lines that ran while another line was running: after that line, because a script runs them then.
+void Explorer::tellLater() {
+  for (const std::string& line : std::exchange(later_, {}))
+    if (onCommand) onCommand(line, false);
+}
+
+void Explorer::openFile(const std::string& name) {
+  const FileKind kind = kindOfFile(name);
+  if (kind == FileKind::unknown) throw unknownKind(name);
+  const ViewState before = std::exchange(view_, wholeOf(view_));
+  const auto undone = std::exchange(undone_, {}), redone = std::exchange(redone_, {});
+  opening_ = true;
+  try {
+    runScript(session_, parseScript(session_.registry(), "open",
+                                    (kind == FileKind::field ? "load " : "build ") + scriptWord(name), {}));
+  } catch (...) {
+    opening_ = false;
+    preview_ = {};
+    drawnFor_.clear();
+    view_ = withFrameOf(view_, before);
+    undone_ = undone;
+    redone_ = redone;
+    throw;
+  }
+  opening_ = false;
 }
 
 /// Runs a line of script, perhaps while another line is running.
@@ -320,6 +404,7 @@ void Explorer::perform(const std::string& line) {
 
 void Explorer::run(const std::string& line) {
   message.clear();
+  const bool isWithinAnother = running_;
   const std::string kind = ui_.busy() ? kindOf(line) : "";
   replaces_ = !kind.empty() && kind == lastKind_;
   lastKind_.clear();  // if this line fails, the next line must not replace it
@@ -327,11 +412,18 @@ void Explorer::run(const std::string& line) {
     perform(line);
   } catch (...) {
     replaces_ = false;
+    if (!isWithinAnother) later_.clear();
     throw;
   }
   lastKind_ = kind;
-  if (onCommand) onCommand(line, replaces_);
-  replaces_ = false;
+  const bool replaces = std::exchange(replaces_, false);
+  if (isWithinAnother) {
+    if (replaces) later_.pop_back();
+    later_.push_back(line);
+    return;
+  }
+  if (onCommand) onCommand(line, replaces);
+  tellLater();
 }
 
 void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands) {
@@ -339,10 +431,10 @@ void Explorer::drawPanels(const Input* event, std::vector<std::string>& commands
   // too, so it must not start while they are being drawn.
   const bool showsJumps =
       view_.isUnfolded(Panel::statistics) || view_.isUnfolded(Panel::worst) || view_.isOpen(Panel::readout);
-  if (!work && showsJumps) session_.jumps();
+  if (!work && showsJumps && session_.hasField()) session_.jumps();
   const bool showsOtherJumps = view_.isUnfolded(Panel::statistics) || view_.isOpen(Panel::readout);
   if (!work && showsOtherJumps && beside_ && !isStale()) session_.otherJumps(view_.beside);
-  ui_.frame(view_.width, view_.height, event, [&] { app::drawPanels(ui_, *this, commands); });
+  ui_.frame({view_.width, view_.height, view_.scale}, event, [&] { app::drawPanels(ui_, *this, commands); });
 }
 
 /// Draws the panels three times, because scroll positions, for instance, depend on the previous frame.
@@ -431,9 +523,11 @@ std::string Explorer::dragCommand(double dx, double dy) const {
     return "plane target=" + vectorWord(target);
   }
   const render::OrbitCamera& c = viewAtPress_.camera;
-  if (*dragged_ == 0)
-    return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - kDegreesPerPixel * dx, 0.1),
-                       std::clamp(rounded(c.elevationDegrees + kDegreesPerPixel * dy, 0.1), -90.0, 90.0), c.distance);
+  if (*dragged_ == 0) {
+    const double turn = kDegreesPerPoint / view_.scale;  // degrees per pixel
+    return fmt::format("camera {:.6g},{:.6g},{}", rounded(c.azimuthDegrees - turn * dx, 0.1),
+                       std::clamp(rounded(c.elevationDegrees + turn * dy, 0.1), -90.0, 90.0), c.distance);
+  }
   // A drag with any button except the left one moves the camera's target together with the mouse. In the plane of the
   // target, the vectors scale · right and scale · up are half the picture's width and height.
   const Box& domain = shownDomain();
@@ -470,9 +564,11 @@ std::optional<std::string> Explorer::typedCommand(const std::string& text) const
 std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
+  if (files.isOpen()) return std::nullopt;
   if (event.kind == Input::Kind::key && !ui_.editing()) return keyCommand(event);
   if (event.kind == Input::Kind::type && !ui_.editing()) return typedCommand(event.text);
-  const bool overPicture = !ui_.wantsMouse() && (layout.canvas.contains(x, y) || layout.beside.contains(x, y));
+  const bool overPicture = (session_.hasField() || showsPreview()) && !ui_.wantsMouse() &&
+                           (layout.canvas.contains(x, y) || layout.beside.contains(x, y));
   if (event.kind == Input::Kind::press && view_.isOpen(Panel::keys)) return "panel keys=false";
   if (event.kind == Input::Kind::press && !dragged_ && overPicture) {
     dragged_ = event.button;
@@ -481,8 +577,7 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
   }
   if (event.kind == Input::Kind::release && dragged_ == event.button) {
     dragged_.reset();
-    constexpr double kClick = 3;  // pixels by which the pointer may move during a click
-    const bool isClick = std::hypot(x - dragFrom_[0], y - dragFrom_[1]) < kClick;
+    const bool isClick = std::hypot(x - dragFrom_[0], y - dragFrom_[1]) < kClick * view_.scale;
     if (event.button == 0 && isClick && layout.canvas.contains(x, y)) return clickCommand();
   }
   if (event.kind == Input::Kind::wheel && overPicture) return wheelCommand(event.turn);
@@ -493,7 +588,8 @@ std::optional<std::string> Explorer::canvasCommand(const Input& event) {
 /// Returns the command for a click into the picture: it looks along the axis of the gizmo at the pointer, or explains
 /// the cell there. Returns std::nullopt if the pointer is not over the field.
 std::optional<std::string> Explorer::clickCommand() {
-  if (const auto view = gizmoViewAt(view_, layoutOf(view_).canvas, ui_.pointer())) return "camera view=" + *view;
+  if (const auto view = gizmoViewAt(view_, layoutInPoints(view_).canvas, ui_.pointerInPoints()))
+    return "camera view=" + *view;
   const std::optional<Readout> at = readout();
   if (!at || !session_.current().field.domain().contains(at->pick.position)) return std::nullopt;
   if (!session_.knowsSurface()) {
@@ -505,14 +601,14 @@ std::optional<std::string> Explorer::clickCommand() {
 }
 
 bool Explorer::isStale() const {
-  const bool isUpToDate = shrunk_ == 1 && drawnFor_ == pictureKey();
+  const bool isUpToDate = coarseness_ == 0 && drawnFor_ == pictureKey();
   if (showsPreview()) return !isUpToDate;
-  const bool isKept = work && session_.hasField();
-  return !isKept && (!picture_ || !isUpToDate);
+  if (!session_.hasField()) return false;
+  return !work && (!picture_ || !isUpToDate);
 }
 
-bool Explorer::redraws(int shrink) const {
-  const bool isOther = drawnFor_ != pictureKey() || shrunk_ != shrink;
+bool Explorer::redraws(int coarseness) const {
+  const bool isOther = drawnFor_ != pictureKey() || coarsenessOf(coarseness) < coarseness_;
   if (showsPreview()) return isOther;
   return !work && isStale() && (isOther || !picture_);
 }
@@ -534,15 +630,16 @@ std::string Explorer::pictureKey() const {
 }
 
 render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
-                              const render::ScaleOptions& scale, int shrink) const {
+                              const render::ScaleOptions& scale, int coarseness) const {
+  const int shrink = std::max(1, coarseness);
   const UiRect canvas = layoutOf(view_).canvas;
   const auto fit = [&](auto picture) {
     picture.width = std::max(16, int(canvas.width()) / shrink);
     picture.height = std::max(16, int(canvas.height()) / shrink);
-    picture.samples = shrink > 1 ? 1 : view_.samples;
+    picture.samples = coarseness > 0 ? 1 : view_.samples;
     picture.bare = true;
     picture.scale = scale;
-    if constexpr (requires { picture.shadows; }) picture.shadows = picture.shadows && shrink == 1;
+    if constexpr (requires { picture.shadows; }) picture.shadows = picture.shadows && coarsenessOf(coarseness) == 0;
     return picture;
   };
   // Place the plane and the camera relative to the session's current field, even if `field` is the second field, which
@@ -553,12 +650,12 @@ render::Drawn Explorer::drawn(render::Renderer& renderer, const Field& field, co
 }
 
 render::Drawn Explorer::drawBeside(const Field& other, render::ReferenceData reference,
-                                   const render::ScaleOptions& scale, int shrink) {
+                                   const render::ScaleOptions& scale, int coarseness) {
   if (reference.jumps != nullptr) reference.jumps = &session_.otherJumps(view_.beside);
   reference.mesh = {};  // it is the contour of the current field
   if (view_.operands == kOwnOperands) reference.outlined = {};
   try {
-    return drawn(session_.otherRenderer(view_.beside, view_.backend), other, reference, scale, shrink);
+    return drawn(session_.otherRenderer(view_.beside, view_.backend), other, reference, scale, coarseness);
   } catch (const Error& error) {
     throw Error(view_.beside + ": " + error.what());
   }
@@ -576,7 +673,7 @@ render::ShownMesh Explorer::contourToDraw() const {
   return {&contour->mesh, contourChoice(view_, session_.current().field).tolerance};
 }
 
-std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const Field* other, int shrink) {
+std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const Field* other, int coarseness) {
   const Coloring& colors = view_.colors();
   const Field& field = session_.current().field;
   render::ScaleOptions scale = colors.scale;
@@ -591,8 +688,8 @@ std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const 
         levels.insert(level);
     scale.levels.assign(levels.begin(), levels.end());
   }
-  const auto draw = [&] { return drawn(session_.renderer(view_.backend), field, reference, scale, shrink); };
-  const auto drawOther = [&] { return drawBeside(*other, reference, scale, shrink); };
+  const auto draw = [&] { return drawn(session_.renderer(view_.backend), field, reference, scale, coarseness); };
+  const auto drawOther = [&] { return drawBeside(*other, reference, scale, coarseness); };
   render::Drawn picture = draw();
   if (other == nullptr) return {std::move(picture), std::nullopt};
   render::Drawn beside = drawOther();
@@ -605,9 +702,9 @@ std::pair<render::Drawn, std::optional<render::Drawn>> Explorer::drawBoth(const 
   return {std::move(picture), std::move(beside)};
 }
 
-void Explorer::drawPicture(int shrink) {
+void Explorer::drawPicture(int coarseness) {
   const Field& field = session_.current().field;
-  auto [picture, beside] = drawBoth(view_.beside.empty() ? nullptr : &session_.other(view_.beside).field, shrink);
+  auto [picture, beside] = drawBoth(view_.beside.empty() ? nullptr : &session_.other(view_.beside).field, coarseness);
   if (view_.slice && view_.mark && session_.knowsExact()) {
     const auto outline = [&](render::Drawn& drawn) {
       const int width = drawn.image.width, height = drawn.image.height;
@@ -623,24 +720,25 @@ void Explorer::drawPicture(int shrink) {
   beside_ = std::move(beside);
   shown_ = {picture_->image};
   if (beside_) shown_.push_back(beside_->image);
-  shrunk_ = shrink;
+  coarseness_ = coarsenessOf(coarseness);
   drawnFor_ = pictureKey();
 }
 
-void Explorer::drawPreview(int shrink) {
+void Explorer::drawPreview(int coarseness) {
+  const int shrink = std::max(1, coarseness);
   const UiRect canvas = layoutOf(view_).canvas;
   const int width = std::max(16, int(canvas.width()) / shrink), height = std::max(16, int(canvas.height()) / shrink);
   if (const Field* field = preview_.field())
-    shown_ = {drawn(preview_.renderer(), *field, {}, view_.colors().scale, shrink).image};
+    shown_ = {drawn(preview_.renderer(), *field, {}, view_.colors().scale, coarseness).image};
   else
     shown_ = {preview_.drawMesh(view_.camera, width, height)};
-  shrunk_ = shrink;
+  coarseness_ = coarsenessOf(coarseness);
   drawnFor_ = pictureKey();
 }
 
-render::Image Explorer::frame(int shrink) {
+render::Image Explorer::frame(int coarseness) {
   if (session_.forgetChangedOthers()) drawnFor_.clear();
-  if (redraws(shrink)) showsPreview() ? drawPreview(shrink) : drawPicture(shrink);
+  if (redraws(coarseness)) showsPreview() ? drawPreview(coarseness) : drawPicture(coarseness);
   settlePanels();
   render::Image image(view_.width, view_.height, {250, 250, 248});
   const Layout layout = layoutOf(view_);
@@ -673,7 +771,7 @@ const std::vector<std::size_t>& Explorer::worst(std::size_t count) {
 }
 
 std::optional<Readout> Explorer::readout() {
-  if (work || isStale() || ui_.wantsMouse() || dragged_) return std::nullopt;
+  if (work || !session_.hasField() || isStale() || ui_.wantsMouse() || dragged_) return std::nullopt;
   const Layout layout = layoutOf(view_);
   const auto [x, y] = ui_.pointer();
   const auto pickIn = [&, x = x, y = y](const Field& field, const std::optional<render::Drawn>& drawn,

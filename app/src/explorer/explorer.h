@@ -13,6 +13,7 @@
 #include "pictures/build_preview.h"
 #include "pictures/readout.h"
 #include "session/session.h"
+#include "widgets/file_dialog.h"
 #include "widgets/ui.h"
 
 namespace hpsdf::app {
@@ -27,6 +28,9 @@ struct Layout {
 
 /// Computes the layout of a frame, which depends only on the state `view`.
 Layout layoutOf(const ViewState& view);
+
+/// Returns the same layout in points, the unit in which the panels are drawn.
+Layout layoutInPoints(const ViewState& view);
 
 /// Returns options with which the field can be built again as it was, as far as its metadata tells. For a field that
 /// was built within a tolerance and changed afterwards, they have the default target error.
@@ -58,8 +62,9 @@ class Explorer final : public SessionExtension {
   /// Sets a setting for the next `rebuild`, in place of those that exclude it.
   void setSetting(const std::string& name, const std::string& value);
   /// Builds the field again with `settings()`. If `maxSteps` is given, the construction ends after that many
-  /// refinement steps. Throws `Error` if neither the settings nor the field name a surface.
-  void rebuild(std::optional<int> maxSteps);
+  /// refinement steps. If `keeps` is true, the field before it is kept and shown beside the new one. Throws `Error` if
+  /// neither the settings nor the field name a surface.
+  void rebuild(std::optional<int> maxSteps, bool keeps);
   /// The number of refinement steps of the complete construction, even if the current field was built with fewer;
   /// std::nullopt if unknown.
   std::optional<std::uint64_t> allSteps() const { return allSteps_; }
@@ -78,20 +83,27 @@ class Explorer final : public SessionExtension {
   const Ui& ui() const { return ui_; }
   void setClipboard(const std::string& text) { ui_.setClipboard(text); }
 
-  /// Draws and returns the whole frame. Redraws the picture in it only if the picture is out of date. `shrink` divides
-  /// the picture's resolution along each axis, so that drawing keeps up with a moving mouse. During long work the last
-  /// picture is shown again or, if there is no field yet, what stands for it.
-  render::Image frame(int shrink = 1);
-  /// True if the picture must be redrawn: there is none yet, or the last one was drawn at reduced resolution or for
-  /// another state of the explorer.
+  /// Draws and returns the whole frame. Redraws the picture in it only if the picture is out of date. `coarseness` lets
+  /// drawing keep up with a moving mouse: 0 draws all samples of each pixel, 1 draws one, and a greater number also
+  /// divides the picture's resolution along each axis. During long work the last picture is shown again or, if there is
+  /// no field yet, what stands for it.
+  render::Image frame(int coarseness = 0);
+  /// True if the picture must be redrawn: there is none yet, or the last one was coarse or drawn for another state of
+  /// the explorer.
   bool isStale() const;
-  /// True if `frame` would draw the picture anew.
-  bool redraws(int shrink) const;
+  /// True if `frame` would draw the picture anew: not in place of an up-to-date picture that is less coarse.
+  bool redraws(int coarseness) const;
+  /// The coarseness of the last picture.
+  int coarseness() const { return coarseness_; }
 
   /// Runs one line of script. Widgets act by calling this function.
   void run(const std::string& line);
   /// Runs the line of script that loads or builds the first field, without calling `onCommand` for it.
   void open(const std::string& line);
+  /// Loads the field's file or builds the field of the surface `name`, and looks at the whole of it: cuts, marks and
+  /// the field beside it are taken back. A field that is built is shown as it grows. If it fails or is cancelled, the
+  /// explorer is as before.
+  void openFile(const std::string& name);
   /// Called after each line of script that `run` has run. `replaces` is true if this line alone has the same
   /// effect as the previous line followed by this line, as during a drag of a slider. A recording may then drop
   /// the previous line.
@@ -101,7 +113,9 @@ class Explorer final : public SessionExtension {
 
   void fieldChanged() override;
 
-  /// Until there is a field, long work shows this mesh in its stead. `domain` is the domain of the field.
+  /// True while there is no field yet, and while `openFile` makes another one.
+  bool isOpening() const { return opening_ || !session_.hasField(); }
+  /// While a field is being opened, long work shows this mesh in its stead. `domain` is the domain of the field.
   void showMesh(const TriangleMesh& mesh, const Box& domain);
   /// The same with an unfinished state of the field.
   void showUnfinished(Field field);
@@ -119,6 +133,13 @@ class Explorer final : public SessionExtension {
   std::optional<Work> work;
   /// The panels set this to true when the user cancels the long work.
   bool cancelWanted = false;
+
+  /// Files that were opened before, the last one first. The window sets them; scripts do not read them, so that their
+  /// frames are always the same.
+  std::vector<std::string> recentFiles;
+
+  /// The dialog that asks for files. While it is open, the panels take no input.
+  FileDialog files;
 
   std::string message;  ///< error or result, shown in the readout panel until the next command
   Session& session() const { return session_; }
@@ -144,18 +165,21 @@ class Explorer final : public SessionExtension {
   bool goBack(std::vector<ViewState>& from, std::vector<ViewState>& to);
   std::string pictureKey() const;
   /// True if the frame shows `preview_` in place of a picture of the field.
-  bool showsPreview() const { return work && !session_.hasField() && !preview_.isEmpty(); }
+  bool showsPreview() const { return work && isOpening() && !preview_.isEmpty(); }
   /// The domain of the picture that is shown, and the field in it. While there is only a mesh, there is no field.
   const Box& shownDomain() const;
   const Field& shownField() const;
   void perform(const std::string& line);
-  void drawPreview(int shrink);
+  void tellLater();
+  void drawPreview(int coarseness);
+  /// Returns 0 for a coarseness that is none, since the view has one sample for each pixel.
+  int coarsenessOf(int coarseness) const { return coarseness == 1 && view_.samples == 1 ? 0 : coarseness; }
   /// Returns the `build` parameters that made the current field, as far as the field's metadata record them.
   std::map<std::string, std::string> settingsOfField() const;
   void removeWithoutEffect(std::map<std::string, std::string>& settings) const;
-  void drawPicture(int shrink);
+  void drawPicture(int coarseness);
   render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
-                      const render::ScaleOptions& scale, int shrink) const;
+                      const render::ScaleOptions& scale, int coarseness) const;
   void drawPanels(const Input* event, std::vector<std::string>& commands);
   void settlePanels();
   void inputWhileWorking(const Input& event);
@@ -172,9 +196,9 @@ class Explorer final : public SessionExtension {
   void hideTriangles(ViewState& view, const std::string& why);
   void finishGesture();
   render::Drawn drawBeside(const Field& other, render::ReferenceData reference, const render::ScaleOptions& scale,
-                           int shrink);
+                           int coarseness);
   /// Draws the pictures of the current field and of the second field, if there is one, in a common colour scale.
-  std::pair<render::Drawn, std::optional<render::Drawn>> drawBoth(const Field* other, int shrink);
+  std::pair<render::Drawn, std::optional<render::Drawn>> drawBoth(const Field* other, int coarseness);
 
   Session& session_;
   Ui ui_;
@@ -189,8 +213,10 @@ class Explorer final : public SessionExtension {
   };
   History before_;
   std::map<std::string, std::string> settings_;
-  std::string lastKind_;  ///< command and parameter names in the gesture's last line of script
+  std::vector<std::string> later_;  ///< lines that ran within another one and are still to be told to `onCommand`
+  std::string lastKind_;            ///< command and parameter names in the gesture's last line of script
   bool running_ = false;
+  bool opening_ = false;   ///< true while `openFile` makes a field
   bool replaces_ = false;  ///< true if the running command replaces the previous one
 
   std::optional<std::uint64_t> allSteps_;
@@ -208,7 +234,7 @@ class Explorer final : public SessionExtension {
   std::optional<render::Drawn> beside_;  ///< picture of the second field, beside the current one
   std::vector<render::Image> shown_;     ///< images of picture_ and beside_
   std::string drawnFor_;
-  int shrunk_ = 1;
+  int coarseness_ = 0;
   std::size_t fields_ = 0;  ///< number of fields so far, which identifies the current field
 
   std::optional<int> dragged_;           ///< mouse button that was pressed over the picture and is held

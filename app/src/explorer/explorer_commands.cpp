@@ -183,9 +183,11 @@ void runSettings(Session& session, const Arguments& arguments) {
 }
 
 void runRebuild(Session& session, const Arguments& arguments) {
-  explorerOf(session).rebuild(arguments.given("max-steps") ? std::optional(arguments.whole("max-steps"))
-                                                           : std::nullopt);
+  explorerOf(session).rebuild(arguments.given("max-steps") ? std::optional(arguments.whole("max-steps")) : std::nullopt,
+                              arguments.flag("keep"));
 }
+
+void runOpen(Session& session, const Arguments& arguments) { explorerOf(session).openFile(arguments.text("file")); }
 
 render::Image drawShot(Session& session, const Arguments&) {
   session.current();  // throws `Error` if there is no field
@@ -231,7 +233,7 @@ std::vector<Parameter> panelParameters() {
     parameters.push_back({kPanelNames[panel], flag(""), kHelp[panel]});
   for (const std::string side : {"left", "right"})
     parameters.push_back(
-        {side + "-scroll", number().atLeast(0).in("pixels"), fmt::format("How far the {} column is scrolled.", side)});
+        {side + "-scroll", number().atLeast(0).in("points"), fmt::format("How far the {} column is scrolled.", side)});
   return parameters;
 }
 
@@ -297,10 +299,11 @@ void addHistoryCommands(Registry& registry) {
   registry.addForScripts({
       .name = "undo",
       .summary = "Take back the last change of what the explorer shows.",
-      .help = "Changes by show (but for the frame's size and renderer), camera, surface, plane, cells, arrows, "
-              "triangles, color, panel, worst, fly and preset; what the mouse does in one go is one change. The field "
-              "itself "
-              "is not changed back.",
+      .help =
+          "Changes by show (but for the frame's size, scale, samples and renderer), camera, surface, plane, cells, "
+          "arrows, triangles, color, panel, worst, fly and preset; what the mouse does in one go is one change. The "
+          "field itself "
+          "is not changed back.",
       .examples = {"undo"},
       .action = runUndo,
   });
@@ -323,6 +326,18 @@ void addHistoryCommands(Registry& registry) {
 
 void addFieldAndShotCommands(Registry& registry) {
   registry.addForScripts({
+      .name = "open",
+      .summary = "Open a field or a mesh in the explorer, and look at the whole of it.",
+      .help =
+          "A field's file is loaded as by 'load'; from a mesh, a grid or a shape a field is built as by 'build' with "
+          "the default settings. Places, cuts, marks and other fields of the view before it are taken back, which "
+          "'undo' does not change. It is what a file dropped onto the window does.",
+      .examples = {"open bunny.obj", "open builtin:torus"},
+      .parameters = {{"file", text("FIELD|MESH").positional().required(),
+                      "A field's file, a mesh, builtin:SHAPE or analytic:SHAPE."}},
+      .action = runOpen,
+  });
+  registry.addForScripts({
       .name = "settings",
       .summary = "Set how 'rebuild' builds; what is not set is as it was.",
       .help = "The options are those of 'build'. Nothing is built yet; 'load' and 'build' forget them.",
@@ -337,9 +352,12 @@ void addFieldAndShotCommands(Registry& registry) {
       .name = "rebuild",
       .summary = "Build the field anew, as 'settings' says.",
       .help = "What 'settings' does not say is as it was for the current field.",
-      .examples = {"rebuild", "rebuild max-steps=100"},
+      .examples = {"rebuild", "rebuild max-steps=100", "settings target-error=1e-3 ; rebuild keep=true"},
       .parameters = {{"max-steps", settingKind("max-steps").under(setting_group::kAsked).advanced(),
-                      "End after so many steps of the refinement: an earlier state of the field."}},
+                      "End after so many steps of the refinement: an earlier state of the field."},
+                     {"keep", flag(),
+                      "Keep the field before it under the name 'kept' and show it beside the new one, for 'beside' and "
+                      "for the colour difference."}},
       .action = runRebuild,
   });
   registry.addForScripts({

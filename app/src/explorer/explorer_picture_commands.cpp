@@ -28,6 +28,7 @@ void changeShow(ViewState& view, const Arguments& arguments, Session&) {
     view.width = arguments.size("size")[0];
     view.height = arguments.size("size")[1];
   }
+  if (arguments.given("scale")) view.scale = arguments.number("scale");
   if (arguments.given("samples")) view.samples = arguments.whole("samples");
   if (arguments.given("cpu") || arguments.given("gl")) view.backend = backend(arguments);
 }
@@ -195,6 +196,8 @@ void addShowCommand(Registry& registry) {
       .parameters = joined(
           {{{"kind", choice({"surface", "slice"}).positional(), "The surface, or a slice."},
             {"size", size(64, 8192).under(kPicture), "Of the whole frame, panels included; 1280x720 at first."},
+            {"scale", number().within(kLeastScale, kGreatestScale).under(kPicture),
+             "Pixels per point, the unit of text and panels, for screens with many pixels per inch; 1 at first."},
             {"samples", wholeNumber().within(1, 8).under(kPicture), "Samples a pixel along each axis; 1 at first."}},
            backendParameters()}),
       .action = changing(changeShow),
@@ -343,8 +346,8 @@ void addCellsAndArrowsCommands(Registry& registry) {
       .help =
           "Where its length is 1, an arrow is 0.8 of their distance long, but for what the projection takes from it.",
       .examples = {"arrows 40", "arrows 0"},
-      .parameters = {{"apart", wholeNumber().within(0, 1000).in("pixels").positional().required(),
-                      "How far apart; 0 for none."}},
+      .parameters = {{"apart", wholeNumber().within(0, 1000).in("points").positional().required(),
+                      "How far apart; 0 for none. A point is a pixel unless 'show' has another scale."}},
       .action = changing(changeArrows),
   });
   registry.addForScripts({
@@ -354,7 +357,8 @@ void addCellsAndArrowsCommands(Registry& registry) {
               "both. 'color difference' shows how far they are apart.",
       .examples = {"beside coarse.hpsdf", "beside none"},
       .parameters = {{"field", text("FIELD").positional().required(),
-                      "The other field's file; none for the current one alone."}},
+                      "The other field's file, or kept for the one that 'rebuild keep=true' has kept; none for the "
+                      "current one alone."}},
       .action = changing(changeBeside),
   });
 }

@@ -121,10 +121,10 @@ void drawHistograms(Ui& ui, Explorer& explorer) {
   };
   const std::string& beside = explorer.view().beside;
   if (beside.empty()) return draw(explorer.figures());
-  ui.text("left: " + fileName(explorer.session().current().name));
+  ui.text("left: " + currentName(explorer));
   draw(explorer.figures());
   if (!explorer.pictureBeside()) return;  // the other field has not been read yet
-  ui.text("right: " + fileName(beside));
+  ui.text("right: " + besideName(explorer));
   draw(explorer.session().otherFigures(beside));
 }
 
@@ -201,11 +201,11 @@ int decimalsFor(const Box& domain) {
 void drawStatistics(Ui& ui, Explorer& explorer) {
   Session& session = explorer.session();
   const std::string& beside = explorer.view().beside;
-  if (!beside.empty()) ui.text("left: " + fileName(session.current().name));
+  if (!beside.empty()) ui.text("left: " + currentName(explorer));
   drawStatisticsOf(ui, session.current().field, explorer.figures(), session.knowsJumps() ? &session.jumps() : nullptr,
                    explorer.shownContour());
   if (beside.empty() || !explorer.pictureBeside()) return;
-  ui.text("right: " + fileName(beside));
+  ui.text("right: " + besideName(explorer));
   const Session::Other& other = session.other(beside);
   drawStatisticsOf(ui, other.field, session.otherFigures(beside), other.jumps ? &*other.jumps : nullptr, nullptr);
 }

@@ -37,6 +37,8 @@ void drawKinds(const Controls& controls, const ViewState& view) {
 
 void drawBar(const Controls& controls, const Explorer& explorer) {
   const ViewState& view = explorer.view();
+  drawFileButtons(controls, explorer);
+  nextTo(1.5F);
   drawKinds(controls, view);
   nextTo(1.5F);
   controls.button("bar/undo", "undo", "undo", explorer.canUndo(), "Take back the last change of the view. Key: Ctrl+Z");
@@ -104,12 +106,13 @@ void drawKeys(const ViewState& view) {
                                     {"where is it torn?", "Questions; Worst interfaces"},
                                     {"what is inside?", "Questions; cut across, or the slice"},
                                     {"a finer field?", "Construction: target error, rebuild"},
-                                    {"two fields?", "Surface: beside, the other one's file"}}};
+                                    {"two fields?", "Surface: beside; rebuild and compare"}}};
   static const KeyTable kKeys = {"Keys",
                                  {{"s, p", "surface, slice"},
                                   {"1 2 3 4", "from the front, back, left, right"},
                                   {"5 6 7", "from the top, bottom, corner"},
                                   {"Ctrl+Z, Ctrl+Y", "undo, redo"},
+                                  {"Ctrl+O, Ctrl+S", "open a file, write one"},
                                   {"Ctrl+C", "copy the view as lines of script"},
                                   {"Tab, Shift+Tab", "next control, the one before"},
                                   {"Enter, Space", "press it; Enter types into a slider"},
@@ -120,7 +123,8 @@ void drawKeys(const ViewState& view) {
                                   {"Ctrl+Q", "close the window"}}};
   constexpr const char* kManual = "The manual is docs/explorer.md and docs/window.md.";
   const float em = ImGui::GetFontSize(), pad = 1.4F * em, column = KeyTable::width();
-  const auto width = static_cast<float>(view.width), height = static_cast<float>(view.height);
+  const auto width = static_cast<float>(view.width / view.scale);
+  const auto height = static_cast<float>(view.height / view.scale);
   const bool two = width > 2 * column + 3 * pad;
   const float left = kMouse.height() + pad + kPlaces.height(), right = kKeys.height() + pad + em;
   const float w = (two ? 2 * column + pad : column) + 2 * pad;
@@ -147,8 +151,8 @@ void drawFieldNames(const Explorer& explorer, const Layout& layout) {
                        IM_COL32(250, 250, 248, 255), 2);
     list.AddText({x, y}, kInk, text.c_str());
   };
-  name(layout.canvas, fileName(explorer.session().current().name));
-  name(layout.beside, fileName(explorer.view().beside));
+  name(layout.canvas, currentName(explorer));
+  name(layout.beside, besideName(explorer));
   list.AddLine({float(layout.beside.x0), float(layout.beside.y0)}, {float(layout.beside.x0), float(layout.beside.y1)},
                kSoftInk);
 }
@@ -238,7 +242,7 @@ void drawReadout(Ui& ui, Explorer& explorer) {
   };
   describe(explorer.session().current().name, *explorer.picture());
   if (explorer.pictureBeside())
-    describe(view.beside, *explorer.pictureBeside());
+    describe(besideName(explorer), *explorer.pictureBeside());
   else
     ui.text(
         "drag: turn or move   right drag: move   wheel: nearer or farther   hover: what is there   click: why   ?: all "
@@ -301,25 +305,20 @@ std::string helpOf(const Registry& registry, const std::string& line) {
   return parameter != nullptr ? parameter->help : command.summary;
 }
 
-}  // namespace
-
-void Controls::describe(const std::string& command, const char* help) const {
-  const bool isUnfinished = command.ends_with('=') || command.ends_with(' ');
-  ui.help(fmt::format("{}\nIn scripts: {}{}", help != nullptr ? help : helpOf(registry, command), command,
-                      isUnfinished ? "…" : ""));
-}
-
-void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) {
-  const Controls controls{ui, explorer.session().registry(), commands};
+/// Draws all panels but the dialog of files.
+void drawParts(const Controls& controls, Explorer& explorer) {
+  Ui& ui = controls.ui;
   const ViewState& view = explorer.view();
-  const Layout layout = layoutOf(view);
-  ui.freeze(explorer.work.has_value() || view.isOpen(Panel::keys));  // a click anywhere closes the list of keys
+  const Layout layout = layoutInPoints(view);
+  ui.freeze(explorer.work || controls.files.isOpen() || view.isOpen(Panel::keys));  // a click closes the list of keys
   const auto scrolling = [&](const char* name, const UiRect& rect, double scroll, const auto& content) {
     if (rect.width() <= 0) return;
     const double now = ui.column(name, rect, scroll, content);
-    if (std::abs(now - scroll) > 0.5) commands.push_back(fmt::format("panel {}-scroll={}", name, now));
+    if (std::abs(now - scroll) > 0.5) controls.commands.push_back(fmt::format("panel {}-scroll={}", name, now));
   };
-  if (explorer.work && !explorer.session().hasField()) return drawPanelsWithoutField(controls, explorer, layout);
+  askForFiles(controls, explorer);
+  if (explorer.work && explorer.isOpening()) return drawPanelsWithoutField(controls, explorer, layout);
+  if (!explorer.session().hasField()) return drawStart(controls, explorer, layout);
   if (layout.bar.width() > 0) ui.column("bar", layout.bar, {}, [&] { drawBar(controls, explorer); });
   scrolling("left", layout.left, view.scroll[0], [&] {
     section(controls, view, Panel::questions, "Questions", [&] { drawQuestions(controls); });
@@ -339,13 +338,28 @@ void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) 
   drawMark(explorer, layout);
   drawFieldNames(explorer, layout);
   drawExplanation(explorer, layout);
-  drawGizmo(ui, view, layout.canvas, commands);
+  drawGizmo(ui, view, layout.canvas, controls.commands);
+  ui.addArea("canvas", layout.canvas);
+  if (layout.beside.width() > 0) ui.addArea("beside", layout.beside);
+}
+
+}  // namespace
+
+void Controls::describe(const std::string& command, const char* help) const {
+  const bool isUnfinished = command.ends_with('=') || command.ends_with(' ');
+  ui.help(fmt::format("{}\nIn scripts: {}{}", help != nullptr ? help : helpOf(registry, command), command,
+                      isUnfinished ? "…" : ""));
+}
+
+void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) {
+  const Controls controls{ui, explorer.session().registry(), commands, explorer.files};
+  drawParts(controls, explorer);
+  const ViewState& view = explorer.view();
   if (view.isOpen(Panel::keys)) {
     drawKeys(view);
     ui.hideTip();
   }
-  ui.addArea("canvas", layout.canvas);
-  if (layout.beside.width() > 0) ui.addArea("beside", layout.beside);
+  explorer.files.draw(ui, view.width / view.scale, view.height / view.scale);
 }
 
 }  // namespace hpsdf::app

@@ -40,6 +40,7 @@ struct Controls {
   Ui& ui;
   const Registry& registry;
   std::vector<std::string>& commands;
+  FileDialog& files;
 
   /// Sets the tooltip of the next control.
   void describe(const std::string& command, const char* help = nullptr) const;
@@ -99,5 +100,27 @@ void drawHistograms(Ui& ui, Explorer& explorer);
 void drawStatistics(Ui& ui, Explorer& explorer);
 /// Draws one page of the list of cell interfaces with the greatest jumps, and the buttons that turn the page.
 void drawWorst(const Controls& controls, Explorer& explorer);
+
+/// Asks for a file to open or to write when its keys are pressed, and appends the command for the file that was chosen.
+void askForFiles(const Controls& controls, const Explorer& explorer);
+
+/// Draws the buttons that open and write files.
+void drawFileButtons(const Controls& controls, const Explorer& explorer);
+
+/// Draws a text field for the file of a field, with a button that lets the user choose one. The file becomes the last
+/// word of `command`; without a file it is "none".
+void fieldFile(const Controls& controls, const std::string& path, const char* label, const std::string& value,
+               const std::string& command);
+/// Draws the same for a mesh or a shape.
+void surfaceFile(const Controls& controls, const std::string& path, const char* label, const std::string& value,
+                 const std::string& command);
+
+/// Draws an invitation to open a file, in the middle of a frame without a field.
+void drawStart(const Controls& controls, const Explorer& explorer, const Layout& layout);
+
+/// Return the names of the two fields that are shown beside each other. Where they differ in their construction only,
+/// the names tell for which accuracy they were built.
+std::string currentName(const Explorer& explorer);
+std::string besideName(const Explorer& explorer);
 
 }  // namespace hpsdf::app

@@ -90,6 +90,7 @@ void drawPlaneAndCells(const Controls& controls, const ViewState& view, const Fi
   if (view.cells.style == render::CellStyle::none) return;
   controls.field("view/degrees", "their degrees", levelText(view.cells.degrees), "cells degrees=");
   controls.field("view/depths", "their depths", levelText(view.cells.depths), "cells depths=");
+  controls.checkbox("view/at-surface", "at the surface", view.cells.atSurface, "cells at-surface=");
 }
 
 /// Draws the controls of the triangles that the command `contour` would write.
@@ -134,15 +135,16 @@ void drawColors(const Controls& controls, Explorer& explorer) {
   controls.choice("view/color", "colour by", colorNames(without), std::string(colorName(colors.by)), "color ");
   const std::string command = fmt::format("color {} ", colorName(colors.by));
   if (colors.by == render::ColorBy::difference)
-    controls.field("view/other", "other field", colors.other, command + "other=", true);
+    fieldFile(controls, "view/other", "other field", colors.other, command + "other=");
   if (colors.by == render::ColorBy::error)
-    controls.field("view/mesh", "made from", colors.mesh, command + "mesh=", true);
+    surfaceFile(controls, "view/mesh", "made from", colors.mesh, command + "mesh=");
   std::vector<std::string> maps = mapNames(colors.by);
   if (!maps.empty()) {
     maps.insert(maps.begin(), "auto");
     controls.choice("view/map", "map", maps, colors.scale.map.empty() ? "auto" : colors.scale.map, command + "map=");
   }
   if (!render::isQuantity(colors.by)) return;
+  controls.checkbox("view/per-cell", "greatest of each cell", colors.scale.perCell, (command + "per-cell=").c_str());
   controls.choice("view/scale", "scale", {"log", "linear"}, colors.scale.logarithmic ? "log" : "linear",
                   command + "scale=");
   drawColorRange(controls, colors, picture ? picture->scale.limits : std::nullopt);
@@ -223,7 +225,7 @@ void drawShown(const Controls& controls, Explorer& explorer) {
   controls.describe("arrows ");
   if (const auto v = controls.ui.slider("view/arrows", "arrows", view.arrows, 0, 120, "%.0f"))
     controls.commands.push_back(fmt::format("arrows {:.0f}", *v));
-  controls.field("view/beside", "beside", view.beside, "beside ", true);
+  fieldFile(controls, "view/beside", "beside", view.beside, "beside ");
 }
 
 void drawCamera(const Controls& controls, Explorer& explorer) {
@@ -278,8 +280,11 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer) {
     if (const auto v = controls.ui.slider("build/steps", "steps", steps, 0, double(*all), "%.0f", When::released))
       controls.commands.push_back(fmt::format("rebuild max-steps={:.0f}", *v));
   }
-  controls.button("build/rebuild", "rebuild", "rebuild", !build.value("mesh", current.madeFrom()).empty(), nullptr,
-                  widthLeft());
+  const bool canBuild = !build.value("mesh", current.madeFrom()).empty();
+  controls.button("build/rebuild", "rebuild", "rebuild", canBuild);
+  ImGui::SameLine();
+  controls.button("build/compare", "rebuild and compare", "rebuild keep=true", canBuild,
+                  "Build the field anew, and show the one before it beside it.", widthLeft());
 }
 
 }  // namespace hpsdf::app

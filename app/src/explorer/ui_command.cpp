@@ -46,7 +46,6 @@ Point targetPixel(Explorer& explorer, const std::string& target, bool types) {
 void moveTo(Explorer& explorer, const Point& pixel) { explorer.input({.kind = Input::Kind::move, .at = pixel}); }
 
 void runUi(Session& session, const Arguments& arguments) {
-  session.current();
   Explorer& explorer = explorerOf(session);
   const std::string action = arguments.text("action");
   const std::string target = arguments.textOr("target", "");

@@ -3,11 +3,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "hpsdf/output/contour.h"
 #include "pictures/picture_arguments.h"
 
 namespace hpsdf::app {
 namespace {
+
+constexpr int kMaxArrows = 1000;  // greatest distance between arrows in a picture, pixels
 
 std::string planeLine(const ViewState& view) {
   std::string line = "plane ";
@@ -49,6 +54,10 @@ std::string panelLine(const ViewState& view) {
   return line + fmt::format(" left-scroll={} right-scroll={}\n", view.scroll[0], view.scroll[1]);
 }
 
+int arrowsInPixels(const ViewState& view) {
+  return std::min(kMaxArrows, static_cast<int>(std::lround(view.arrows * view.scale)));
+}
+
 render::Plane planeOf(const ViewState& view, const Field& field) {
   if (view.plane) return *view.plane;
   return render::AxisPlane{view.axis, view.planeOffset.value_or(defaultOffset(shownBox(field), view.axis))};
@@ -73,7 +82,7 @@ render::SlicePicture slicePicture(const ViewState& view, const Field& field) {
   picture.target = view.sliceTarget;
   picture.color = view.sliceColors.by;
   picture.scale = view.sliceColors.scale;
-  picture.arrows = view.arrows;
+  picture.arrows = arrowsInPixels(view);
   return picture;
 }
 
@@ -88,15 +97,15 @@ render::SurfacePicture surfacePicture(const ViewState& view, const Field& field)
   picture.edges = view.edges;
   if (view.planeInSpace) picture.plane = planeOf(view, field);
   picture.cells = view.cells;
-  picture.arrows = view.arrows;
+  picture.arrows = arrowsInPixels(view);
   picture.color = view.surfaceColors.by;
   picture.scale = view.surfaceColors.scale;
   return picture;
 }
 
 std::string scriptOf(const ViewState& view) {
-  return fmt::format("show {} size={}x{} samples={} {}\n", view.slice ? "slice" : "surface", view.width, view.height,
-                     view.samples, backendText(view.backend)) +
+  return fmt::format("show {} size={}x{} scale={} samples={} {}\n", view.slice ? "slice" : "surface", view.width,
+                     view.height, view.scale, view.samples, backendText(view.backend)) +
          cameraLine(view.camera) + surfaceLine(view) + planeLine(view) + cellsLine(view.cells) +
          fmt::format("triangles shown={} tolerance={} simplify={}\n", view.triangles, view.trianglesTolerance,
                      view.trianglesSimplified) +

@@ -47,6 +47,8 @@ struct Coloring {
 /// Returns the default tolerance of contours as a percentage.
 std::string defaultContourTolerance();
 
+constexpr double kLeastScale = 1, kGreatestScale = 4;  ///< range of `ViewState::scale`
+
 struct ViewState {
   bool slice = false;  ///< true shows a slice of the field, false the surface in space
 
@@ -72,7 +74,7 @@ struct ViewState {
   bool triangles = false;                                      ///< draws the triangles of the surface's contour
   std::string trianglesTolerance = defaultContourTolerance();  ///< as text, such as "0.002" or "0.1%"
   bool trianglesSimplified = false;                            ///< merges vertices of the contour
-  int arrows = 0;                                              ///< spacing of gradient arrows in pixels; 0 for none
+  int arrows = 0;                                              ///< spacing of gradient arrows in points; 0 for none
 
   std::string beside;  ///< file of another field, drawn beside the current one with the same settings, or empty
 
@@ -87,10 +89,11 @@ struct ViewState {
   /// set up with numbers, and those that list figures.
   std::array<bool, kPanels> open = {true, true,  true,  true, false, true,  true,
                                     true, false, false, true, true,  false, false};
-  std::array<double, 2> scroll = {0, 0};  ///< scroll positions of the left and the right column, pixels
+  std::array<double, 2> scroll = {0, 0};  ///< scroll positions of the left and the right column, points
   int width = 1280;                       ///< size of the whole frame, pixels
   int height = 720;
-  int samples = 1;  ///< samples per pixel along each axis
+  double scale = 1;  ///< pixels per point, the unit of text, widgets and their distances
+  int samples = 1;   ///< samples per pixel along each axis
   Backend backend;
 
   bool isOpen(Panel panel) const { return open[static_cast<std::size_t>(panel)]; }

@@ -154,7 +154,13 @@ const Contour& Session::contour(const ContourChoice& choice) {
   return *contour_;
 }
 
+void Session::keep(Field field) { kept_ = std::make_unique<Other>(Other{kKept, std::move(field)}); }
+
 Session::Other& Session::other(const std::string& file) {
+  if (file == kKept) {
+    if (!kept_) throw Error("no field is kept; 'rebuild keep=true' keeps the field before it");
+    return *kept_;
+  }
   const auto found = std::ranges::find(others_, file, &Other::file);
   if (found != others_.end()) {
     std::rotate(others_.begin(), found, found + 1);

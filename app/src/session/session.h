@@ -123,7 +123,11 @@ class Session {
     std::unique_ptr<render::Renderer> renderer = {};
     Backend backend = {};
   };
+  /// Returns the second field of this file, or the one that `keep` has kept for the name `kKept`.
   Other& other(const std::string& file);
+  /// Keeps a field as a second field of the name `kKept`, in place of the one that was kept before.
+  void keep(Field field);
+  static constexpr const char* kKept = "kept";
   /// Forgets the second fields whose files have been modified since they were read. Returns whether there were any. A
   /// second field whose file was deleted is kept.
   bool forgetChangedOthers();
@@ -177,6 +181,7 @@ class Session {
   std::optional<Contour> contour_;
   ContourChoice contourOf_;                                  // choices for `contour_`
   std::vector<std::unique_ptr<Other>> others_;               // most recently used first; renderers keep references
+  std::unique_ptr<Other> kept_;                              // the one of the name kKept
   std::shared_ptr<const DistanceFunction> exact_;            // distance to the field's own surface
   std::shared_ptr<const DistanceFunction> exactOfArgument_;  // distance to `surfaceArgument_`
   std::string surfaceArgument_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
+#include <vector>
 
 namespace hpsdf::app {
 namespace {
@@ -47,6 +49,10 @@ float edge(const ImVec2& a, const ImVec2& b, const ImVec2& p) {
 /// triangles traverse their shared edge in opposite directions, so the pixels belong to exactly one of them.
 bool coversItsEdge(const ImVec2& a, const ImVec2& b) { return a.y == b.y ? a.x > b.x : a.y > b.y; }
 
+bool haveOneTexel(const ImDrawVert& a, const ImDrawVert& b, const ImDrawVert& c) {
+  return a.uv.x == b.uv.x && a.uv.x == c.uv.x && a.uv.y == b.uv.y && a.uv.y == c.uv.y;
+}
+
 void paintTriangle(render::Image& image, const Coverage& texture, const Clip& clip, const ImDrawVert* a,
                    const ImDrawVert* b, const ImDrawVert* c) {
   float area = edge(a->pos, b->pos, c->pos);
@@ -59,7 +65,7 @@ void paintTriangle(render::Image& image, const Coverage& texture, const Clip& cl
   const auto [top, bottom] = std::minmax({a->pos.y, b->pos.y, c->pos.y});
   const int x0 = std::max(clip.x0, int(std::floor(left))), x1 = std::min(clip.x1, int(std::ceil(right)));
   const int y0 = std::max(clip.y0, int(std::floor(top))), y1 = std::min(clip.y1, int(std::ceil(bottom)));
-  const bool oneTexel = a->uv.x == b->uv.x && a->uv.x == c->uv.x && a->uv.y == b->uv.y && a->uv.y == c->uv.y;
+  const bool oneTexel = haveOneTexel(*a, *b, *c);
   const float constantCoverage = oneTexel ? coverageAt(texture, a->uv.x, a->uv.y) : 0;
   const Channels colorA = channelsOf(a->col), colorB = channelsOf(b->col), colorC = channelsOf(c->col);
   const bool oneColor = a->col == b->col && a->col == c->col;
@@ -83,19 +89,68 @@ void paintTriangle(render::Image& image, const Coverage& texture, const Clip& cl
     }
 }
 
+/// Returns the corners of a list of triangles in pixels. Corners of glyphs, which have a texture, are moved to whole
+/// pixels; a little more than one half is added, because rounding errors must not move the corners of one glyph
+/// differently.
+std::vector<ImDrawVert> cornersInPixels(const ImDrawList& list, const ImDrawCmd& command, float scale) {
+  const ImDrawVert* vertices = list.VtxBuffer.Data + command.VtxOffset;
+  const ImDrawIdx* indices = list.IdxBuffer.Data + command.IdxOffset;
+  std::vector<ImDrawVert> corners(command.ElemCount);
+  for (unsigned i = 0; i < command.ElemCount; ++i) {
+    corners[i] = vertices[indices[i]];
+    corners[i].pos = {corners[i].pos.x * scale, corners[i].pos.y * scale};
+  }
+  if (scale == 1) return corners;
+  for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
+    if (haveOneTexel(corners[i], corners[i + 1], corners[i + 2])) continue;
+    for (std::size_t k = i; k < i + 3; ++k)
+      corners[k].pos = {std::floor(corners[k].pos.x + 0.51F), std::floor(corners[k].pos.y + 0.51F)};
+  }
+  return corners;
+}
+
+/// True if the two triangles with these six corners are the halves of an upright rectangle of one opaque colour.
+bool isPlainRectangle(std::span<const ImDrawVert, 6> corners, const Coverage& texture) {
+  const ImDrawVert &a = corners[0], &b = corners[1], &c = corners[2], &d = corners[5];
+  const auto areSame = [](const ImDrawVert& p, const ImDrawVert& q) {
+    return p.pos.x == q.pos.x && p.pos.y == q.pos.y;
+  };
+  const bool isUpright = areSame(a, corners[3]) && areSame(c, corners[4]) && a.pos.y == b.pos.y && b.pos.x == c.pos.x &&
+                         c.pos.y == d.pos.y && d.pos.x == a.pos.x && a.pos.x < c.pos.x && a.pos.y < c.pos.y;
+  const bool isPlain = a.col == b.col && a.col == c.col && a.col == d.col && haveOneTexel(a, b, c) &&
+                       haveOneTexel(a, c, d) && (a.col >> IM_COL32_A_SHIFT & 0xff) == 255;
+  return isUpright && isPlain && coverageAt(texture, a.uv.x, a.uv.y) == 1;
+}
+
+/// Fills the pixels whose centres lie in the rectangle, which is faster than painting its two triangles.
+void fillRectangle(render::Image& image, const Clip& clip, const ImDrawVert& low, const ImDrawVert& high) {
+  const auto first = [](float edge) { return int(std::ceil(edge - 0.5F)); };
+  const int x0 = std::max(clip.x0, first(low.pos.x)), x1 = std::min(clip.x1, first(high.pos.x));
+  const int y0 = std::max(clip.y0, first(low.pos.y)), y1 = std::min(clip.y1, first(high.pos.y));
+  const Channels channels = channelsOf(low.col);
+  const render::Color color = {std::uint8_t(channels[0]), std::uint8_t(channels[1]), std::uint8_t(channels[2])};
+  for (int y = y0; y < y1 && x0 < x1; ++y) std::fill_n(&image.at(x0, y), x1 - x0, color);
+}
+
 }  // namespace
 
-void paint(render::Image& image, const ImDrawData& data, const Coverage& texture) {
+void paint(render::Image& image, const ImDrawData& data, const Coverage& texture, double scale) {
+  const auto pixel = [&](float coordinate) { return int(std::lround(coordinate * scale)); };
   for (int n = 0; n < data.CmdListsCount; ++n) {
     const ImDrawList& list = *data.CmdLists[n];
     for (const ImDrawCmd& command : list.CmdBuffer) {
-      const Clip clip{std::max(0, int(command.ClipRect.x)), std::max(0, int(command.ClipRect.y)),
-                      std::min(image.width, int(command.ClipRect.z)), std::min(image.height, int(command.ClipRect.w))};
-      const ImDrawVert* vertices = list.VtxBuffer.Data + command.VtxOffset;
-      const ImDrawIdx* indices = list.IdxBuffer.Data + command.IdxOffset;
-      for (unsigned i = 0; i + 2 < command.ElemCount; i += 3)
-        paintTriangle(image, texture, clip, vertices + indices[i], vertices + indices[i + 1],
-                      vertices + indices[i + 2]);
+      const Clip clip{std::max(0, pixel(command.ClipRect.x)), std::max(0, pixel(command.ClipRect.y)),
+                      std::min(image.width, pixel(command.ClipRect.z)),
+                      std::min(image.height, pixel(command.ClipRect.w))};
+      const std::vector<ImDrawVert> corners = cornersInPixels(list, command, float(scale));
+      for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
+        if (i + 6 <= corners.size() && isPlainRectangle(std::span<const ImDrawVert, 6>(&corners[i], 6), texture)) {
+          fillRectangle(image, clip, corners[i], corners[i + 2]);
+          i += 3;
+          continue;
+        }
+        paintTriangle(image, texture, clip, &corners[i], &corners[i + 1], &corners[i + 2]);
+      }
     }
   }
 }

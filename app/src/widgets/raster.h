@@ -20,7 +20,8 @@ struct Coverage {
 
 /// Blends the triangles of `data` over the picture, one after the other and by the rules of graphics cards. A triangle
 /// covers the pixels whose centres it contains. Colours and texture coordinates are interpolated, and the texture is
-/// sampled bilinearly.
-void paint(render::Image& image, const ImDrawData& data, const Coverage& texture);
+/// sampled bilinearly. The coordinates of `data` are multiplied by `scale`. Triangles with a texture, which are glyphs,
+/// are then moved to whole pixels, so that text is crisp at every scale.
+void paint(render::Image& image, const ImDrawData& data, const Coverage& texture, double scale = 1);
 
 }  // namespace hpsdf::app

@@ -12,7 +12,7 @@
 namespace hpsdf::app {
 namespace {
 
-constexpr float kTextSize = 13;     // pixels per em
+constexpr float kTextSize = 13;     // points per em
 constexpr float kStep = 1.0F / 60;  // assumed seconds per frame; no clock is read
 
 struct NamedKey {
@@ -36,6 +36,8 @@ constexpr NamedKey kKeys[] = {{"enter", Key::enter, ImGuiKey_Enter},
                               {"f1", Key::f1, ImGuiKey_COUNT},  // Dear ImGui has no name for it
                               {"a", Key::a, ImGuiKey_A},
                               {"c", Key::c, ImGuiKey_C},
+                              {"o", Key::o, ImGuiKey_COUNT},  // Dear ImGui has no name for it
+                              {"s", Key::s, ImGuiKey_COUNT},
                               {"v", Key::v, ImGuiKey_V},
                               {"x", Key::x, ImGuiKey_X},
                               {"y", Key::y, ImGuiKey_Y},
@@ -81,6 +83,8 @@ void setStyle() {
 }
 
 UiRect rectOf(const ImVec2& low, const ImVec2& high) { return {low.x, low.y, high.x, high.y}; }
+/// Blurs the edges of lines over a pixel, not over a point.
+void sharpen(ImDrawList& list, double scale) { list._FringeScale = 1 / float(scale); }
 
 UiRect visiblePart(const ImVec2& low, const ImVec2& high) {
   const ImDrawList& list = *ImGui::GetWindowDrawList();
@@ -133,6 +137,17 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   io.SetClipboardTextFn = [](void* clipboard, const char* text) { *static_cast<std::string*>(clipboard) = text; };
   io.GetClipboardTextFn = [](void* clipboard) { return static_cast<std::string*>(clipboard)->c_str(); };
   setStyle();
+  setScale(1);
+}
+
+/// Makes the font atlas for a number of pixels per point. Dear ImGui counts in points; its glyphs have the size that
+/// they will have in pixels, so that text is crisp.
+void Ui::setScale(double scale) {
+  if (scale == scale_) return;
+  scale_ = scale;
+  ImGuiIO& io = activate();
+  io.Fonts->Clear();
+  ImGui::GetStyle().AntiAliasedLinesUseTex = scale == 1;  // only glyphs may have a texture where they are moved
 
   // Ranges of the characters that the font atlas contains: Latin, Greek, dashes, dots, arrows, ∇, −, ≤, ≥.
   static const ImWchar ranges[] = {0x20,   0x7e,   0xa0,   0xff,   0x391,  0x3c9,  0x2013, 0x2014, 0x2026, 0x2026,
@@ -143,8 +158,10 @@ Ui::Ui() : state_(std::make_unique<State>()) {
   config.PixelSnapH = true;
   const auto font = render::dejavuSans();
   // The const_cast is safe: the atlas only reads the font, which it does not own.
-  io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font.data()), static_cast<int>(font.size()), kTextSize,
-                                 &config, ranges);
+  ImFont* const added =
+      io.Fonts->AddFontFromMemoryTTF(const_cast<unsigned char*>(font.data()), static_cast<int>(font.size()),
+                                     kTextSize * float(scale), &config, ranges);
+  added->Scale = 1 / float(scale);
   unsigned char* texels = nullptr;
   Coverage& texture = state_->texture;
   io.Fonts->GetTexDataAsAlpha8(&texels, &texture.width, &texture.height);
@@ -153,9 +170,10 @@ Ui::Ui() : state_(std::make_unique<State>()) {
 
 Ui::~Ui() { ImGui::DestroyContext(state_->context); }
 
-void Ui::frame(int width, int height, const Input* input, const std::function<void()>& widgets) {
+void Ui::frame(const FrameSize& size, const Input* input, const std::function<void()>& widgets) {
+  setScale(size.scale);
   ImGuiIO& io = activate();
-  io.DisplaySize = {float(width), float(height)};
+  io.DisplaySize = {float(size.width / scale_), float(size.height / scale_)};
   io.DeltaTime = kStep;
   io.MouseWheel = 0;
   if (input != nullptr) {
@@ -170,20 +188,24 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
     if (event.kind == Input::Kind::type) io.AddInputCharactersUTF8(event.text.c_str());
     if (event.kind == Input::Kind::key && event.key != Key::tab) io.KeysDown[static_cast<int>(event.key)] = true;
   }
-  io.MousePos = {float(pointer_[0]), float(pointer_[1])};
+  io.MousePos = {float(pointer_[0] / scale_), float(pointer_[1] / scale_)};
   widgets_.clear();
   order_.clear();
   state_->hovered.reset();
   state_->chosen.reset();
+  event_ = input;
   const auto end = [&] {
     state_->key.reset();
     state_->focusMoved = false;
     help_.clear();
+    event_ = nullptr;
     ImGui::Render();
     if (input != nullptr && input->kind == Input::Kind::key) io.KeysDown[static_cast<int>(input->key)] = false;
     if (input == nullptr || input->kind != Input::Kind::press) io.KeyCtrl = io.KeyShift = false;
   };
   ImGui::NewFrame();
+  for (ImDrawList* const list : {ImGui::GetBackgroundDrawList(), ImGui::GetForegroundDrawList()})
+    sharpen(*list, scale_);
   try {
     widgets();
   } catch (...) {
@@ -192,7 +214,7 @@ void Ui::frame(int width, int height, const Input* input, const std::function<vo
     end();
     throw;
   }
-  drawTip(width, height);
+  drawTip();
   end();
 }
 
@@ -232,21 +254,22 @@ void Ui::hideTip() {
 
 /// Draws a tooltip: beside the column of its widget, or else below or above the widget. It covers neither the widget
 /// nor, unless there is no other place, other widgets of the column.
-void Ui::drawTip(int width, int height) {
+void Ui::drawTip() {
   const auto& tip = state_->chosen ? state_->chosen : state_->hovered;
   if (!tip || tip->text.empty() || holds(0) || holds(1) || holds(2)) return;
   if (ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel)) return;
+  const auto [width, height] = ImGui::GetIO().DisplaySize;
   const float em = ImGui::GetFontSize(), pad = 0.5F * em, gap = 0.4F * em;
   const ImVec2 text = ImGui::CalcTextSize(tip->text.c_str(), nullptr, false, 22 * em);
   const float w = text.x + 2 * pad, h = text.y + 2 * pad;
   const UiRect &item = tip->widget, &column = tip->column;
-  ImVec2 at(std::clamp(float(item.x0), 0.0F, std::max(0.0F, float(width) - w)),
-            std::clamp(float(item.y0), 0.0F, std::max(0.0F, float(height) - h)));
-  if (float(column.x1) + gap + w <= float(width))
+  ImVec2 at(std::clamp(float(item.x0), 0.0F, std::max(0.0F, width - w)),
+            std::clamp(float(item.y0), 0.0F, std::max(0.0F, height - h)));
+  if (float(column.x1) + gap + w <= width)
     at.x = float(column.x1) + gap;
   else if (float(column.x0) - gap - w >= 0)
     at.x = float(column.x0) - gap - w;
-  else if (float(item.y1) + gap + h <= float(height))
+  else if (float(item.y1) + gap + h <= height)
     at.y = float(item.y1) + gap;
   else if (float(item.y0) - gap - h >= 0)
     at.y = float(item.y0) - gap - h;
@@ -261,7 +284,7 @@ void Ui::drawTip(int width, int height) {
 
 void Ui::paint(render::Image& image) const {
   activate();
-  app::paint(image, *ImGui::GetDrawData(), state_->texture);
+  app::paint(image, *ImGui::GetDrawData(), state_->texture, scale_);
 }
 
 ImGuiIO& Ui::activate() const {
@@ -291,6 +314,7 @@ double Ui::column(const char* name, const UiRect& rect, std::optional<double> sc
       ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
           ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoBringToFrontOnFocus |
           (scrolls ? ImGuiWindowFlags_None : ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse));
+  sharpen(*ImGui::GetWindowDrawList(), scale_);
   const bool isByUser = ImGui::GetIO().MouseWheel != 0 || ImGui::IsMouseDown(0);
   const double scrolledTo = isByUser ? double(ImGui::GetScrollY()) : scroll;
   if (std::abs(ImGui::GetScrollY() - scrolledTo) > 0.5) ImGui::SetScrollY(float(scrolledTo));  // at the next frame
@@ -308,7 +332,7 @@ void Ui::note(const std::string& path, bool takesText, std::optional<double> fro
   const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
   const ImVec2 labelled(from ? float(*from) : low.x, low.y);
   const UiRect rect = visiblePart(low, high);
-  widgets_[path] = {.rect = rect, .enabled = !state_->disabled, .takesText = takesText, .help = help_};
+  widgets_[path] = {.rect = rect.times(scale_), .enabled = !state_->disabled, .takesText = takesText, .help = help_};
   const ImGuiWindow& window = *ImGui::GetCurrentWindow();
   const UiRect column = rectOf(window.Pos, {window.Pos.x + window.Size.x, window.Pos.y + window.Size.y});
   const bool hovered = ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled) ||
@@ -327,10 +351,10 @@ void Ui::note(const std::string& path, bool takesText, std::optional<double> fro
 }
 
 bool Ui::addControl(const std::string& path, const UiRect& rect, std::string help) {
-  const bool over = !wantsMouse() && rect.contains(pointer_[0], pointer_[1]);
+  const bool over = !wantsMouse() && rect.contains(pointerInPoints()[0], pointerInPoints()[1]);
   if (over) state_->hovered = {help, rect, rect};
   if (path == focus_) state_->chosen = {help, rect, rect};
-  widgets_[path] = {.rect = rect, .enabled = !state_->frozen, .help = std::move(help)};
+  widgets_[path] = {.rect = rect.times(scale_), .enabled = !state_->frozen, .help = std::move(help)};
   if (!state_->frozen) order_.push_back(path);
   return !state_->frozen && pressedByKey(path);
 }
@@ -413,6 +437,7 @@ std::optional<std::string> Ui::combo(const std::string& path, const char* text, 
   if (const int step = stepByKey(path))
     chosen = items[std::size_t(std::clamp(now + step, std::ptrdiff_t{0}, count - 1))];
   if (!open) return chosen == shown ? std::nullopt : chosen;
+  sharpen(*ImGui::GetWindowDrawList(), scale_);
   for (const std::string& item : items) {
     const std::string itemPath = path + "/" + item;
     if (ImGui::Selectable(id(itemPath, item.c_str()), item == shown)) chosen = item;
@@ -464,6 +489,52 @@ std::optional<std::string> Ui::field(const std::string& path, const char* text, 
   typeInto(path, true);
   note(path, true, from);
   return entered && buffer.data() != value ? std::optional<std::string>(buffer.data()) : std::nullopt;
+}
+
+void Ui::entry(const std::string& path, std::string& text, bool focus) {
+  std::array<char, 1024> buffer{};
+  text.copy(buffer.data(), buffer.size() - 1);
+  ImGui::SetNextItemWidth(-1);
+  if (focus) {
+    ImGui::ClearActiveID();  // a field that has the keyboard ignores another text
+    ImGui::SetKeyboardFocusHere();
+  }
+  ImGui::InputText(id(path, ""), buffer.data(), buffer.size(), ImGuiInputTextFlags_AutoSelectAll);
+  note(path, true);
+  // As with a slider, what is typed after a Ctrl+click replaces the text.
+  if (ImGui::IsItemClicked() && ImGui::GetIO().KeyCtrl)
+    if (ImGuiInputTextState* const state = ImGui::GetInputTextState(ImGui::GetItemID())) state->SelectAll();
+  text = buffer.data();
+}
+
+bool Ui::item(const std::string& path, const char* label, bool selected) {
+  const bool clicked = ImGui::Selectable(id(path, label), selected);
+  note(path);
+  return clicked || pressedByKey(path);
+}
+
+void Ui::list(const char* name, double height, const std::function<void()>& content) {
+  ImGui::BeginChild(name, {0, float(height)}, true);
+  sharpen(*ImGui::GetWindowDrawList(), scale_);
+  content();
+  ImGui::EndChild();
+}
+
+void Ui::overlay(const char* name, const UiRect& box, const std::function<void()>& content) {
+  ImGui::SetNextWindowPos({0, 0});
+  ImGui::SetNextWindowSize(ImGui::GetIO().DisplaySize);
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, {0.1F, 0.11F, 0.14F, 0.3F});
+  ImGui::Begin(name, nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings);
+  ImGui::PopStyleColor();
+  ImGui::SetCursorPos({float(box.x0), float(box.y0)});
+  ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_PopupBg));
+  ImGui::BeginChild("box", {float(box.width()), float(box.height())}, true, ImGuiWindowFlags_NoScrollbar);
+  ImGui::PopStyleColor();
+  sharpen(*ImGui::GetWindowDrawList(), scale_);
+  content();
+  ImGui::EndChild();
+  ImGui::End();
 }
 
 bool Ui::row(const std::string& path, std::span<const std::string> cells, std::span<const double> columns) {

@@ -35,6 +35,8 @@ enum class Key : std::uint8_t {
   f1,
   a,
   c,
+  o,
+  s,
   v,
   x,
   y,
@@ -44,6 +46,12 @@ enum class Key : std::uint8_t {
 /// Returns the names of all keys as scripts spell them: "enter", "escape", ….
 std::vector<std::string> keyNames();
 std::optional<Key> keyNamed(std::string_view name);
+
+/// The size of a frame.
+struct FrameSize {
+  int width, height;  ///< pixels
+  double scale = 1;   ///< pixels per point, the unit of text and widgets
+};
 
 /// One mouse or keyboard event.
 struct Input {
@@ -57,17 +65,18 @@ struct Input {
   bool shift = false;             ///< for press, release, wheel and key: Shift is held
 };
 
-/// A rectangle of a frame in pixels: x in [x0, x1), y in [y0, y1).
+/// A rectangle of a frame in pixels or points: x in [x0, x1), y in [y0, y1).
 struct UiRect {
   double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   bool contains(double x, double y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
   double width() const { return x1 - x0; }
   double height() const { return y1 - y0; }
+  UiRect times(double factor) const { return {x0 * factor, y0 * factor, x1 * factor, y1 * factor}; }
 };
 
 /// A widget of the last frame: its rectangle and the input that it takes.
 struct Widget {
-  UiRect rect;             ///< visible part; empty if the widget is scrolled out of its column
+  UiRect rect;             ///< visible part, pixels; empty if the widget is scrolled out of its column
   bool enabled = true;     ///< false while the widget takes no input
   bool takesText = false;  ///< true for text fields and sliders
   bool isControl = true;   ///< false for areas and displays, which the keyboard does not reach
@@ -84,16 +93,17 @@ class Ui {
   Ui(const Ui&) = delete;
   Ui& operator=(const Ui&) = delete;
 
-  /// Makes one frame of width × height pixels. Handles the event `input` unless it is null, then calls
+  /// Makes one frame. Handles the event `input` unless it is null, then calls
   /// `widgets`, which draws all widgets by calling the functions below. An exception that `widgets` throws is
   /// passed on after the frame has been completed.
-  void frame(int width, int height, const Input* input, const std::function<void()>& widgets);
+  void frame(const FrameSize& size, const Input* input, const std::function<void()>& widgets);
 
   /// Paints the widgets of the last frame over a picture that has the size of this frame.
   void paint(render::Image& image) const;
 
   /// Returns the widgets of the last frame by their paths, such as "bar/undo".
   const std::map<std::string, Widget>& widgets() const { return widgets_; }
+  /// Returns the position of the mouse pointer, pixels.
   std::array<double, 2> pointer() const { return pointer_; }
   /// True if the mouse pointer is over a panel, or if a widget has captured the mouse.
   bool wantsMouse() const;
@@ -108,12 +118,14 @@ class Ui {
   /// slider. A press of the mouse and Escape end the choice.
   const std::string& focus() const { return focus_; }
   void clearFocus() { focus_.clear(); }
+  /// Returns the event that the present frame handles, or nullptr.
+  const Input* event() const { return event_; }
   const std::string& clipboard() const;
   void setClipboard(const std::string& text);
 
   // The following functions draw widgets. Only the function `widgets`, the argument of `frame`, may call them. Each
   // function returns the change that the user made in this frame. A path has the form panel/name. A label may be empty;
-  // it stands on the left of the widget.
+  // it stands on the left of the widget. Sizes and positions are in points.
 
   /// Sets the tooltip of the next widget. A tooltip is shown beside its column while the pointer rests on the widget
   /// and no mouse button is down, and for the control that the keyboard has chosen.
@@ -122,7 +134,7 @@ class Ui {
   void hideTip();
 
   /// Draws the background of a panel and calls `content` to fill the panel. `scroll` is the scroll position in
-  /// pixels, or std::nullopt for a panel that never scrolls. Returns the new scroll position.
+  /// points, or std::nullopt for a panel that never scrolls. Returns the new scroll position.
   double column(const char* name, const UiRect& rect, std::optional<double> scroll,
                 const std::function<void()>& content);
   /// Draws the heading of a section that is unfolded or folded. Returns true if it was pressed.
@@ -136,6 +148,17 @@ class Ui {
                                const char* format = "%.4g", When when = When::moved);
   /// Draws a text field. Returns the text of the field when Enter is pressed, and std::nullopt otherwise.
   std::optional<std::string> field(const std::string& path, const char* label, const std::string& value);
+  /// Draws a text field that changes `text` as the user types. If `focus` is true, it gets the keyboard, and what is
+  /// typed replaces the text.
+  void entry(const std::string& path, std::string& text, bool focus);
+  /// Draws an entry of a list. Returns true if it is clicked.
+  bool item(const std::string& path, const char* label, bool selected);
+  /// Draws a list that scrolls.
+  void list(const char* name, double height, const std::function<void()>& content);
+  /// Draws a box over the whole frame, the rest of which is darkened.
+  void overlay(const char* name, const UiRect& box, const std::function<void()>& content);
+  /// Returns the position of the mouse pointer, points.
+  std::array<double, 2> pointerInPoints() const { return {pointer_[0] / scale_, pointer_[1] / scale_}; }
   /// Draws a row of a table, with its cells from `columns` on, measured in widths of a digit.
   bool row(const std::string& path, std::span<const std::string> cells, std::span<const double> columns);
   void text(const std::string& line, bool soft = false);
@@ -148,7 +171,9 @@ class Ui {
 
   /// Registers a rectangle that no function of this class draws, such as the picture, as a widget, so that
   /// scripts find it by its path.
-  void addArea(const std::string& path, const UiRect& rect) { widgets_[path] = {.rect = rect, .isControl = false}; }
+  void addArea(const std::string& path, const UiRect& rect) {
+    widgets_[path] = {.rect = rect.times(scale_), .isControl = false};
+  }
 
   /// Registers a rectangle that no function of this class draws as a control with a tooltip. Returns true if it was
   /// pressed by the keyboard; presses of the mouse are the caller's.
@@ -168,7 +193,8 @@ class Ui {
   bool pressedByKey(const std::string& path) const;
   /// Returns 1 for the keys right and down, -1 for left and up, if they are pressed for this control, otherwise 0.
   int stepByKey(const std::string& path) const;
-  void drawTip(int width, int height);
+  void drawTip();
+  void setScale(double scale);
   void setDisabled(bool disabled);
   const char* id(const std::string& path, const char* label);
 
@@ -179,6 +205,8 @@ class Ui {
   std::string focus_;
   std::string help_;  ///< tooltip of the next widget
   std::array<double, 2> pointer_ = {-1, -1};
+  const Input* event_ = nullptr;
+  double scale_ = 0;  ///< pixels per point; 0 before the first frame
 };
 
 }  // namespace hpsdf::app

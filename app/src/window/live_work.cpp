@@ -46,7 +46,7 @@ void LiveWork::forecast(const Forecast& forecast) {
 }
 
 void LiveWork::showMesh(const TriangleMesh& mesh, const Box& domain) {
-  if (std::this_thread::get_id() != thread_ || explorer_.session().hasField()) return;
+  if (std::this_thread::get_id() != thread_ || !explorer_.isOpening()) return;
   explorer_.showMesh(mesh, domain);
   explorer_.work = Explorer::Work{.task = "preparing the exact distance", .cancellable = explorer_.running()};
   refresh();
@@ -55,7 +55,7 @@ void LiveWork::showMesh(const TriangleMesh& mesh, const Box& domain) {
 }
 
 void LiveWork::offerField(const std::function<Field()>& fieldSoFar) {
-  if (std::this_thread::get_id() != thread_ || refreshing_ || explorer_.session().hasField()) return;
+  if (std::this_thread::get_id() != thread_ || refreshing_ || !explorer_.isOpening()) return;
   using Seconds = std::chrono::duration<double>;
   const auto start = Clock::now();
   if (Seconds(start - shownSince_).count() < pause_ || !takeReport()) return;

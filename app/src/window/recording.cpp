@@ -15,6 +15,7 @@ void Recording::add(const std::string& line, bool replaces) {
   // A window takes many sizes while a user resizes it. If successive lines set the size, only the last one is
   // recorded.
   const auto isSize = [](const std::string& any) { return any.starts_with("show size=") && any.rfind(' ') == 4; };
+  if (line.starts_with("shot ")) notePointer();
   if (replaces || (isSize(line) && !lines_.empty() && isSize(lines_.back())))
     lines_.back() = line;
   else

@@ -19,7 +19,7 @@ class Recording {
   Recording& operator=(const Recording&) = delete;
 
   /// Records a line that moves the pointer to its present position, because highlights and the readout panel depend on
-  /// the pointer.
+  /// the pointer. `shot` does so by itself.
   void notePointer();
 
   std::size_t lines() const { return lines_.size(); }

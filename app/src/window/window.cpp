@@ -21,6 +21,7 @@
 #include "session/field_summary.h"
 #include "text/text.h"
 #include "window/live_work.h"
+#include "window/recent_files.h"
 #include "window/recording.h"
 
 namespace hpsdf::app {
@@ -28,10 +29,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kPollSeconds = 0.2;     // longest wait for an event, because Ctrl-C does not end a wait
-constexpr double kRestSeconds = 0.06;    // time without an event after which a slow picture is drawn in full
-constexpr double kStillSeconds = 0.3;    // the same while work runs, which full pictures would slow down
-constexpr double kSmoothSeconds = 0.04;  // a picture that takes longer is drawn with fewer pixels while the view moves
+constexpr double kPollSeconds = 0.2;   // longest wait for an event, because Ctrl-C does not end a wait
+constexpr double kRestSeconds = 0.06;  // time without an event after which a slow picture is drawn in full
+constexpr double kSettledSeconds =
+    0.2;                               // the same after a picture with one sample a pixel, if the finished one is slow
+constexpr double kStillSeconds = 0.3;  // the same while work runs, which full pictures would slow down
+constexpr double kSmoothSeconds = 0.045;  // frames that take longer are drawn with fewer pixels while the view moves
+constexpr double kPromptSeconds = 0.5;    // a picture that takes longer is drawn with one sample a pixel first
+constexpr int kCoarsest = 6;              // greatest divisor of the number of pixels along an axis
+constexpr int kSamples = 2;               // samples of a pixel along each axis, once nothing moves
 constexpr const char* kGuessUp = "camera up=auto";    // files of meshes do not say which axis points up
 constexpr int kLeastSize = 64, kGreatestSize = 8192;  // range of frame sizes, pixels
 
@@ -63,7 +69,9 @@ class Desktop {
 /// renderer draws in another OpenGL context.
 class Screen {
  public:
-  Screen(int width, int height, const std::string& title) {
+  /// Opens a window. Its size is in points. `scale` is the number of pixels per point, by default the desktop's.
+  Screen(int width, int height, std::optional<double> scale, const std::string& title) : scale_(scale) {
+    glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 0);
     window_ = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
@@ -71,12 +79,28 @@ class Screen {
       throw Error(fmt::format("the window cannot be opened ({}): install the graphics driver, or libgl1-mesa-dri",
                               glfwProblem()));
     glfwSetWindowSizeLimits(window_, kLeastSize, kLeastSize, GLFW_DONT_CARE, GLFW_DONT_CARE);
+    // A desktop that counts in points has enlarged the window already; X11 counts in pixels.
+    int units = 0, pixels = 0;
+    glfwGetWindowSize(window_, &units, nullptr);
+    glfwGetFramebufferSize(window_, &pixels, nullptr);
+    if (const double factor = this->scale() * std::max(units, 1) / std::max(pixels, 1); factor != 1)
+      glfwSetWindowSize(window_, int(std::lround(width * factor)), int(std::lround(height * factor)));
+    glfwShowWindow(window_);
   }
   ~Screen() { glfwDestroyWindow(window_); }
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
   GLFWwindow* window() const { return window_; }
+
+  /// Returns the number of pixels per point: what the user chose, or the scale of the desktop. Desktops that derive
+  /// their scale from the size of the screen have odd ones, which are rounded to quarters.
+  double scale() const {
+    if (scale_) return *scale_;
+    float across = 1, down = 1;
+    glfwGetWindowContentScale(window_, &across, &down);
+    return std::clamp(std::round(4.0 * across) / 4, kLeastScale, kGreatestScale);
+  }
 
   /// Returns the window's size in pixels, or std::nullopt if the window is minimized.
   std::optional<std::array<int, 2>> size() const {
@@ -111,6 +135,7 @@ class Screen {
 
  private:
   GLFWwindow* window_ = nullptr;
+  std::optional<double> scale_;
   unsigned texture_ = 0, framebuffer_ = 0;
 };
 
@@ -161,22 +186,26 @@ class Window {
  public:
   Window(Session& session, const WindowOptions& options)
       : explorer_(explorerOf(session)),
-        screen_(options.width, options.height, options.title),
+        screen_(options.width, options.height, options.scale, options.title),
         work_(explorer_, [this] { refresh(); }) {
     listen();
     const auto size = screen_.size().value_or(std::array{options.width, options.height});
-    const std::string show = fmt::format("show size={}x{} {}", size[0], size[1], backendText(options.backend));
+    const std::string show = fmt::format("show size={}x{} scale={} samples={} {}", size[0], size[1], screen_.scale(),
+                                         kSamples, backendText(options.backend));
     explorer_.run(show);
+    explorer_.recentFiles = recentFiles();
     explorer_.run(kGuessUp);
-    recording_.emplace(explorer_, std::vector{std::string(kGuessUp), options.opening});
-    openField(options.opening);
+    std::vector<std::string> lines = {kGuessUp};
+    if (!options.opening.empty()) lines.push_back(options.opening);
+    recording_.emplace(explorer_, lines);
+    if (!options.opening.empty()) openField(options.opening);
     explorer_.run(show);
   }
 
   void run() {
     draw(false);
     while (!ended()) {
-      glfwWaitEventsTimeout(explorer_.isStale() ? kRestSeconds : kPollSeconds);
+      glfwWaitEventsTimeout(longestWait());
       const bool happened = takeEvents();
       if (ended()) break;
       if (happened || explorer_.isStale()) draw(happened);
@@ -186,7 +215,7 @@ class Window {
   /// Ends the user's input and returns the last frame, which the recorded script reproduces.
   render::Image finish() {
     endGestures();
-    return frame(1);
+    return frame(0);
   }
 
   const Recording& recording() const { return *recording_; }
@@ -215,6 +244,9 @@ class Window {
       Input event{.kind = Input::Kind::type};
       appendUtf8(event.text, code);
       windowOf(w).events_.push_back(event);
+    });
+    glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** files) {
+      if (count > 0) windowOf(w).dropped_ = files[0];
     });
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { windowOf(w).damaged_ = true; });
   }
@@ -268,6 +300,14 @@ class Window {
       attempt([&] { explorer_.run(fmt::format("show size={}x{}", (*size)[0], (*size)[1])); });
       happened = true;
     }
+    if (const double scale = screen_.scale(); scale != explorer_.view().scale) {
+      attempt([&] { explorer_.run(fmt::format("show scale={}", scale)); });
+      happened = true;
+    }
+    if (const auto file = std::exchange(dropped_, std::nullopt)) {
+      attempt([&] { explorer_.run("open " + scriptWord(*file)); });
+      happened = true;
+    }
     while (!events_.empty()) {
       const auto event = events_.front();
       events_.pop_front();
@@ -312,10 +352,10 @@ class Window {
   }
 
   /// Draws a frame and returns it. If the picture cannot be drawn, undoes changes of the view until it can be drawn.
-  render::Image frame(int shrink) {
+  render::Image frame(int coarseness) {
     for (;;) {
       try {
-        return explorer_.frame(shrink);
+        return explorer_.frame(coarseness);
       } catch (const Error& error) {
         if (!explorer_.canUndo()) throw;
         explorer_.run("undo");
@@ -324,26 +364,55 @@ class Window {
     }
   }
 
-  /// Shows in the window's title what the field is and how wrong it is.
+  /// Shows in the window's title what the field is and how wrong it is, and remembers its file.
   void showTitle() {
     if (!explorer_.session().hasField()) return;
     const CurrentField& current = explorer_.session().current();
     const std::string title = fmt::format("{} - {} - hpsdf", current.name, estimateLine(current.field));
-    if (title != title_) glfwSetWindowTitle(screen_.window(), title.c_str());
+    if (title == title_) return;
+    glfwSetWindowTitle(screen_.window(), title.c_str());
     title_ = title;
+    rememberFile(current.name);
+    explorer_.recentFiles = recentFiles();
   }
 
-  /// Draws and shows a frame. If `roughly` is true and the picture takes too long, it is drawn with fewer pixels.
-  void draw(bool roughly) {
+  /// Returns the time after which the picture is drawn again if nothing happens.
+  double longestWait() const {
+    if (!explorer_.isStale()) return kPollSeconds;
+    return explorer_.coarseness() == 1 && finishedSeconds_ > kPromptSeconds ? kSettledSeconds : kRestSeconds;
+  }
+
+  /// Returns how coarse the next picture is: while the view moves, so coarse that frames are smooth. Where the finished
+  /// picture takes long, one with a sample a pixel precedes it.
+  int nextCoarseness(bool moves) const {
+    if (moves) return movingCoarseness_;
+    return finishedSeconds_ > kPromptSeconds && explorer_.redraws(1) ? 1 : 0;
+  }
+
+  /// Learns from the time that a frame took how coarse moving pictures must be. The time of pictures is proportional to
+  /// their number of samples.
+  void learn(int coarseness, double seconds) {
+    const auto square = [](double x) { return x * x; };
+    if (coarseness == 0) finishedSeconds_ = seconds;
+    if (coarseness == 1) finishedSeconds_ = square(kSamples) * seconds;
+    if (coarseness < 2) {
+      const double plain = finishedSeconds_ / square(kSamples);
+      movingCoarseness_ = std::clamp(int(std::ceil(std::sqrt(plain / kSmoothSeconds))), 1, kCoarsest);
+      return;
+    }
+    const double ofFiner = seconds * square(double(coarseness) / (coarseness - 1));
+    if (seconds > kSmoothSeconds) movingCoarseness_ = std::min(coarseness + 1, kCoarsest);
+    if (ofFiner < 0.8 * kSmoothSeconds) movingCoarseness_ = coarseness - 1;
+  }
+
+  /// Draws and shows a frame. `moves` is true while the user moves what it shows.
+  void draw(bool moves) {
     showTitle();
-    const bool slow = roughly && fullSeconds_ > kSmoothSeconds;
-    const int shrink = slow ? std::clamp(int(std::ceil(std::sqrt(fullSeconds_ / kSmoothSeconds))), 2, 4) : 1;
-    // The pictures of a growing field may all be rough, so that their time in full is estimated.
-    const bool measures = explorer_.redraws(shrink) && (shrink == 1 || explorer_.showsUnfinished());
+    const int coarseness = nextCoarseness(moves);
+    const bool redraws = explorer_.redraws(coarseness);
     const auto start = Clock::now();
-    const render::Image image = frame(shrink);
-    if (measures) fullSeconds_ = shrink * shrink * std::chrono::duration<double>(Clock::now() - start).count();
-    screen_.show(image);
+    screen_.show(frame(coarseness));
+    if (redraws) learn(coarseness, std::chrono::duration<double>(Clock::now() - start).count());
   }
 
   /// Loads or builds the field. The window is there at once and shows the progress; closing it or Escape cancels the
@@ -383,7 +452,7 @@ class Window {
   /// frame.
   void endGestures() {
     attempt([&] { explorer_.releaseInput(); });  // a released slider may start long work
-    frame(1);                                    // if drawing fails, undoes changes of the view, also in the recording
+    frame(0);                                    // if drawing fails, undoes changes of the view, also in the recording
     explorer_.message.clear();
     recording_->notePointer();
   }
@@ -403,10 +472,12 @@ class Window {
   LiveWork work_;
   std::optional<Recording> recording_;       ///< begins with the line that makes the field
   std::deque<std::optional<Input>> events_;  ///< waiting events; std::nullopt asks for a screenshot
+  std::optional<std::string> dropped_;       ///< file that was dropped onto the window and is to be opened
   bool damaged_ = false;                     ///< true if the desktop has lost the window's content
   Clock::time_point lastInput_ = {};         ///< time of the last event that was handled while work ran
   std::string title_ = {};                   ///< title of the window; empty before the first frame
-  double fullSeconds_ = 0;                   ///< time that the last picture in full resolution took
+  double finishedSeconds_ = 0;               ///< time that the last finished picture took, or would have taken
+  int movingCoarseness_ = 1;                 ///< coarseness of pictures while the view moves
 };
 
 }  // namespace
@@ -427,6 +498,7 @@ std::size_t showWindow(Session& session, const WindowOptions& options) {
   };
   try {
     window.run();
+    if (!session.hasField()) return 0;  // there was nothing to record
     const render::Image last = window.finish();
     if (options.shot) savePng(last, *options.shot);
   } catch (const Cancelled&) {
