@@ -233,10 +233,6 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
         !(color == ColorBy::distance && name == std::string_view("range")))
       throw Error(
           fmt::format("{}: the colours of {} have none; it is for {}", name, arguments.text("color"), quantityNames()));
-  options.perCell = arguments.flag("per-cell");
-  if (options.perCell && !render::isQuantity(color))
-    throw Error(fmt::format("per-cell: the colours of {} have no greatest value; it is for {}", arguments.text("color"),
-                            quantityNames()));
   options.map = arguments.textOr("map", "");
   checkMap(options.map, color);
   if (arguments.given("mesh") && color != ColorBy::error)
@@ -252,6 +248,20 @@ render::ScaleOptions scaleOptions(const Arguments& arguments) {
   return options;
 }
 
+namespace {
+
+/// Returns the colour scale of a picture, in which cells may have the colour of their greatest value.
+render::ScaleOptions pictureScale(const Arguments& arguments) {
+  render::ScaleOptions options = scaleOptions(arguments);
+  options.perCell = arguments.flag("per-cell");
+  if (options.perCell && !render::isQuantity(colorNamed(arguments.text("color"))))
+    throw Error(fmt::format("per-cell: the colours of {} have no greatest value; it is for {}", arguments.text("color"),
+                            quantityNames()));
+  return options;
+}
+
+}  // namespace
+
 render::SlicePicture slicePicture(const Arguments& arguments, const Box& box) {
   render::SlicePicture picture;
   if (arguments.given("plane")) {
@@ -264,7 +274,7 @@ render::SlicePicture slicePicture(const Arguments& arguments, const Box& box) {
   picture.zoom = arguments.number("zoom");
   if (arguments.given("target")) picture.target = pointOf(arguments, "target");
   picture.color = colorNamed(arguments.text("color"));
-  picture.scale = scaleOptions(arguments);
+  picture.scale = pictureScale(arguments);
   setPixels(picture, arguments);
   picture.arrows = arguments.whole("arrows");
   picture.form = pictureForm(arguments);
@@ -321,7 +331,7 @@ render::SurfacePicture surfacePicture(const Arguments& arguments, const Box& box
   picture.plane = scenePlane(arguments, box);
   picture.cells = shownCells(arguments);
   picture.color = colorNamed(arguments.text("color"));
-  picture.scale = scaleOptions(arguments);
+  picture.scale = pictureScale(arguments);
   picture.arrows = arguments.whole("arrows");
   picture.form = pictureForm(arguments);
   return picture;
