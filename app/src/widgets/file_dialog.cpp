@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kWidth = 560, kHeight = 460, kMargin = 16;  // greatest size of the dialog, points
+constexpr double kDialogWidth = 560, kDialogHeight = 460, kDialogMargin = 16;  // greatest size of the dialog, points
 
 bool isFolder(const std::string& path) {
   std::error_code unknown;
@@ -184,7 +184,7 @@ void FileDialog::drawContents(Ui& ui) {
 
 void FileDialog::draw(Ui& ui, double width, double height) {
   if (!isOpen()) return;
-  const double w = std::min(kWidth, width - kMargin), h = std::min(kHeight, height - kMargin);
+  const double w = std::min(kDialogWidth, width - kDialogMargin), h = std::min(kDialogHeight, height - kDialogMargin);
   const double x = std::floor((width - w) / 2), y = std::floor((height - h) / 2);
   const UiRect box{x, y, x + w, y + h};
   const Input* const event = ui.event();

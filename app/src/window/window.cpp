@@ -37,7 +37,7 @@ constexpr double kStillSeconds = 0.3;  // the same while work runs, which full p
 constexpr double kSmoothSeconds = 0.045;  // frames that take longer are drawn with fewer pixels while the view moves
 constexpr double kPromptSeconds = 0.5;    // a picture that takes longer is drawn with one sample a pixel first
 constexpr int kCoarsest = 6;              // greatest divisor of the number of pixels along an axis
-constexpr int kSamples = 2;               // samples of a pixel along each axis, once nothing moves
+constexpr int kRestSamples = 2;           // samples of a pixel along each axis, once nothing moves
 constexpr const char* kGuessUp = "camera up=auto";    // files of meshes do not say which axis points up
 constexpr int kLeastSize = 64, kGreatestSize = 8192;  // range of frame sizes, pixels
 
@@ -191,7 +191,7 @@ class Window {
     listen();
     const auto size = screen_.size().value_or(std::array{options.width, options.height});
     const std::string show = fmt::format("show size={}x{} scale={} samples={} {}", size[0], size[1], screen_.scale(),
-                                         kSamples, backendText(options.backend));
+                                         kRestSamples, backendText(options.backend));
     explorer_.run(show);
     explorer_.recentFiles = recentFiles();
     explorer_.run(kGuessUp);
@@ -394,9 +394,9 @@ class Window {
   void learn(int coarseness, double seconds) {
     const auto square = [](double x) { return x * x; };
     if (coarseness == 0) finishedSeconds_ = seconds;
-    if (coarseness == 1) finishedSeconds_ = square(kSamples) * seconds;
+    if (coarseness == 1) finishedSeconds_ = square(kRestSamples) * seconds;
     if (coarseness < 2) {
-      const double plain = finishedSeconds_ / square(kSamples);
+      const double plain = finishedSeconds_ / square(kRestSamples);
       movingCoarseness_ = std::clamp(int(std::ceil(std::sqrt(plain / kSmoothSeconds))), 1, kCoarsest);
       return;
     }
