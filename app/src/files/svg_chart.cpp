@@ -150,7 +150,7 @@ class ChartDrawing {
     render::StrokedShape drawn{.lines = {{}}, .width = 2, .color = color};
     if (curve.dashed) {
       drawn.opacity = 0.8;
-      drawn.dashes = kDashes;
+      drawn.dashes = dashes_;
     }
     std::vector<render::VectorShape> marks;
     for (const auto& [px, py] : curve.points) {
@@ -172,7 +172,7 @@ class ChartDrawing {
   void addLegend() {
     double y = kPlotTop + 12;
     const auto entry = [&](const std::string& name, render::Color color, bool dashed) {
-      line(kLegendLeft, y - 4, kLegendLeft + 26, y - 4, color, 2.5, 1, dashed ? kDashes : std::vector<double>());
+      line(kLegendLeft, y - 4, kLegendLeft + 26, y - 4, color, 2.5, 1, dashed ? dashes_ : std::vector<double>());
       const std::string shown = legendText(name);
       text(kLegendLeft + 34, y, render::TextAnchor::start, shown, 0, shown == name ? "" : name);
       y += kLegendLine;
@@ -185,7 +185,7 @@ class ChartDrawing {
     if (!chart_.dashed.empty()) entry(chart_.dashed, kChartInk, true);
   }
 
-  const std::vector<double> kDashes = {6, 4};
+  const std::vector<double> dashes_ = {6, 4};
   const Chart& chart_;
   LogAxis x_, y_;
   render::VectorLayer layer_;

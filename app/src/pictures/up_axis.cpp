@@ -9,22 +9,22 @@
 namespace hpsdf::app {
 namespace {
 
-using Point = Eigen::Vector2d;
+using Point2 = Eigen::Vector2d;
 
 constexpr double kHeight = 0.015;  // height of a base, in diagonals of the surface's box
 constexpr double kClearly = 2;     // factor by which one base must be larger than another
 constexpr int kSamples = 64;       // samples of a field along each side of a plane
 
 /// Returns the area of the convex hull of the points.
-double hullArea(std::vector<Point> points) {
+double hullArea(std::vector<Point2> points) {
   std::ranges::sort(points,
-                    [](const Point& a, const Point& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
-  const auto cross = [](const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.x(); };
+                    [](const Point2& a, const Point2& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
+  const auto cross = [](const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); };
   double area = 0;
   // The lower and the upper chain of the hull: Andrew's monotone chain.
   for (int chain = 0; chain < 2; ++chain) {
-    std::vector<Point> hull;
-    for (const Point& p : points) {
+    std::vector<Point2> hull;
+    for (const Point2& p : points) {
       while (hull.size() > 1 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0) hull.pop_back();
       hull.push_back(p);
     }
@@ -61,7 +61,7 @@ double baseArea(const Field& field, const Box& box, int axis) {
       for (int j = 0; j < kSamples; ++j)
         plane[std::size_t(i) * kSamples + j] = pointAt(axis, height, at(i, first), at(j, second));
     field.values(plane, values);
-    std::vector<Point> inside;
+    std::vector<Point2> inside;
     for (std::size_t i = 0; i < plane.size(); ++i)
       if (values[i] < between) inside.emplace_back(plane[i][first], plane[i][second]);
     if (!inside.empty()) return hullArea(std::move(inside));
@@ -71,7 +71,7 @@ double baseArea(const Field& field, const Box& box, int axis) {
 
 double baseArea(const TriangleMesh& mesh, const Box& box, int axis) {
   const double height = box.min()[axis] + kHeight * box.diagonal().norm();
-  std::vector<Point> base;
+  std::vector<Point2> base;
   for (const Vector3& vertex : mesh.vertices)
     if (vertex[axis] <= height) base.emplace_back(vertex[(axis + 1) % 3], vertex[(axis + 2) % 3]);
   return hullArea(std::move(base));

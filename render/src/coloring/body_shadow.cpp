@@ -10,11 +10,11 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr int kMapSize = 2048;        // pixels of the lamp's view along each side
-constexpr double kLargestCaster = 3;  // of the bodies that throw shadows, in lengths of the scene
-constexpr int kTapsAcross = 7;        // samples of the lamp's view at a point, along each side of a square
-constexpr double kBorder = 0.004;     // half the width of a shadow's border, in lengths of the scene
-constexpr double kClearance = 2;      // pixels of the lamp's view by which a point is lifted off its own surface
+constexpr int kMapSize = 2048;           // pixels of the lamp's view along each side
+constexpr double kLargestCaster = 3;     // of the bodies that throw shadows, in lengths of the scene
+constexpr int kTapsAcross = 7;           // samples of the lamp's view at a point, along each side of a square
+constexpr double kShadowBorder = 0.004;  // half the width of a shadow's border, in lengths of the scene
+constexpr double kClearance = 2;         // pixels of the lamp's view by which a point is lifted off its own surface
 
 /// The bodies that throw shadows, as the lamp sees them.
 class LampView {
@@ -34,7 +34,7 @@ class LampView {
     camera_ = {box.center() + 1.01 * half * toKey, -toKey, half * across, half * toKey.cross(across),
                Projection::orthographic};
     pixel_ = 2 * half / kMapSize;
-    step_ = kBorder * extent / pixel_ / (kTapsAcross / 2);
+    step_ = kShadowBorder * extent / pixel_ / (kTapsAcross / 2);
     map_ = renderer.view(camera_, casters, kMapSize, kMapSize);
   }
 

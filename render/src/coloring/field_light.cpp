@@ -9,6 +9,7 @@
 #include <span>
 
 #include "hpsdf/types.h"
+#include "image/color.h"
 
 namespace hpsdf::render {
 namespace {
@@ -25,6 +26,7 @@ constexpr int kMostShadowSteps = 80;
 constexpr double kAround = 0.1;        // rays to the lamp are followed within this distance of the solid's box
 constexpr double kLampRadius = 0.13;   // tangent of the angle under which half of the lamp is seen
 constexpr double kGroundReach = 1.25;  // the ground is darkened up to this distance from the solid's middle
+constexpr double kFadesFrom = 0.8;     // share of the view's width from which on the shadow on the ground fades
 constexpr int kRowsTogether = 4;       // rows of samples whose points are evaluated together
 
 /// The distance to the solid that casts shadows, at many points at once.
@@ -141,7 +143,9 @@ class LightMeter {
     const Vector3 point = eye + t * ray;
     const double away = (point - ground_->middle).norm() / (kGroundReach * size_);
     if (!(away < 1)) return std::nullopt;
-    return Place{i, point, Vector3::Unit(ground_->axis), std::clamp(2 * away - 1, 0.0, 1.0)};
+    // Beside the view lies the legend, where no shadow falls.
+    const double atRightEdge = smoothStep(kFadesFrom, 1, (x + 0.5) / buffers_.width);
+    return Place{i, point, Vector3::Unit(ground_->axis), std::max(std::clamp(2 * away - 1, 0.0, 1.0), atRightEdge)};
   }
 
   void measureAmbient(const std::vector<Place>& places, FieldLight& light) const {

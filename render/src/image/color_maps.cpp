@@ -49,7 +49,7 @@ LinearColor greys(double t) { return Polar{0.20, 0, 0}.towards({0.725, 0, 0}, t)
 
 /// One half of a diverging map. Its colours from white to the end form a quadratic Bézier curve, whose control point is
 /// a light, saturated colour. The side is then visible even close to the middle.
-struct Side {
+struct HalfMap {
   Oklab middle, end;
 
   LinearColor at(double s) const {
@@ -58,7 +58,7 @@ struct Side {
   }
 };
 
-LinearColor diverging(const Side& inside, const Side& outside, double t) {
+LinearColor diverging(const HalfMap& inside, const HalfMap& outside, double t) {
   const double s = std::clamp(2 * t - 1, -1.0, 1.0);
   return s < 0 ? inside.at(-s) : outside.at(s);
 }

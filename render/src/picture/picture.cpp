@@ -374,7 +374,8 @@ Drawn drawSlice(Renderer& renderer, const Field& field, const SlicePicture& pict
   checkColor(picture.color, ColorBy::normal, reference);
   checkArrows(picture.arrows);
   const int samples = picture.samples;
-  const auto [width, height] = finishedSize(picture, frame);
+  const ViewSize size = finishedSize(picture, frame);
+  const int width = size.width, height = size.height;
   const SliceView view = sliceView(field, picture);
   Drawn drawn{.image = {},
               .view = view,
@@ -434,7 +435,8 @@ Drawn drawSurface(Renderer& renderer, const Field& field, const SurfacePicture& 
   checkColor(picture.color, ColorBy::distance, reference);
   checkArrows(picture.arrows);
   const int samples = picture.samples;
-  const auto [width, height] = finishedSize(picture, frame);
+  const ViewSize size = finishedSize(picture, frame);
+  const int width = size.width, height = size.height;
   Sampling sampling{samples, frame.lineWidth() * picture.form.pixelRatio, 1};
   Scene scene = renderScene(renderer, field, picture, reference.mesh, width, height, sampling.lineWidth);
   const ViewBuffers& buffers = scene.buffers;
