@@ -83,9 +83,10 @@ void writeCsv(const render::SliceView& view, const render::ViewBuffers& buffers,
 }
 
 /// Loads the field of a call, draws the picture whose settings are `settings(arguments, box)`, and makes it the
-/// session's picture, with shapes if the output is a vector file. Returns the settings.
+/// session's picture, with shapes if it is for the vector file `file`. Returns the settings.
 template <typename Settings, typename Draw>
-auto drawForSession(Session& session, const Arguments& arguments, const Settings& settings, const Draw& draw) {
+auto drawForSession(Session& session, const Arguments& arguments, const std::string& file, const Settings& settings,
+                    const Draw& draw) {
   const auto asked = settings(arguments, kAnyBox);  // throws `Error` for wrong arguments before the field is loaded
   const Backend chosen = backend(arguments);
   useField(session, arguments);
@@ -93,16 +94,21 @@ auto drawForSession(Session& session, const Arguments& arguments, const Settings
   render::Renderer& renderer = session.renderer(chosen);
   const Field& field = session.current().field;
   auto picture = settings(arguments, shownBox(field));
-  picture.form.vectors = render::isVectorFile(arguments.text("output"));
+  picture.form.vectors = render::isVectorFile(file);
   session.setPicture(draw(renderer, field, picture, reference));
   return picture;
 }
 
-render::Image slicedImage(Session& session, const Arguments& arguments) {
+/// Draws the slice of a call and makes it the session's picture. `file` is the file for which it is drawn, or "".
+void drawSliceFor(Session& session, const Arguments& arguments, const std::string& file) {
   const render::SlicePicture asked = slicePicture(arguments);
   render::checkPictureSize(asked.width, asked.height, asked.samples);
   const auto settings = [](const Arguments& given, const Box& box) { return slicePicture(given, box); };
-  drawForSession(session, arguments, settings, render::drawSlice);
+  drawForSession(session, arguments, file, settings, render::drawSlice);
+}
+
+render::Image slicedImage(Session& session, const Arguments& arguments) {
+  drawSliceFor(session, arguments, "");
   return session.picture().image;
 }
 
@@ -117,7 +123,7 @@ void runSlice(Session& session, const Arguments& arguments) {
   const Backend chosen = backend(arguments);
   checkWritable(file);
   if (format == SliceFormat::picture) {
-    slicedImage(session, arguments);
+    drawSliceFor(session, arguments, file);
     const render::Drawn& drawn = session.picture();
     savePicture(drawn.image, drawn.vectors, file);
     picture.width = drawn.image.width;
@@ -143,10 +149,15 @@ void runSlice(Session& session, const Arguments& arguments) {
   reportPicture(session, arguments, file, picture.width, picture.height, session.lastRenderer());
 }
 
-render::Image renderedImage(Session& session, const Arguments& arguments) {
+/// Draws the surface of a call and makes it the session's picture. `file` is the file for which it is drawn, or "".
+void drawSurfaceFor(Session& session, const Arguments& arguments, const std::string& file) {
   const auto settings = [](const Arguments& given, const Box& box) { return surfacePicture(given, box); };
-  const render::SurfacePicture picture = drawForSession(session, arguments, settings, render::drawSurface);
+  const render::SurfacePicture picture = drawForSession(session, arguments, file, settings, render::drawSurface);
   noteOddSurface(session.console(), session.current().field, picture, session.picture().seen);
+}
+
+render::Image renderedImage(Session& session, const Arguments& arguments) {
+  drawSurfaceFor(session, arguments, "");
   return session.picture().image;
 }
 
@@ -156,7 +167,8 @@ void runRender(Session& session, const Arguments& arguments) {
   surfacePicture(arguments);  // throws `Error` before any work, as `backend` does
   backend(arguments);
   checkWritable(file);
-  const render::Image image = renderedImage(session, arguments);
+  drawSurfaceFor(session, arguments, file);
+  const render::Image& image = session.picture().image;
   savePicture(image, session.picture().vectors, file);
   reportPicture(session, arguments, file, image.width, image.height, session.lastRenderer());
 }
