@@ -109,11 +109,12 @@ void report(Session& session, const Arguments& arguments, const Line& line, std:
   session.console().out << text << "\n";
 }
 
+/// Draws the plot of a line for the file `file`, or for no file if this is "".
 render::DrawnLine drawnLine(const Field& field, const Line& line, std::span<const double> exact,
-                            const Arguments& arguments) {
+                            const Arguments& arguments, const std::string& file) {
   const auto [width, height] = arguments.size("size");
   render::PictureForm form = pictureForm(arguments);
-  form.vectors = render::isVectorFile(arguments.text("output"));
+  form.vectors = render::isVectorFile(file);
   return render::drawLine(field, line, exact, width, height, form);
 }
 
@@ -121,7 +122,7 @@ render::Image drawProbe(Session& session, const Arguments& arguments) {
   useField(session, arguments);
   const Field& field = session.current().field;
   const Line line = lineOf(field, arguments);
-  return drawnLine(field, line, exactValues(session, arguments, line), arguments).image;
+  return drawnLine(field, line, exactValues(session, arguments, line), arguments, "").image;
 }
 
 void runProbe(Session& session, const Arguments& arguments) {
@@ -136,7 +137,7 @@ void runProbe(Session& session, const Arguments& arguments) {
   const Line line = lineOf(field, arguments);
   const std::vector<double> exact = exactValues(session, arguments, line);
   if (picture) {
-    const render::DrawnLine drawn = drawnLine(field, line, exact, arguments);
+    const render::DrawnLine drawn = drawnLine(field, line, exact, arguments, file);
     savePicture(drawn.image, drawn.vectors, file);
   } else {
     writeTable(line, exact, file);
