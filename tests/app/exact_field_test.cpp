@@ -50,6 +50,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"build", "build builtin:box strategy=hpx target-error=1e-3 grid=3 output=$out/f.hpsdf"},
     // The result has no exact leaves, so that it is not saved where the fields of a trial must have some.
     {"combine", "combine \"union($field, offset(builtin:box, 0.1))\" target-error=1e-2; expect at(0,0,0).value < -0.1"},
+    {"open", "open $field; expect stats.exact_leaves.leaves > 0"},
     {"load", "load $field; expect stats.exact_leaves.leaves > 0"},
     {"save", "save output=$out/f.hpsdf"},
     {"save", "save output=$out/f.hpsdf compress=true; load $out/f.hpsdf; expect stats.exact_leaves.leaves > 0"},
