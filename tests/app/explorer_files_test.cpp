@@ -7,8 +7,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "commands/commands.h"
 #include "explorer/explorer.h"
+#include "explorer_bench.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "language/script.h"
@@ -24,24 +24,10 @@ using ::testing::Not;
 
 constexpr const char* kSphere = "build analytic:sphere target-error=1e-2; show cpu=true size=900x600\n";
 
-/// An explorer with its own session, and a folder of files.
-struct Bench {
+/// An explorer with a folder of files.
+struct Bench : ExplorerBench {
   support::TemporaryDirectory folder;
-  Registry registry = makeRegistry();
-  std::istringstream in;
-  std::ostringstream out, err;
-  Session session{registry, Console{in, out, err}};
 
-  Explorer& explorer() { return explorerOf(session); }
-  void run(const std::string& script) { runScript(session, parseScript(registry, "test", script, {})); }
-  std::string failure(const std::string& script) {
-    try {
-      run(script);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "nothing failed";
-  }
   std::string file(const std::string& name) const { return (folder.path() / name).string(); }
   void key(Key key, bool control = false) {
     explorer().input({.kind = Input::Kind::key, .key = key, .control = control});

@@ -10,8 +10,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "commands/commands.h"
 #include "explorer/exact_outline.h"
+#include "explorer_bench.h"
 #include "hpsdf/error.h"
 #include "hpsdf/mesh_file.h"
 #include "language/script.h"
@@ -26,32 +26,10 @@ namespace explorer_test {
 
 using ::testing::HasSubstr;
 
-/// An explorer with its own session and without a terminal.
-struct Bench {
-  Registry registry = makeRegistry();
-  std::istringstream in;
-  std::ostringstream out, err;
-  Session session{registry, Console{in, out, err}};
-
-  void run(const std::string& script) { runScript(session, parseScript(registry, "test", script, {})); }
-  Explorer& explorer() { return explorerOf(session); }
-  const ViewState& view() { return explorer().view(); }
-  std::string failure(const std::string& script) {
-    try {
-      run(script);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "nothing failed";
-  }
-};
+using Bench = ExplorerBench;
 
 constexpr const char* kTorus =
     "build analytic:torus target-error=1e-4 estimator=embedded; show cpu=true size=900x600\n";
-
-bool same(const render::Image& a, const render::Image& b) {
-  return a.width == b.width && a.height == b.height && a.pixels == b.pixels;
-}
 
 TEST(Explorer, aCopiedViewIsRestoredExactly) {
   Bench bench;

@@ -6,9 +6,9 @@
 #include <set>
 #include <sstream>
 
-#include "commands/commands.h"
 #include "explorer/explorer.h"
 #include "explorer/explorer_commands.h"
+#include "explorer_bench.h"
 #include "hpsdf/error.h"
 #include "language/script.h"
 #include "pictures/up_axis.h"
@@ -22,18 +22,9 @@ using ::testing::IsEmpty;
 
 constexpr const char* kSphere = "build analytic:sphere target-error=1e-2 ; show cpu=true size=900x600\n";
 
-/// An explorer with its own session and without a terminal.
-struct Bench {
+struct Bench : ExplorerBench {
   explicit Bench(const std::string& script = kSphere) { run(script); }
 
-  Registry registry = makeRegistry();
-  std::istringstream in;
-  std::ostringstream out, err;
-  Session session{registry, Console{in, out, err}};
-
-  void run(const std::string& script) { runScript(session, parseScript(registry, "test", script, {})); }
-  Explorer& explorer() { return explorerOf(session); }
-  const ViewState& view() { return explorer().view(); }
   const std::string& focus() { return explorer().ui().focus(); }
   void key(Key key, bool shift = false) { explorer().input({.kind = Input::Kind::key, .key = key, .shift = shift}); }
   void type(const std::string& text) { explorer().input({.kind = Input::Kind::type, .text = text}); }
@@ -42,17 +33,7 @@ struct Bench {
     for (int i = 0; i < 200 && focus() != path; ++i) key(Key::tab);
     ASSERT_EQ(focus(), path);
   }
-  std::string failure(const std::string& script) {
-    try {
-      run(script);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "nothing failed";
-  }
 };
-
-bool same(const render::Image& a, const render::Image& b) { return a.pixels == b.pixels; }
 
 /// Returns the paths of the controls that take input.
 std::set<std::string> controls(Bench& bench) {

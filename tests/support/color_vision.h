@@ -1,5 +1,5 @@
 #pragma once
-// How different colours look, to readers with normal and with deficient colour vision.
+// Differences of colours as they look to readers with normal and with deficient colour vision.
 
 #include <algorithm>
 #include <array>

@@ -4,6 +4,7 @@
 #include "console/version.h"
 #include "files/html_page.h"
 #include "files/text_file.h"
+#include "hpsdf/render/markup.h"
 #include "text/json.h"
 #include "text/text.h"
 
@@ -101,10 +102,10 @@ std::string pictures(const CheckedItem& item) {
 }
 
 std::string swatch(const std::string& value) {
-  const std::string color = value.starts_with('#')
-                                ? fmt::format("<i class=\"color\" style=\"background:{}\"></i>", htmlEscaped(value))
-                                : std::string();
-  return color + htmlEscaped(value);
+  const std::string color = value.starts_with('#') ? fmt::format("<i class=\"color\" style=\"background:{}\"></i>",
+                                                                 render::escapedMarkup(value))
+                                                   : std::string();
+  return color + render::escapedMarkup(value);
 }
 
 std::string worstDifferences(const CheckedItem& item) {
@@ -112,8 +113,9 @@ std::string worstDifferences(const CheckedItem& item) {
   std::string html =
       "<table>\n<tr><th>The worst, from the top left</th><th>baseline</th><th>actual</th><th>difference</th></tr>\n";
   for (const WorstDifference& worst : item.worst)
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", htmlEscaped(worst.position),
-                        swatch(worst.baseline), swatch(worst.actual), htmlEscaped(worst.difference));
+    html +=
+        fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", render::escapedMarkup(worst.position),
+                    swatch(worst.baseline), swatch(worst.actual), render::escapedMarkup(worst.difference));
   return html + "</table>\n";
 }
 
@@ -132,8 +134,8 @@ std::string checkCommand(const CheckRequest& request) {
 }
 
 std::string failure(const CheckedItem& item, const CheckRequest& request) {
-  std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", htmlEscaped(item.title()),
-                                 verdictText(item.verdict), htmlEscaped(item.problem));
+  std::string html = fmt::format("<h2 class=\"failure\">{}: {}</h2>\n<p>{}</p>\n", render::escapedMarkup(item.title()),
+                                 verdictText(item.verdict), render::escapedMarkup(item.problem));
   html += pictures(item);
   if (!item.live.empty())
     html += "<details class=\"live\">\n<summary>Look into the field that drew the actual picture</summary>\n" +
@@ -146,13 +148,14 @@ std::string failure(const CheckedItem& item, const CheckRequest& request) {
   html += "<table>\n";
   for (const auto& [name, value] : facts)
     if (!value.empty()) html += htmlFact(name, value);
-  html += fmt::format("</table>\n<code>{} --only {}</code>\n", htmlEscaped(checkCommand(request)),
-                      htmlEscaped(shellWord(item.script)));
+  html += fmt::format("</table>\n<code>{} --only {}</code>\n", render::escapedMarkup(checkCommand(request)),
+                      render::escapedMarkup(shellWord(item.script)));
   const bool canBeAccepted = item.controlLine == 0 && !item.picture.empty() && fs::exists(item.actual);
   if (canBeAccepted)
-    html += fmt::format("<p>If it is right now:</p>\n<code>{}</code>\n",
-                        htmlEscaped(fmt::format("hpsdf accept {} --from {} {}", shellWord(request.folder.string()),
-                                                shellWord(request.output.string()), shellWord(item.name()))));
+    html += fmt::format(
+        "<p>If it is right now:</p>\n<code>{}</code>\n",
+        render::escapedMarkup(fmt::format("hpsdf accept {} --from {} {}", shellWord(request.folder.string()),
+                                          shellWord(request.output.string()), shellWord(item.name()))));
   return html;
 }
 
@@ -163,8 +166,8 @@ std::string overview(const CheckOutcome& outcome) {
   for (const CheckedItem& item : outcome.items)
     html += fmt::format(
         "<tr{}><td>{}</td><td>{}</td><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{:.3g}</td></tr>\n",
-        item.verdict == Verdict::passed ? "" : " class=\"failed\"", htmlEscaped(item.script),
-        htmlEscaped(item.pictureText()), verdictText(item.verdict), grouped(item.differing), item.largest);
+        item.verdict == Verdict::passed ? "" : " class=\"failed\"", render::escapedMarkup(item.script),
+        render::escapedMarkup(item.pictureText()), verdictText(item.verdict), grouped(item.differing), item.largest);
   return html + "</table>\n";
 }
 
@@ -174,7 +177,7 @@ std::string xmlText(const std::string& text) {
   for (char& c : printable)
     if (static_cast<unsigned char>(c) < 0x20) c = ' ';
   const std::string valid = Json(printable).dump(-1, ' ', false, Json::error_handler_t::replace);
-  return htmlEscaped(Json::parse(valid).get<std::string>());
+  return render::escapedMarkup(Json::parse(valid).get<std::string>());
 }
 
 std::string junitCase(const CheckedItem& item) {
@@ -196,7 +199,7 @@ std::string checkHtml(const CheckOutcome& outcome, const CheckRequest& request) 
   std::string html = htmlHead("Check of " + request.folder.string(), subtitle,
                               std::string(kPictureRowStyle) + std::string(kLiveStyle) + std::string(kCheckStyle));
   html += "<h2>All comparisons</h2>\n" + overview(outcome);
-  html += fmt::format("<code>{}</code>\n", htmlEscaped(checkCommand(request)));
+  html += fmt::format("<code>{}</code>\n", render::escapedMarkup(checkCommand(request)));
   for (const CheckedItem& item : outcome.items)
     if (item.verdict != Verdict::passed) html += failure(item, request);
   return html + std::string(kPictureRowScript) + std::string(kLensScript) + std::string(kLiveScript) +

@@ -9,6 +9,7 @@
 #include "files/html_page.h"
 #include "files/svg_chart.h"
 #include "hpsdf/detail/memory.h"
+#include "hpsdf/render/markup.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -152,17 +153,17 @@ std::string figuresHtml(const FieldComparison& comparison) {
   std::string html;
   for (std::size_t n = 0; n < comparison.fields.size(); ++n)
     html += fmt::format("<p class=\"key\">{}{}&ensp;{}</p>\n", swatchHtml(n), comparison.fields[n].letter,
-                        htmlEscaped(comparison.fields[n].file));
+                        render::escapedMarkup(comparison.fields[n].file));
   html += "<div class=\"wide-table\"><table class=\"figures\">\n<tr><th></th>" + letterCells(comparison) + "</tr>\n";
   for (const FigureRow& row : rowsOf(comparison)) {
     const std::string label(row.label);
-    html += fmt::format("<tr><th>{}{}</th>", label.starts_with(' ') ? "&emsp;" : "", htmlEscaped(label));
+    html += fmt::format("<tr><th>{}{}</th>", label.starts_with(' ') ? "&emsp;" : "", render::escapedMarkup(label));
     for (const FieldFigures& figures : comparison.fields)
-      html += fmt::format("<td>{}</td>", htmlEscaped(cellText(row, comparison, figures)));
+      html += fmt::format("<td>{}</td>", render::escapedMarkup(cellText(row, comparison, figures)));
     html += "</tr>\n";
   }
-  html += "</table></div>\n<p>" + htmlEscaped(pointsText(comparison) + ".");
-  if (comparison.options.times) html += " " + htmlEscaped(std::string(kTimesNote));
+  html += "</table></div>\n<p>" + render::escapedMarkup(pointsText(comparison) + ".");
+  if (comparison.options.times) html += " " + render::escapedMarkup(std::string(kTimesNote));
   return html + "</p>\n";
 }
 
@@ -192,8 +193,9 @@ std::string viewHtml(const FieldComparison& comparison, const ComparedView& view
     names.push_back(nameOf(comparison.fields[n]));
     row.push_back({names.back(), view.pngs[n]});
   }
-  std::string html = fmt::format("<h2>{}</h2>\n<p>{}</p>\n", htmlEscaped(view.title),
-                                 htmlEscaped(view.caption + (view.showsLength ? ", in " + comparison.unit : "") + "."));
+  std::string html =
+      fmt::format("<h2>{}</h2>\n<p>{}</p>\n", render::escapedMarkup(view.title),
+                  render::escapedMarkup(view.caption + (view.showsLength ? ", in " + comparison.unit : "") + "."));
   if (!view.legend.empty()) html += fmt::format("<p class=\"legend\">{}</p>\n", view.legend);
   return html + pictureRow(row) + pictureSlider(names);
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "hpsdf/field.h"
+#include "hpsdf/render/markup.h"
 
 namespace hpsdf::app {
 namespace {
@@ -49,8 +50,8 @@ std::string levels(const std::string& title, const std::map<int, double>& shares
     rows += fmt::format(
         "<tr><th>{}</th><td class=\"share\">{}</td><td class=\"bar\"><span "
         "style=\"width:{:.2f}%\"></span></td></tr>\n",
-        levelName(level), htmlEscaped(shareText(share)), 100 * share);
-  return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", htmlEscaped(title), rows);
+        levelName(level), render::escapedMarkup(shareText(share)), 100 * share);
+  return fmt::format("<div>\n<h2>{}</h2>\n<table>\n{}</table>\n</div>\n", render::escapedMarkup(title), rows);
 }
 
 /// Returns a path as an address in HTML.
@@ -67,8 +68,8 @@ std::string addressOf(const std::string& path) {
 std::string figure(const ReportPicture& picture) {
   return fmt::format(
       "<figure>\n<img src=\"{0}\" alt=\"{1}\">\n<figcaption><b>{1}</b>{2}\n<code>{3}</code></figcaption>\n</figure>\n",
-      htmlEscaped(picture.file), htmlEscaped(picture.title), htmlEscaped(picture.caption),
-      htmlEscaped(picture.command));
+      render::escapedMarkup(picture.file), render::escapedMarkup(picture.title), render::escapedMarkup(picture.caption),
+      render::escapedMarkup(picture.command));
 }
 
 }  // namespace
@@ -126,17 +127,17 @@ std::string pictureRow(const std::vector<PagePicture>& pictures) {
   std::string html = "<div class=\"pictures\">\n";
   for (const PagePicture& picture : pictures)
     html += fmt::format("<figure><img src=\"{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
-                        htmlPng(picture.png), htmlEscaped(picture.title));
+                        htmlPng(picture.png), render::escapedMarkup(picture.title));
   return html + "</div>\n";
 }
 
 std::string pictureSlider(const std::vector<std::string>& names) {
   const auto side = [&](std::size_t shown) {
-    if (names.size() == 2) return htmlEscaped(names[shown]);
+    if (names.size() == 2) return render::escapedMarkup(names[shown]);
     std::string options;
     for (std::size_t n = 0; n < names.size(); ++n)
-      options +=
-          fmt::format("<option value=\"{}\"{}>{}</option>", n, n == shown ? " selected" : "", htmlEscaped(names[n]));
+      options += fmt::format("<option value=\"{}\"{}>{}</option>", n, n == shown ? " selected" : "",
+                             render::escapedMarkup(names[n]));
     return "<select>" + options + "</select>";
   };
   return fmt::format(
@@ -147,40 +148,10 @@ std::string pictureSlider(const std::vector<std::string>& names) {
       side(0), side(1));
 }
 
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t n = 0; n < bytes.size(); n += 3) {
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8 | (n + k < bytes.size() ? static_cast<unsigned char>(bytes[n + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k) text += n + k > bytes.size() ? '=' : kDigits[group >> (18 - 6 * k) & 63];
-  }
-  return text;
-}
-
-std::string htmlPng(std::string_view bytes) { return "data:image/png;base64," + base64(bytes); }
-
-std::string htmlEscaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&')
-      result += "&amp;";
-    else if (c == '<')
-      result += "&lt;";
-    else if (c == '>')
-      result += "&gt;";
-    else if (c == '"')
-      result += "&quot;";
-    else
-      result += c;
-  }
-  return result;
-}
+std::string htmlPng(std::string_view bytes) { return "data:image/png;base64," + render::base64(bytes); }
 
 std::string htmlFact(const std::string& name, const std::string& value) {
-  return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", htmlEscaped(name), htmlEscaped(value));
+  return fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", render::escapedMarkup(name), render::escapedMarkup(value));
 }
 
 std::string htmlHead(const std::string& title, const std::string& subtitle, std::string_view moreStyle) {
@@ -188,11 +159,11 @@ std::string htmlHead(const std::string& title, const std::string& subtitle, std:
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}{2}</style>\n</head>\n<body>\n<h1>{0}</h1>\n<p class=\"subtitle\">{3}</p>\n",
-      htmlEscaped(title), kStyle, moreStyle, htmlEscaped(subtitle));
+      render::escapedMarkup(title), kStyle, moreStyle, render::escapedMarkup(subtitle));
 }
 
 std::string htmlFoot(const std::string& footer) {
-  return fmt::format("<footer>{}</footer>\n</body>\n</html>\n", htmlEscaped(footer));
+  return fmt::format("<footer>{}</footer>\n</body>\n</html>\n", render::escapedMarkup(footer));
 }
 
 std::string reportHtml(const ReportPage& page) {
@@ -205,7 +176,7 @@ std::string reportHtml(const ReportPage& page) {
   html += "<h2>Figures</h2>\n<table>\n";
   for (const auto& [name, value] : page.figures) html += htmlFact(name, value);
   html += "</table>\n";
-  if (!page.buildCommand.empty()) html += fmt::format("<code>{}</code>\n", htmlEscaped(page.buildCommand));
+  if (!page.buildCommand.empty()) html += fmt::format("<code>{}</code>\n", render::escapedMarkup(page.buildCommand));
   html += "<h2>Pictures</h2>\n";
   for (const ReportPicture& picture : page.pictures) html += figure(picture);
   html += "<div class=\"columns\">\n" + levels("Volume by degree", page.degrees) +

@@ -62,14 +62,8 @@ std::string pictureRow(const std::vector<PagePicture>& pictures);
 /// two of them.
 std::string pictureSlider(const std::vector<std::string>& names);
 
-/// Returns bytes in base64 (RFC 4648).
-std::string base64(std::string_view bytes);
-
 /// Encodes the bytes of a PNG file as the source of an <img> element, so that the HTML page contains the
 /// picture.
 std::string htmlPng(std::string_view bytes);
-
-/// Escapes text for use between tags and in quoted attributes.
-std::string htmlEscaped(const std::string& text);
 
 }  // namespace hpsdf::app

@@ -18,6 +18,7 @@
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/render/blend_zone_bounds.h"
+#include "hpsdf/render/markup.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/web/page_template.h"
 #include "language/script.h"
@@ -94,7 +95,7 @@ std::string filled(std::string_view text, const Marks& marks) {
 
 std::string figure(const PagePicture& picture) {
   return fmt::format("<figure><img src=\"{0}\" alt=\"{1}\"><figcaption>{1}</figcaption></figure>\n",
-                     htmlPng(picture.png), htmlEscaped(picture.title));
+                     htmlPng(picture.png), render::escapedMarkup(picture.title));
 }
 
 /// Gives those of the files that have no name yet the name `nameOf(file)` if it is that of no other file.
@@ -123,19 +124,21 @@ void FieldPage::add(const Field& field, const FieldInPage& described, const Prog
         ErrorKind::limit, described.name,
         fmt::format("with this field the page holds more than {}; write several pages", bytesText(kMostFieldBytes)));
   requireMemory("a page with these fields", 5 * bytes_, "write several pages");
-  const std::string view = described.view.empty() ? "" : fmt::format(" data-view=\"{}\"", htmlEscaped(described.view));
+  const std::string view =
+      described.view.empty() ? "" : fmt::format(" data-view=\"{}\"", render::escapedMarkup(described.view));
   fields_ += fmt::format("<script type=\"application/octet-stream\" class=\"field\" data-name=\"{}\"{}>",
-                         htmlEscaped(described.name), view);
-  fields_ += base64(compressed(payloadOf(field), progress));
+                         render::escapedMarkup(described.name), view);
+  fields_ += render::base64(compressed(payloadOf(field), progress));
   fields_ += "</script>\n";
   for (const PagePicture& picture : described.pictures) pictures_ += figure(picture);
 }
 
 std::string FieldPage::html(const std::string& title) const {
-  return filled(web::pageTemplate(), {{"{{title}}", htmlEscaped(title)},
-                                      {"{{fields}}", fields_},
-                                      {"{{pictures}}", pictures_},
-                                      {"{{program}}", base64(compressed(std::string(web::pageProgram()), {}))}});
+  return filled(web::pageTemplate(),
+                {{"{{title}}", render::escapedMarkup(title)},
+                 {"{{fields}}", fields_},
+                 {"{{pictures}}", pictures_},
+                 {"{{program}}", render::base64(compressed(std::string(web::pageProgram()), {}))}});
 }
 
 std::vector<PagePicture> fallbackPictures(render::Renderer& renderer, const Field& field, const std::string& name) {

@@ -14,6 +14,7 @@
 #include "files/output_folder.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
+#include "hpsdf/render/markup.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/verify.h"
 #include "language/script.h"
@@ -200,19 +201,19 @@ std::string htmlOf(const std::vector<TableRow>& rows) {
         fmt::format("<p class=\"legend\">{} {}</p>\n", kLevels[k].title, levelsSvg(rows.front().pictures[k].colors));
   std::string head;
   for (const auto& [name, value] : cellsOf(rows.front()))
-    head += fmt::format("<th{}>{}</th>", name == "mesh" ? "" : " class=\"figure\"", htmlEscaped(name));
+    head += fmt::format("<th{}>{}</th>", name == "mesh" ? "" : " class=\"figure\"", render::escapedMarkup(name));
   html += "<table>\n<tr>" + head + "<th>degrees, depths</th><th>slice by degree</th><th>by depth</th></tr>\n";
   for (const TableRow& row : rows) {
     html += "<tr>";
     for (const auto& [name, value] : cellsOf(row))
-      html += fmt::format("<td{}>{}</td>", name == "mesh" ? "" : " class=\"figure\"", htmlEscaped(value));
+      html += fmt::format("<td{}>{}</td>", name == "mesh" ? "" : " class=\"figure\"", render::escapedMarkup(value));
     html += fmt::format("<td>{}{}</td>", row.pictures[0].svg, row.pictures[1].svg);
     for (std::size_t k = 0; k < kLevels.size(); ++k)
       html +=
           fmt::format("<td><img src=\"{}\" alt=\"slice by {}\"></td>", htmlPng(row.pictures[k].png), kLevels[k].name);
     html += "</tr>\n";
   }
-  return html + fmt::format("</table>\n<p>{}</p>\n", htmlEscaped(kErrorsNote)) + htmlFoot(versionText());
+  return html + fmt::format("</table>\n<p>{}</p>\n", render::escapedMarkup(kErrorsNote)) + htmlFoot(versionText());
 }
 
 std::string textOf(const std::vector<TableRow>& rows) {

@@ -18,6 +18,7 @@
 #include "files/svg_chart.h"
 #include "hpsdf/detail/memory.h"
 #include "hpsdf/detail/output_file.h"
+#include "hpsdf/render/markup.h"
 #include "hpsdf/verify.h"
 #include "session/field_summary.h"
 #include "session/session.h"
@@ -312,13 +313,13 @@ svg.chart { display: block; max-width: 100%; height: auto; margin: 1rem 0; }
 )";
 
 std::string tradeoffSection(const Tradeoff& tradeoff) {
-  std::string html = fmt::format("<h2>{}</h2>\n<table>\n<tr>", htmlEscaped(tradeoff.mesh));
+  std::string html = fmt::format("<h2>{}</h2>\n<table>\n<tr>", render::escapedMarkup(tradeoff.mesh));
   for (const std::string& head : tradeoffHeads(tradeoff.range)) html += fmt::format("<th>{}</th>", head);
   html += "</tr>\n";
   for (const TradeoffPoint& point : tradeoff.points) {
     html += &point == tradeoff.best() ? "<tr class=\"chosen\">" : "<tr>";
     for (const std::string& cell : tradeoffCells(tradeoff.range, point))
-      html += fmt::format("<td>{}</td>", htmlEscaped(cell));
+      html += fmt::format("<td>{}</td>", render::escapedMarkup(cell));
     html += "</tr>\n";
   }
   html += "</table>\n";
@@ -327,8 +328,9 @@ std::string tradeoffSection(const Tradeoff& tradeoff) {
       "field. Time is that of the construction on this machine.{}</p>\n",
       shortNumber(tradeoff.points.front().measured.nearDistance),
       tradeoff.range.isOfTolerances() ? " A tolerance is kept if no cell and no point misses it." : "");
-  if (!tradeoff.recommendation.empty()) html += fmt::format("<p>{}</p>\n", htmlEscaped(tradeoff.recommendation));
-  if (tradeoff.recommended) html += fmt::format("<code>{}</code>\n", htmlEscaped(tradeoff.best()->command));
+  if (!tradeoff.recommendation.empty())
+    html += fmt::format("<p>{}</p>\n", render::escapedMarkup(tradeoff.recommendation));
+  if (tradeoff.recommended) html += fmt::format("<code>{}</code>\n", render::escapedMarkup(tradeoff.best()->command));
   return html + chartSvg(memoryChart(tradeoff)) + chartSvg(timeChart(tradeoff));
 }
 

@@ -205,13 +205,13 @@ class SurfaceLine {
   /// Draws the line over the colour `ground` of a sample at `distance` samples from the line's centre.
   LinearColor operator()(const LinearColor& ground, double distance) const {
     const LinearColor cased =
-        mix(ground, casing_, float(kSurfaceCasingStrength) * coverage(distance, kCasingWidth * thin_));
+        mix(ground, casing_, float(kLineCasingStrength) * coverage(distance, kCasingWidth * thin_));
     return mix(cased, line_, coverage(distance, kSurfaceWidth * thin_));
   }
 
  private:
   double thin_;
-  LinearColor line_ = decodeSrgb(kSurfaceLine), casing_ = decodeSrgb(kSurfaceCasing);
+  LinearColor line_ = decodeSrgb(kSurfaceLine), casing_ = decodeSrgb(kLineCasing);
 };
 
 /// The share of the backdrop's light that is left where the ground is in shadow.

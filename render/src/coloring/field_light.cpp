@@ -42,7 +42,7 @@ class Distances {
     clip_ = Clip{clip->axis, clip->offset, toEye[clip->axis] >= 0 ? 1.0 : -1.0};
   }
 
-  /// What the field says of points outside of its domain, where it does not know the distance.
+  /// The value for points outside of the domain, where the field does not know the distance.
   enum class Outside : std::uint8_t {
     asTheField,  ///< an upper bound, which hides no light
     lowerBound,  ///< a safe step for a ray
@@ -115,11 +115,11 @@ class LightMeter {
     for (int y = first; y < last; ++y)
       for (int x = 0; x < buffers_.width; ++x)
         if (const auto place = placeAt(x, y)) places.push_back(*place);
-    measureAmbient(places, light);
+    if (!light.open.empty()) measureAmbient(places, light);
     followKey(places, light);
     for (const Place& place : places) {
       if (place.fade == 0) continue;
-      light.open[place.sample] += float(place.fade) * (1 - light.open[place.sample]);
+      if (!light.open.empty()) light.open[place.sample] += float(place.fade) * (1 - light.open[place.sample]);
       light.lit[place.sample] += float(place.fade) * (1 - light.lit[place.sample]);
     }
   }
@@ -229,7 +229,8 @@ class LightMeter {
 }  // namespace
 
 FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, const Vector3& toKey) {
-  FieldLight light{std::vector<float>(buffers.cell.size(), 1), std::vector<float>(buffers.cell.size(), 1)};
+  FieldLight light{{}, std::vector<float>(buffers.cell.size(), 1)};
+  if (!caster.amongBodies) light.open.assign(buffers.cell.size(), 1);
   const LightMeter meter(caster, buffers, toKey);
   const int strips = (buffers.height + kRowsTogether - 1) / kRowsTogether;
   tbb::parallel_for(0, strips, [&](int strip) {

@@ -12,7 +12,7 @@ namespace hpsdf::render {
 
 /// The light at each sample of a view, 0 to 1. Samples that show neither the surface nor the ground have 1.
 struct FieldLight {
-  std::vector<float> open;  ///< share of the ambient light that reaches the point; empty without light of the field
+  std::vector<float> open;  ///< share of the ambient light that reaches the point; empty if it was not measured
   std::vector<float> lit;   ///< share of the key light that reaches the point; empty likewise
 };
 
@@ -21,7 +21,8 @@ struct ShadowCaster {
   const Field& field;
   SurfaceView view;
   UpAxis up = UpAxis::y;
-  bool onGround = false;  ///< if true, the solid stands on a plane, on which its shadow falls
+  bool onGround = false;     ///< if true, the solid stands on a plane, on which its shadow falls
+  bool amongBodies = false;  ///< if true, the ambient light is not measured: the field does not know what bodies take
 };
 
 /// Measures the light at the samples of `buffers`. `toKey` is the unit vector towards the key light.

@@ -9,12 +9,12 @@ constexpr Color kOutline = {18, 16, 38};  // outlines of cells
 constexpr Color kIsoLine = {24, 28, 44};
 constexpr Color kZeroLine = {10, 10, 20};
 constexpr Color kSurfaceLine = {255, 255, 255};
-constexpr Color kSurfaceCasing = {16, 14, 34};
+constexpr Color kLineCasing = {16, 14, 34};
 
 // The share, 0 to 1, of a line's colour where the line covers the ground.
 constexpr double kOutlineStrength = 0.62;
 constexpr double kIsoStrength = 0.42;
-constexpr double kSurfaceCasingStrength = 0.8;
+constexpr double kLineCasingStrength = 0.8;
 
 // The widths of lines are in multiples of a thin line's width.
 constexpr double kZeroWidth = 2.4;

@@ -120,7 +120,7 @@ Image withoutBackground(const Image& onWhite, const Image& onBlack) {
   Image image = onWhite;
   image.alpha.resize(image.pixels.size());
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    // What shines through is what differs; the channel in which most does decides, so that no colour is cut off.
+    // The two pictures differ by what shines through. The channel that differs most decides, lest a colour be cut off.
     int transparency = 0;
     for (std::size_t k = 0; k < 3; ++k)
       transparency = std::max(transparency, int(onWhite.pixels[i][k]) - int(onBlack.pixels[i][k]));

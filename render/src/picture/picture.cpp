@@ -303,16 +303,15 @@ SurfaceLook lookOf(const Field& field, const SurfacePicture& picture, const Scen
                    .bodies = materialsOf(picture.bodies),
                    .lightTilt = lightTiltOf(picture.camera.elevationDegrees)};
   if (!picture.shadows || !picture.surface) return look;
-  // What stands or lies beside the surface throws no shadow, so that a shadow on the ground would mislead.
-  const bool isAlone = !picture.plane && picture.cells.style == CellStyle::none && !picture.bodies.renderer;
-  const ShadowCaster caster{field, scene.view, picture.camera.up, isAlone};
+  // Planes and cells beside the surface throw no shadow, so that a shadow on the ground would mislead.
+  const bool hasBodies = picture.bodies.renderer != nullptr;
+  const bool isAlone = !picture.plane && picture.cells.style == CellStyle::none && !hasBodies;
+  const ShadowCaster caster{field, scene.view, picture.camera.up, isAlone, hasBodies};
   const Vector3 toKey = directionToKey(scene.view.camera, look.lightTilt);
   look.light = fieldLight(caster, scene.buffers, toKey);
-  if (picture.bodies.renderer) {
+  if (hasBodies)
     throwShadows(*picture.bodies.renderer, picture.bodies.bodies, scene.view, scene.buffers, toKey,
                  field.domain().diagonal().norm(), look.light.lit);
-    look.light.open.clear();  // the field knows nothing of the light that bodies take
-  }
   return look;
 }
 

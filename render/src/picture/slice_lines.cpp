@@ -9,6 +9,7 @@
 #include <string>
 
 #include "coloring/color_view.h"
+#include "coloring/line_style.h"
 #include "image/color.h"
 #include "image/strokes.h"
 #include "picture/cracks.h"
@@ -18,8 +19,6 @@ namespace hpsdf::render {
 namespace {
 
 constexpr int kOutlineBlock = 8;  // pixels along each side of a block in which an outline is searched
-constexpr Color kOutlineCasing = {16, 14, 34};
-constexpr float kOutlineCasingStrength = 0.8F;
 // Vector pictures are mixed in sRGB values instead of linear light: there, this opacity has the effect of the strength
 // on most colours.
 constexpr double kOutlineCasingOpacity = 0.6;
@@ -260,7 +259,7 @@ void paintSliceLines(Image& picture, const Field& field, const SliceView& view, 
     for (const FlatLine& line :
          dashedOutline(*reference.outlined[n].distance, field, view, part, width, height, lineWidth))
       distances.add(line);
-    distances.paint(picture, kOutlineCasing, halfWidth + border, kOutlineCasingStrength);
+    distances.paint(picture, kLineCasing, halfWidth + border, float(kLineCasingStrength));
     distances.paint(picture, outlineColor(n), halfWidth, 1);
   }
   if (reference.mesh.mesh != nullptr)
@@ -277,7 +276,7 @@ std::vector<VectorShape> sliceLineShapes(const Field& field, const SliceView& vi
         kOutlineWidth * lineWidth, outlineColor(n), 1, true};
     StrokedShape casing = line;
     casing.width += 2 * kOutlineCasingBorder * lineWidth;
-    casing.color = kOutlineCasing;
+    casing.color = kLineCasing;
     casing.opacity = kOutlineCasingOpacity;
     shapes.emplace_back(std::move(casing));
     shapes.emplace_back(std::move(line));

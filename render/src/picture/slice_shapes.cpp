@@ -149,12 +149,12 @@ VectorLayer isoLineLayer(const SliceContent& slice, const Eigen::AlignedBox2d& w
 /// Returns the line along which the plane meets the field's surface, with its casing.
 VectorLayer surfaceLayer(const SliceContent& slice, const Eigen::AlignedBox2d& window) {
   std::vector<Polyline> lines = contourLines(slice.buffers, slice.sampling.samples, 0);
-  MatchingOpacity opacity(kSurfaceCasing, kSurfaceCasingStrength);
+  MatchingOpacity opacity(kLineCasing, kLineCasingStrength);
   for (const Polyline& line : lines)
     for (const Eigen::Vector2d& point : line) opacity.add(groundAt(slice.ground, point));
   const double thin = slice.sampling.lineWidth;
   return {"surface",
-          {StrokedShape{lines, kCasingWidth * thin, kSurfaceCasing, opacity.best(), true},
+          {StrokedShape{lines, kCasingWidth * thin, kLineCasing, opacity.best(), true},
            StrokedShape{std::move(lines), kSurfaceWidth * thin, kSurfaceLine, 1, true}},
           window};
 }

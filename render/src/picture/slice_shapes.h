@@ -12,7 +12,7 @@
 
 namespace hpsdf::render {
 
-/// What a slice shows.
+/// The content of a slice: its cells and colours, and where they lie in the picture.
 struct SliceContent {
   const Field& field;
   const SliceView& view;

@@ -23,7 +23,7 @@ class Samples {
     if (!buffers_.covered(a)) return false;
     const Eigen::Vector3f &na = buffers_.normal[a], &nb = buffers_.normal[b];
     if (na.dot(nb) < kLeastCosine) return true;
-    const Vector3 step = pointOf(x1, y1, b) - pointOf(x0, y0, a);
+    const Vector3 step = pointAt(view_, buffers_, x1, y1) - pointAt(view_, buffers_, x0, y0);
     const double sample =
         pixelSize(view_.camera, std::min(buffers_.distance[a], buffers_.distance[b]), buffers_.height);
     const double least = kLeastRise * sample * std::max(std::abs(x1 - x0), std::abs(y1 - y0));
@@ -32,12 +32,6 @@ class Samples {
 
  private:
   std::size_t index(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
-
-  /// The point that a sample shows, also if it shows a body.
-  Vector3 pointOf(int x, int y, std::size_t i) const {
-    return pixelEye(view_.camera, x, y, buffers_.width, buffers_.height) +
-           double(buffers_.distance[i]) * pixelRay(view_.camera, x, y, buffers_.width, buffers_.height);
-  }
 
   const SurfaceView& view_;
   const ViewBuffers& buffers_;

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "hpsdf/render/markup.h"
 #include "hpsdf/render/vector_picture.h"
 #include "image/text.h"
 
@@ -38,34 +39,6 @@ std::string colorText(Color color) {
   for (const std::uint8_t channel : color) {
     text += kDigits[channel / 16];
     text += kDigits[channel % 16];
-  }
-  return text;
-}
-
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char letter : text)
-    if (letter == '&')
-      result += "&amp;";
-    else if (letter == '<')
-      result += "&lt;";
-    else if (letter == '>')
-      result += "&gt;";
-    else if (letter == '"')
-      result += "&quot;";
-    else
-      result += letter;
-  return result;
-}
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : kLetters[bits >> (18 - 6 * k) & 63];
   }
   return text;
 }
@@ -169,7 +142,7 @@ class SvgWriter {
       place += attribute("transform",
                          "rotate(" + numberText(-shape.rotation) + " " + numberText(x) + " " + numberText(y) + ")");
     return "<text" + place + attribute("font-size", shape.size) + attribute("fill", paint(shape.color)) + ">" +
-           escaped(lettersOf(shape.text)) + (shape.title.empty() ? std::string() : titleText(shape.title)) +
+           escapedMarkup(lettersOf(shape.text)) + (shape.title.empty() ? std::string() : titleText(shape.title)) +
            "</text>\n";
   }
 
@@ -190,7 +163,9 @@ class SvgWriter {
     return letters;
   }
 
-  static std::string titleText(const std::string& title) { return "<title>" + escaped(lettersOf(title)) + "</title>"; }
+  static std::string titleText(const std::string& title) {
+    return "<title>" + escapedMarkup(lettersOf(title)) + "</title>";
+  }
 
   std::optional<Color> ink_;
 };

@@ -148,7 +148,7 @@ struct ViewBuffers {
 };
 
 /// Returns the point, in world units, that a pixel shows. The point of a `SurfaceView` is defined only if
-/// `buffers.hit` is true for the pixel.
+/// `buffers.covered` is true for the pixel.
 Vector3 pointAt(const SliceView& view, const ViewBuffers& buffers, int x, int y);
 Vector3 pointAt(const SurfaceView& view, const ViewBuffers& buffers, int x, int y);
 
