@@ -3,19 +3,26 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
+#include "coloring/body_shadow.h"
 #include "coloring/field_light.h"
 #include "coloring/surface_shader.h"
 #include "hpsdf/build.h"
 #include "hpsdf/exact_distance.h"
+#include "hpsdf/render/bodies.h"
 #include "hpsdf/render/compare.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/render/renderer.h"
 #include "hpsdf/shapes.h"
+#include "scene/body_view.h"
 #include "scene/feature_edges.h"
+#include "view/view_buffers.h"
 
 namespace hpsdf::render {
 namespace light_test {
@@ -40,7 +47,7 @@ struct Lit {
 
 Lit lit(const Field& field, const SurfaceView& view) {
   Lit result{view, makeCpuRenderer(field)->surface(view, kWidth, kHeight), {}, directionToKey(view.camera, 0)};
-  result.light = fieldLight({field, result.view, UpAxis::y, true}, result.buffers, result.toKey);
+  result.light = fieldLight({field, result.view, UpAxis::y, true}, result.buffers, 1, result.toKey);
   return result;
 }
 
@@ -102,6 +109,29 @@ TEST(FieldLight, leavesASphereOpenAndLitWhereItFacesTheLamp) {
   EXPECT_GT(away, 100);
 }
 
+TEST(FieldLight, isMeasuredOnceForAnEvenPixelAndSampleBySampleAtBorders) {
+  const Lit scene = litSphere();
+  const ShadowCaster caster{fieldOf("sphere"), scene.view, UpAxis::y, true};
+  const FieldLight shared = fieldLight(caster, scene.buffers, 2, scene.toKey);
+  int even = 0, different = 0;
+  for (int y = 0; y < kHeight; y += 2)
+    for (int x = 0; x < kWidth; x += 2) {
+      const std::size_t first = std::size_t(y) * kWidth + x;
+      const std::array<std::size_t, 4> samples = {first, first + 1, first + kWidth, first + kWidth + 1};
+      const auto hits = std::ranges::count_if(samples, [&](std::size_t i) { return scene.buffers.hit(i); });
+      for (const std::size_t i : samples) {
+        if (hits == 0 || hits == 4) {
+          even += i != first && shared.lit[i] == shared.lit[first];
+          different += std::abs(shared.lit[i] - scene.light.lit[i]) > 0.15;
+        } else {
+          EXPECT_EQ(shared.lit[i], scene.light.lit[i]) << x << ", " << y;
+        }
+      }
+    }
+  EXPECT_GT(even, kWidth * kHeight * 7 / 10);
+  EXPECT_LT(different, kWidth * kHeight / 50);
+}
+
 TEST(FieldLight, isLessAmbientInTheHoleOfATorusThanOnItsOutside) {
   const Field& field = fieldOf("torus,major=1,minor=0.8");
   OrbitCamera orbit;
@@ -141,6 +171,51 @@ TEST(FieldLight, doesNotCountWhatAClippingPlaneRemoves) {
     EXPECT_GT(cap.light.lit[i], whole.light.lit[i] + 0.5);
   });
   EXPECT_GT(freed, 20);
+}
+
+/// A plate on z = 0 with a ball above it, seen from above by parallel rays.
+struct BallAbovePlate {
+  std::unique_ptr<BodyRenderer> renderer =
+      makeCpuBodyRenderer({shapes::mesh("sphere,radius=0.2"), shapes::mesh("box,width=2,height=2,depth=0.1")});
+  std::vector<Body> bodies = {Body{0}, Body{1}};
+  SurfaceView view;
+  ViewBuffers buffers = emptyBuffers(kWidth, kHeight, true);
+  Vector3 toKey = Vector3(1, 0, 1).normalized();
+
+  BallAbovePlate() {
+    bodies[0].worldFromBody.translation() = Vector3(0, 0, 0.6);
+    view.camera = {Vector3(0, 0, 4), -Vector3::UnitZ(), 1.6 * Vector3::UnitX(), 1.2 * Vector3::UnitY(),
+                   Projection::orthographic};
+    addBodies(renderer->view(view.camera, bodies, kWidth, kHeight), buffers);
+  }
+
+  /// Returns the light at the point of the plate with these coordinates; `extent` is the length of the scene.
+  float litAt(double x, double y, double extent) {
+    std::vector<float> lit(buffers.cell.size(), 1);
+    throwShadows(*renderer, bodies, view, buffers, toKey, extent, lit);
+    const PicturePoint at = project(view.camera, Vector3(x, y, 0), kWidth, kHeight);
+    const std::size_t i = std::size_t(at.y) * kWidth + std::size_t(at.x);
+    EXPECT_EQ(buffers.body[i], 1U) << "the ball hides the point";
+    return lit[i];
+  }
+};
+
+TEST(BodyShadow, fallsAwayFromTheLampWithASoftBorder) {
+  BallAbovePlate scene;
+  // Rays towards the lamp rise by 45 degrees, so that the ball's middle is above the point at x = -0.55.
+  EXPECT_EQ(scene.litAt(-0.55, 0, 2), 0);
+  EXPECT_EQ(scene.litAt(0.55, 0, 2), 1);
+  EXPECT_EQ(scene.litAt(-0.55, 0.35, 2), 1);
+  const float border = scene.litAt(-0.55, 0.2, 8);
+  EXPECT_GT(border, 0.1);
+  EXPECT_LT(border, 0.9);
+}
+
+TEST(BodyShadow, isNotThrownByBodiesMuchLargerThanTheScene) {
+  BallAbovePlate scene;
+  // The ball's diagonal is 0.69: it is a caster for a scene of length 0.3, and none for a scene of length 0.2.
+  EXPECT_EQ(scene.litAt(-0.55, 0, 0.3), 0);
+  EXPECT_EQ(scene.litAt(-0.55, 0, 0.2), 1);
 }
 
 TEST(ShadowedPicture, isTheSameByBothRenderers) {

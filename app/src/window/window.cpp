@@ -30,14 +30,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double kPollSeconds = 0.2;   // longest wait for an event, because Ctrl-C does not end a wait
-constexpr double kRestSeconds = 0.06;  // time without an event after which a slow picture is drawn in full
+constexpr double kRestSeconds = 0.04;  // time without an event after which a slow picture is drawn in full
 constexpr double kSettledSeconds =
-    0.2;                               // the same after a picture with one sample a pixel, if the finished one is slow
+    0.1;                               // the same after a picture with one sample a pixel, if the finished one is slow
 constexpr double kStillSeconds = 0.3;  // the same while work runs, which full pictures would slow down
-constexpr double kSmoothSeconds = 0.045;  // frames that take longer are drawn with fewer pixels while the view moves
-constexpr double kPromptSeconds = 0.5;    // a picture that takes longer is drawn with one sample a pixel first
-constexpr int kCoarsest = 6;              // greatest divisor of the number of pixels along an axis
-constexpr int kRestSamples = 2;           // samples of a pixel along each axis, once nothing moves
+constexpr double kSmoothSeconds = 0.045;    // frames that take longer are drawn with fewer pixels while the view moves
+constexpr double kPromptSeconds = 0.6;      // a picture that takes longer is drawn with one sample a pixel first
+constexpr double kFinishedOverPlain = 2.8;  // usual time of a finished picture over that with a sample a pixel
+constexpr int kCoarsest = 6;                // greatest divisor of the number of pixels along an axis
+constexpr int kRestSamples = 2;             // samples of a pixel along each axis, once nothing moves
 constexpr const char* kGuessUp = "camera up=auto";    // files of meshes do not say which axis points up
 constexpr int kLeastSize = 64, kGreatestSize = 8192;  // range of frame sizes, pixels
 
@@ -389,12 +390,12 @@ class Window {
     return finishedSeconds_ > kPromptSeconds && explorer_.redraws(1) ? 1 : 0;
   }
 
-  /// Learns from the time that a frame took how coarse moving pictures must be. The time of pictures is proportional to
-  /// their number of samples.
+  /// Learns from the time that a frame took how coarse moving pictures must be. The time of pictures without
+  /// shadows is proportional to their number of samples; light is measured once a pixel.
   void learn(int coarseness, double seconds) {
     const auto square = [](double x) { return x * x; };
     if (coarseness == 0) finishedSeconds_ = seconds;
-    if (coarseness == 1) finishedSeconds_ = square(kRestSamples) * seconds;
+    if (coarseness == 1) finishedSeconds_ = kFinishedOverPlain * seconds;
     if (coarseness < 2) {
       const double plain = finishedSeconds_ / square(kRestSamples);
       movingCoarseness_ = std::clamp(int(std::ceil(std::sqrt(plain / kSmoothSeconds))), 1, kCoarsest);

@@ -27,7 +27,9 @@ constexpr double kAround = 0.1;        // rays to the lamp are followed within t
 constexpr double kLampRadius = 0.13;   // tangent of the angle under which half of the lamp is seen
 constexpr double kGroundReach = 1.25;  // the ground is darkened up to this distance from the solid's middle
 constexpr double kFadesFrom = 0.8;     // share of the view's width from which on the shadow on the ground fades
-constexpr int kRowsTogether = 4;       // rows of samples whose points are evaluated together
+constexpr int kRowsTogether = 4;       // rows of pixels whose points are evaluated together
+constexpr float kEvenCosine = 0.9F;    // least cosine between normals of an even piece of a surface
+constexpr double kEvenDepth = 4;       // greatest difference of the distances of an even piece, in samples
 
 /// The distance to the solid that casts shadows, at many points at once.
 class Distances {
@@ -70,7 +72,7 @@ class Distances {
   double lowerBound(const Vector3& x, double value) const {
     const double beyond = std::sqrt(field_.domain().squaredExteriorDistance(x));
     const double atBoundary = value - beyond;
-    return beyond > 0 && atBoundary > 0 ? std::hypot(beyond, atBoundary) : value;
+    return beyond > 0 && atBoundary > 0 ? std::sqrt(beyond * beyond + atBoundary * atBoundary) : value;
   }
 
   const Field& field_;
@@ -97,8 +99,8 @@ Box solidBox(const Field& field, double offset) {
 
 class LightMeter {
  public:
-  LightMeter(const ShadowCaster& caster, const ViewBuffers& buffers, const Vector3& toKey)
-      : view_(caster.view), buffers_(buffers), toKey_(toKey), distances_(caster) {
+  LightMeter(const ShadowCaster& caster, const ViewBuffers& buffers, int samples, const Vector3& toKey)
+      : view_(caster.view), buffers_(buffers), samples_(samples), toKey_(toKey), distances_(caster) {
     const Box box = solidBox(caster.field, caster.view.offset);
     size_ = box.diagonal().norm();
     around_ = Box(box.min().array() - kAround * size_, box.max().array() + kAround * size_);
@@ -109,18 +111,21 @@ class LightMeter {
     if (view_.camera.eye[axis] > middle[axis]) ground_ = Ground{axis, middle[axis], middle};
   }
 
-  /// Measures the light in the rows from `first` to before `last`.
+  /// Measures the light in the rows of pixels from `first` to before `last`.
   void measure(int first, int last, FieldLight& light) const {
     std::vector<Place> places;
     for (int y = first; y < last; ++y)
-      for (int x = 0; x < buffers_.width; ++x)
-        if (const auto place = placeAt(x, y)) places.push_back(*place);
-    if (!light.open.empty()) measureAmbient(places, light);
-    followKey(places, light);
+      for (int x = 0; x < buffers_.width / samples_; ++x) addPlaces(x, y, places);
+    if (!light.open.empty()) measureAmbient(places);
+    followKey(places);
     for (const Place& place : places) {
-      if (place.fade == 0) continue;
-      if (!light.open.empty()) light.open[place.sample] += float(place.fade) * (1 - light.open[place.sample]);
-      light.lit[place.sample] += float(place.fade) * (1 - light.lit[place.sample]);
+      const double open = place.open + place.fade * (1 - place.open), lit = place.lit + place.fade * (1 - place.lit);
+      for (int y = 0; y < place.side; ++y)
+        for (int x = 0; x < place.side; ++x) {
+          const std::size_t i = place.sample + std::size_t(y) * buffers_.width + x;
+          if (!light.open.empty()) light.open[i] = float(open);
+          light.lit[i] = float(lit);
+        }
     }
   }
 
@@ -128,8 +133,41 @@ class LightMeter {
   struct Place {
     std::size_t sample;
     Vector3 point, normal;
-    double fade;  ///< 0 on the surface and on the ground near it; 1 where the shadow on the ground ends
+    double fade;   ///< 0 on the surface and on the ground near it; 1 where the shadow on the ground ends
+    int side = 1;  ///< the light is that of side × side samples, of which `sample` is the upper left one
+    double open = 1, lit = 1;
   };
+
+  /// Adds the places at which the samples of pixel (x, y) are measured: one for all of them where they show an even
+  /// piece of a surface or the ground alone, since light changes little within a pixel.
+  void addPlaces(int x, int y, std::vector<Place>& places) const {
+    const int side = isEven(x * samples_, y * samples_) ? samples_ : 1;
+    for (int row = y * samples_; row < (y + 1) * samples_; row += side)
+      for (int column = x * samples_; column < (x + 1) * samples_; column += side)
+        if (auto place = placeAt(column, row)) {
+          place->side = side;
+          places.push_back(*place);
+        }
+  }
+
+  /// Returns true if the samples of the pixel whose upper left sample is (left, top) show neighbouring points of one
+  /// surface with similar normals, or nothing.
+  bool isEven(int left, int top) const {
+    const std::size_t first = std::size_t(top) * buffers_.width + left;
+    const bool covered = buffers_.covered(first);
+    const float farthest =
+        covered ? float(kEvenDepth * pixelSize(view_.camera, buffers_.distance[first], buffers_.height)) : 0;
+    for (int y = 0; y < samples_; ++y)
+      for (int x = 0; x < samples_; ++x) {
+        const std::size_t i = first + std::size_t(y) * buffers_.width + x;
+        if (buffers_.covered(i) != covered) return false;
+        if (!covered) continue;
+        if (buffers_.showsBody(i) != buffers_.showsBody(first)) return false;
+        if (std::abs(buffers_.distance[i] - buffers_.distance[first]) > farthest) return false;
+        if (buffers_.normal[i].dot(buffers_.normal[first]) < kEvenCosine) return false;
+      }
+    return true;
+  }
 
   std::optional<Place> placeAt(int x, int y) const {
     const std::size_t i = std::size_t(y) * buffers_.width + x;
@@ -148,7 +186,7 @@ class LightMeter {
     return Place{i, point, Vector3::Unit(ground_->axis), std::max(std::clamp(2 * away - 1, 0.0, 1.0), atRightEdge)};
   }
 
-  void measureAmbient(const std::vector<Place>& places, FieldLight& light) const {
+  void measureAmbient(std::vector<Place>& places) const {
     std::vector<Vector3> points(places.size());
     std::vector<double> values, closed(places.size(), 0);
     double weight = 1, weights = 0;
@@ -162,20 +200,21 @@ class LightMeter {
       weight *= 0.85;
     }
     for (std::size_t i = 0; i < places.size(); ++i)
-      light.open[places[i].sample] = float(std::max(0.0, 1 - kAmbientStrength * closed[i] / weights));
+      places[i].open = std::max(0.0, 1 - kAmbientStrength * closed[i] / weights);
   }
 
   /// The part of a ray towards the lamp on which the solid can hide the lamp.
   struct Ray {
-    std::size_t sample;
+    std::size_t place;
     Vector3 start;
     double length, last;  ///< where the ray is, and where this part ends
     double clear = 1;     ///< lowest ratio of the distance to the half width of the lamp's cone, at most 1
   };
 
-  /// Returns the ray towards the lamp, or std::nullopt if it passes by the solid.
-  std::optional<Ray> rayFrom(const Place& place) const {
-    Ray ray{place.sample, place.point + kLift * size_ * place.normal, kLeastShadowStep * size_,
+  /// Returns the ray of `places[i]` towards the lamp, or std::nullopt if it passes by the solid.
+  std::optional<Ray> rayFrom(const std::vector<Place>& places, std::size_t i) const {
+    const Place& place = places[i];
+    Ray ray{i, place.point + kLift * size_ * place.normal, kLeastShadowStep * size_,
             std::numeric_limits<double>::infinity()};
     for (int axis = 0; axis < 3; ++axis) {
       const double slope = toKey_[axis], low = around_.min()[axis], high = around_.max()[axis];
@@ -189,12 +228,12 @@ class LightMeter {
   }
 
   /// Follows the rays from all places to the lamp, a step of all rays at a time.
-  void followKey(const std::vector<Place>& places, FieldLight& light) const {
+  void followKey(std::vector<Place>& places) const {
     std::vector<Ray> rays;
-    for (const Place& place : places) {
-      if (place.normal.dot(toKey_) <= kBehind)
-        light.lit[place.sample] = 0;
-      else if (const auto ray = rayFrom(place))
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i].normal.dot(toKey_) <= kBehind)
+        places[i].lit = 0;
+      else if (const auto ray = rayFrom(places, i))
         rays.push_back(*ray);
     }
     std::vector<Vector3> points;
@@ -210,7 +249,7 @@ class LightMeter {
         ray.length +=
             std::clamp(kShadowStep * std::abs(values[i]), kLeastShadowStep * size_, kGreatestShadowStep * size_);
         const double seen = std::clamp(ray.clear, -1.0, 1.0);
-        light.lit[ray.sample] = float(0.25 * (1 + seen) * (1 + seen) * (2 - seen));
+        places[ray.place].lit = 0.25 * (1 + seen) * (1 + seen) * (2 - seen);
         if (ray.clear > -1 && ray.length < ray.last) rays[kept++] = ray;
       }
       rays.resize(kept);
@@ -219,6 +258,7 @@ class LightMeter {
 
   const SurfaceView& view_;
   const ViewBuffers& buffers_;
+  int samples_;
   Vector3 toKey_;
   Distances distances_;
   double size_ = 0;
@@ -228,13 +268,14 @@ class LightMeter {
 
 }  // namespace
 
-FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, const Vector3& toKey) {
+FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, int samples, const Vector3& toKey) {
   FieldLight light{{}, std::vector<float>(buffers.cell.size(), 1)};
   if (!caster.amongBodies) light.open.assign(buffers.cell.size(), 1);
-  const LightMeter meter(caster, buffers, toKey);
-  const int strips = (buffers.height + kRowsTogether - 1) / kRowsTogether;
+  const LightMeter meter(caster, buffers, samples, toKey);
+  const int rows = buffers.height / samples;
+  const int strips = (rows + kRowsTogether - 1) / kRowsTogether;
   tbb::parallel_for(0, strips, [&](int strip) {
-    meter.measure(strip * kRowsTogether, std::min(buffers.height, (strip + 1) * kRowsTogether), light);
+    meter.measure(strip * kRowsTogether, std::min(rows, (strip + 1) * kRowsTogether), light);
   });
   return light;
 }

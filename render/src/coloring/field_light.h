@@ -25,12 +25,13 @@ struct ShadowCaster {
   bool amongBodies = false;  ///< if true, the ambient light is not measured: the field does not know what bodies take
 };
 
-/// Measures the light at the samples of `buffers`. `toKey` is the unit vector towards the key light.
+/// Measures the light at the samples of `buffers`, which hold samples × samples for each pixel. Samples of a pixel that
+/// show an even piece of a surface are measured together. `toKey` is the unit vector towards the key light.
 ///
 /// The ambient light is lessened where the field, at a few points along the normal, is lower than the distance to the
 /// surface's own point, as in a fold (Evans, "Fast Approximations for Global Illumination on Dynamic Scenes", 2006).
 /// The key light is followed towards the lamp by sphere tracing; the lowest ratio of field to length gives the shadow's
 /// soft border (Quilez, "Soft shadows in raymarched SDFs", 2010).
-FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, const Vector3& toKey);
+FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, int samples, const Vector3& toKey);
 
 }  // namespace hpsdf::render

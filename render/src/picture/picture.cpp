@@ -308,7 +308,7 @@ SurfaceLook lookOf(const Field& field, const SurfacePicture& picture, const Scen
   const bool isAlone = !picture.plane && picture.cells.style == CellStyle::none && !hasBodies;
   const ShadowCaster caster{field, scene.view, picture.camera.up, isAlone, hasBodies};
   const Vector3 toKey = directionToKey(scene.view.camera, look.lightTilt);
-  look.light = fieldLight(caster, scene.buffers, toKey);
+  look.light = fieldLight(caster, scene.buffers, picture.samples, toKey);
   if (hasBodies)
     throwShadows(*picture.bodies.renderer, picture.bodies.bodies, scene.view, scene.buffers, toKey,
                  field.domain().diagonal().norm(), look.light.lit);
