@@ -16,9 +16,9 @@ namespace {
 
 // Lengths are shares of the solid's size, the diagonal of its box.
 constexpr std::array kTaps = {0.009, 0.018, 0.035, 0.065, 0.11};  // distances along the normal for the ambient light
-constexpr double kAmbientStrength = 1.5;
-constexpr double kLift = 0.014;   // height at which the rays to the lamp start, above the steps between cells
-constexpr double kBehind = -0.3;  // cosine from which on a surface is turned away from the lamp
+constexpr double kAmbientStrength = 1.8;  // the ambient light decays with what is closed, so that gaps are not black
+constexpr double kLift = 0.014;           // height at which the rays to the lamp start, above the steps between cells
+constexpr double kBehind = -0.3;          // cosine from which on a surface is turned away from the lamp
 constexpr double kLeastShadowStep = 0.005, kGreatestShadowStep = 0.1;
 constexpr double kShadowStep =
     0.6;  // share of the distance by which a ray advances, so as not to miss the nearest place
@@ -199,8 +199,7 @@ class LightMeter {
       weights += weight;
       weight *= 0.85;
     }
-    for (std::size_t i = 0; i < places.size(); ++i)
-      places[i].open = std::max(0.0, 1 - kAmbientStrength * closed[i] / weights);
+    for (std::size_t i = 0; i < places.size(); ++i) places[i].open = std::exp(-kAmbientStrength * closed[i] / weights);
   }
 
   /// The part of a ray towards the lamp on which the solid can hide the lamp.

@@ -12,10 +12,11 @@ namespace hpsdf::render {
 namespace {
 
 /// The colours of the levels that differ most, found by simulated annealing under the conditions that color_sets_test
-/// checks. Cool and warm hues take turns, because lightness alone gives fewer distinct colours.
+/// checks. They become lighter from level to level. Cool and warm hues take turns among the dark ones, because
+/// lightness alone gives fewer distinct colours.
 constexpr std::array<Color, kDistinctLevels> kLevels = {
-    {{39, 20, 120}, {101, 42, 58}, {99, 111, 124}, {200, 118, 29}, {87, 180, 141}, {192, 151, 255}, {246, 212, 74}}};
-constexpr Color kExact = {171, 0, 11};
+    {{7, 3, 57}, {64, 9, 9}, {81, 70, 81}, {21, 85, 171}, {54, 156, 148}, {147, 158, 91}, {252, 213, 13}}};
+constexpr Color kExact = {179, 23, 0};
 
 Oklab mixOklab(const Oklab& a, const Oklab& b, double t) {
   return {std::lerp(a.lightness, b.lightness, t), std::lerp(a.a, b.a, t), std::lerp(a.b, b.b, t)};

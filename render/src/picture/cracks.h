@@ -10,7 +10,7 @@
 namespace hpsdf::render {
 
 /// The colour of cracks: a violet that differs from all colours of surfaces, also for colour-blind readers.
-constexpr Color kCrackColor = {169, 1, 239};
+constexpr Color kCrackColor = {174, 114, 255};
 
 /// The number of pixels with cracks in a view, and the greatest |f − offset| at a crack.
 struct Cracks {

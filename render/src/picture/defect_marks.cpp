@@ -35,10 +35,10 @@ constexpr int kGroupCell = 8;          // size of a grid cell in pixels; marks i
 const Swatch& styleOf(DefectKind kind) {
   static const std::array<Swatch, kDefectKinds> styles = {
       {{{"boundary edges", "boundary"}, "", {146, 255, 1}},
-       {{"non-manifold edges", "non-manifold", "of 3+ faces"}, "", {12, 46, 118}},
-       {{"inconsistent edges", "inconsistent", "opposed"}, "", {11, 116, 101}},
-       {{"pinched vertices", "pinched"}, "", {169, 89, 2}},
-       {{"pairs of faces that meet", "pairs meet"}, "", {100, 1, 4}}}};
+       {{"non-manifold edges", "non-manifold", "of 3+ faces"}, "", {3, 38, 108}},
+       {{"inconsistent edges", "inconsistent", "opposed"}, "", {13, 108, 95}},
+       {{"pinched vertices", "pinched"}, "", {168, 90, 0}},
+       {{"pairs of faces that meet", "pairs meet"}, "", {98, 5, 2}}}};
   return styles[static_cast<std::size_t>(kind)];
 }
 

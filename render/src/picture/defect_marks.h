@@ -20,7 +20,7 @@ inline const std::array<std::string, 2> kDefectTitles = {"Defects of the mesh", 
 Color defectColor(DefectKind kind);
 
 /// The colour of faces that are seen from behind. Faces seen from outside have the colour of surfaces.
-constexpr Color kBackColor = {133, 151, 169};
+constexpr Color kBackColor = {120, 153, 158};
 
 /// The kinds of defects that the mesh has, with the number of defects of each kind.
 std::vector<Legend::Defects> defectLegend(const MeshDefects& defects);

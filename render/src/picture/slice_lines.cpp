@@ -220,7 +220,7 @@ std::vector<FlatLine> sectionOf(const TriangleMesh& mesh, const SliceView& view,
 
 std::span<const Color> outlineColors() {
   static constexpr std::array<Color, 5> kColors = {
-      {{250, 214, 6}, {84, 188, 252}, {188, 132, 24}, {11, 124, 97}, {160, 166, 167}}};
+      {{249, 212, 3}, {70, 104, 141}, {110, 104, 97}, {1, 49, 43}, {149, 159, 160}}};
   return kColors;
 }
 

@@ -87,14 +87,14 @@ export function orderedColor(t) {
   return fromOklch(0.385 + 0.445 * at, chroma, 302 - 227 * at ** 0.8);
 }
 
-const LEVELS = ["#271478", "#652a3a", "#636f7c", "#c8761d", "#57b48d", "#c097ff", "#f6d44a"];
+const LEVELS = ["#070339", "#400909", "#514651", "#1555ab", "#369c94", "#939e5b", "#fcd50d"];
 
 /**
  * The colour of a level, which is a degree or a depth, or of exact cells.
  * @param {number} level
  */
 export function levelColor(level) {
-  if (level === EXACT_DEGREE) return fromHex("#ab000b");
+  if (level === EXACT_DEGREE) return fromHex("#b31700");
   if (level < LEVELS.length) return fromHex(LEVELS[level]);
   return fromOklch(0.45 + 0.47 * 0.86 ** (level - LEVELS.length), 0.15, 130);
 }
