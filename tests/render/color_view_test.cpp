@@ -32,11 +32,11 @@ void forEachSample(ViewBuffers& buffers, const Visit& visit) {
     for (int x = 0; x < buffers.width; ++x) visit(x, y, std::size_t(y) * buffers.width + x);
 }
 
-// Returns a slice with degree 2 in the left half, degree 5 in the right half, and nothing in the last four columns.
+// Returns a slice with degree 2 in the left half, degree 1 in the right half, and nothing in the last four columns.
 ViewBuffers twoCells(int size) {
   ViewBuffers buffers = blank(size, size);
   forEachSample(buffers, [&](int x, int, std::size_t i) {
-    if (x >= size / 2) buffers.cell[i] = 7, buffers.degree[i] = 5;
+    if (x >= size / 2) buffers.cell[i] = 7, buffers.degree[i] = 1;
     if (x >= size - 4) buffers.cell[i] = kNoCell, buffers.degree[i] = 0, buffers.value[i] = 0;
   });
   return buffers;
@@ -56,7 +56,7 @@ double inkAt(const Image& image, int x, int y, double value, const DistanceScale
 TEST(LevelSlice, givesCellsTheColorOfTheirLevelAndADarkOutline) {
   const Image image = degrees(twoCells(64));
   EXPECT_EQ(image.at(16, 40), levelColor(2));
-  EXPECT_EQ(image.at(45, 40), levelColor(5));
+  EXPECT_EQ(image.at(45, 40), levelColor(1));
   EXPECT_EQ(image.at(62, 40), paperColor());
   EXPECT_LT(lightnessOf(image.at(32, 40)), 0.75 * lightnessOf(image.at(45, 40))) << "no outline between the cells";
   EXPECT_LT(lightnessOf(image.at(60, 40)), 0.75 * lightnessOf(paperColor())) << "no outline where the domain ends";
@@ -72,7 +72,7 @@ TEST(LevelSlice, readsTheDepthsForColorsOfDepth) {
 
 TEST(LevelSlice, revealsSwappedAndUnknownLevels) {
   ViewBuffers wrong = twoCells(64);
-  for (auto& degree : wrong.degree) degree = degree == 2 ? 5 : degree == 5 ? 2 : degree;
+  for (auto& degree : wrong.degree) degree = degree == 2 ? 1 : degree == 1 ? 2 : degree;
   const Image right = degrees(twoCells(64)), swapped = degrees(wrong);
   int different = 0;
   for (std::size_t i = 0; i < right.pixels.size(); ++i) different += right.pixels[i] != swapped.pixels[i];

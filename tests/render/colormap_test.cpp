@@ -41,9 +41,9 @@ TEST(Color, returnsUnchangedFromOklabAndHasItsKnownCorners) {
   EXPECT_NEAR(std::atan2(vivid.b, vivid.a), 145 * 3.14159265 / 180, 0.01);
 }
 
-TEST(LevelColor, isLighterForHigherLevelsAsFarAsTheyAreDistinct) {
+TEST(LevelColor, isDarkerForHigherLevels) {
   for (int level = 1; level < kDistinctLevels; ++level)
-    EXPECT_GT(lightnessOf(levelColor(level)), lightnessOf(levelColor(level - 1)) + 0.005) << level;
+    EXPECT_LT(lightnessOf(levelColor(level)), lightnessOf(levelColor(level - 1)) - 0.005) << level;
   for (int level = kDistinctLevels + 1; level <= kMaxDegree; ++level)
     EXPECT_LT(lightnessOf(levelColor(level)), lightnessOf(levelColor(level - 1))) << level;
 }

@@ -52,10 +52,9 @@ std::string mapLines(render::MapKind kind, bool showsColors) {
 std::string colorsHelp(bool showsColors) {
   std::string text = fmt::format(
       "What colours show is chosen by --color:\n  {}\n\n"
-      "Degrees and depths have the same colours in every picture. Up to {} they are lighter the higher, and everybody\n"
-      "can tell them apart, also with a colour vision deficiency; from {} on they are greens, darker the higher, "
-      "which\n"
-      "are closer to each other.\n",
+      "Degrees and depths have the same colours in every picture. Up to {} they are darker the higher, and everybody\n"
+      "can tell them apart, also with a colour vision deficiency; from {} on they are greens that\n"
+      "darken from a light one and are closer to each other.\n",
       fmt::join(colorNames(), ", "), render::kDistinctLevels - 1, render::kDistinctLevels);
   for (int level = 0; level < render::kDistinctLevels + 3; ++level) text += levelLine(level, showsColors);
   text += levelLine(kExactDegree, showsColors);

@@ -12,10 +12,10 @@ namespace hpsdf::render {
 namespace {
 
 /// The colours of the levels that differ most, found by simulated annealing under the conditions that color_sets_test
-/// checks. They become lighter from level to level. Cool and warm hues take turns among the dark ones, because
-/// lightness alone gives fewer distinct colours.
+/// checks. They become darker from level to level, so that coarse cells, which fill large areas, are light. Cool and
+/// warm hues take turns among the dark ones, because lightness alone gives fewer distinct colours.
 constexpr std::array<Color, kDistinctLevels> kLevels = {
-    {{7, 3, 57}, {64, 9, 9}, {81, 70, 81}, {21, 85, 171}, {54, 156, 148}, {147, 158, 91}, {252, 213, 13}}};
+    {{252, 213, 13}, {147, 158, 91}, {54, 156, 148}, {21, 85, 171}, {81, 70, 81}, {64, 9, 9}, {7, 3, 57}}};
 constexpr Color kExact = {179, 23, 0};
 
 Oklab mixOklab(const Oklab& a, const Oklab& b, double t) {

@@ -87,7 +87,7 @@ export function orderedColor(t) {
   return fromOklch(0.385 + 0.445 * at, chroma, 302 - 227 * at ** 0.8);
 }
 
-const LEVELS = ["#070339", "#400909", "#514651", "#1555ab", "#369c94", "#939e5b", "#fcd50d"];
+const LEVELS = ["#fcd50d", "#939e5b", "#369c94", "#1555ab", "#514651", "#400909", "#070339"];
 
 /**
  * The colour of a level, which is a degree or a depth, or of exact cells.
