@@ -159,7 +159,7 @@ TEST(Explorer, aPointStaysUnderTheMouseThatDragsIt) {
                                       int(x - canvas.x0) + 32, int(y - canvas.y0) - 80 + 48);
     ASSERT_TRUE(before && after) << view;
     // In perspective, points that are not in the target's plane move by slightly more or less than the mouse.
-    EXPECT_LT((before->position - after->position).norm(), slice ? 0.004 : 0.1) << view;
+    EXPECT_LT((before->position - after->position).norm(), slice ? 0.004 : 0.12) << view;
   }
 }
 

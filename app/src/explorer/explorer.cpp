@@ -63,15 +63,17 @@ ViewState withFrameOf(const ViewState& frame, ViewState view) {
   return view;
 }
 
-/// Returns `view` without what belongs to one field alone: places, cuts, marks and other fields.
+/// Returns `view` without what belongs to one field alone: directions, places, cuts, marks, cells and other fields.
 ViewState wholeOf(ViewState view) {
   view.planeOffset.reset();
   view.plane.reset();
   view.zoom = 1;
   view.operands.clear();
   view.sliceTarget.reset();
-  view.camera.target.reset();
-  view.camera.distance = render::OrbitCamera{}.distance;
+  view.camera = {.up = view.camera.up, .projection = view.camera.projection};
+  view.surface = true;
+  view.cracks = view.planeInSpace = false;
+  view.cells = {};
   view.surfaceOffset = 0;
   view.clip.reset();
   view.defects.clear();

@@ -129,7 +129,8 @@ constexpr Preset kPresets[] = {
 /// Returns the line of script that shows a preset.
 std::string presetLine(Session& session, const std::string& name) {
   const std::string plain =
-      "show surface ; surface offset=0 shown=true clip=none cracks=false defects=none ; plane in-space=false ; "
+      "show surface ; surface offset=0 shown=true clip=none cracks=false edges=false defects=none ; plane "
+      "in-space=false ; "
       "cells none ; triangles shown=false ; arrows 0 ; worst mark=none ; ";
   const std::string whole = plain + "camera 30,20,1.1 target=center ; ";
   const std::string levels = "panel legend=true histograms=true worst=false statistics=false";

@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace hpsdf::app {
+namespace {
+
+constexpr double kAtSurface = 0.1;  // greatest |f| at the surface, in edges of the smaller cell
+
+}  // namespace
 
 double cellSizeAt(const Field& field, int depth) {
   return std::ldexp(field.domain().sizes()[0] / field.grid()[0], -depth);
@@ -11,7 +16,7 @@ double cellSizeAt(const Field& field, int depth) {
 
 bool isAtSurface(const Field& field, const Interface& face) {
   const double edge = cellSizeAt(field, std::max(face.depths[0], face.depths[1]));
-  return std::abs(field.value(face.worst)) <= std::max(0.5 * edge, face.value.max);
+  return std::abs(field.value(face.worst)) <= std::max(kAtSurface * edge, face.value.max);
 }
 
 bool isTorn(const Field& field, const Interface& face) { return std::abs(field.value(face.worst)) < face.value.max; }

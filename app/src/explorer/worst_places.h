@@ -12,8 +12,8 @@ namespace hpsdf::app {
 /// Returns the edge length of a cell at this depth, in world units.
 double cellSizeAt(const Field& field, int depth);
 
-/// Tells whether the greatest jump of an interface is at the surface: whether |f| there is at most half an edge of the
-/// smaller cell, or at most the jump itself.
+/// Tells whether the greatest jump of an interface is at the surface: whether |f| there is at most a tenth of the edge
+/// of the smaller cell, or at most the jump itself.
 bool isAtSurface(const Field& field, const Interface& face);
 
 /// Tells whether the surface is torn at the place of an interface's greatest jump: whether the jump is greater than

@@ -145,14 +145,15 @@ Camera cameraOf(const OrbitCamera& camera, const Box& domain, int width, int hei
   const Vector3 right = std::cos(azimuth) * Vector3::UnitX() - std::sin(azimuth) * front;
   const Vector3 towardsEye = std::cos(elevation) * outward + std::sin(elevation) * vertical;
   const Vector3 up = std::cos(elevation) * vertical - std::sin(elevation) * outward;
-  const double halfHeight = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
+  const double half = std::tan(0.5 * radians(camera.fieldOfViewDegrees));
   const double distance = camera.distance * domain.diagonal().norm();
   const Vector3 target = camera.target.value_or(domain.center());
   Camera result;
   result.eye = target + distance * towardsEye;
   result.forward = -towardsEye;
-  result.right = right * (halfHeight * width / height);
-  result.up = up * halfHeight;
+  const double shorter = std::min(width, height);
+  result.right = right * (half * width / shorter);
+  result.up = up * (half * height / shorter);
   if (camera.projection == Projection::orthographic) {
     result.right *= distance;
     result.up *= distance;

@@ -67,7 +67,7 @@ export function raysOf(orbit, field, aspect) {
     const toCorner = dot(subtract(centreOf(field), target), towardsEye) + 0.5 * dot(field.size, /** @type {Vector} */ (towardsEye.map(Math.abs)));
     eye = add(target, scaled(towardsEye, toCorner + RAY_MARGIN * diagonalOf(field)));
   }
-  return { eye, forward: scaled(towardsEye, -1), right: scaled(side, reach * aspect), up: scaled(above, reach), parallel: orbit.parallel };
+  return { eye, forward: scaled(towardsEye, -1), right: scaled(side, reach * Math.max(aspect, 1)), up: scaled(above, reach * Math.max(1 / aspect, 1)), parallel: orbit.parallel };
 }
 
 /**

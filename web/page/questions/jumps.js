@@ -483,12 +483,12 @@ export class Jumps {
   }
 
   /**
-   * Returns whether the field at the greatest jump is at most half an edge of the smaller cell, or at most the jump itself.
+   * Returns whether the field at the greatest jump is at most a tenth of the edge of the smaller cell, or at most the jump itself.
    * @param {number} n
    */
   isAtSurface(n) {
     const edge = this.field.size[0] / this.field.grid[0] / 2 ** this.depths[n];
-    return this.values[n] <= Math.max(0.5 * edge, this.jumps.value[n]);
+    return this.values[n] <= Math.max(0.1 * edge, this.jumps.value[n]);
   }
 
   /**

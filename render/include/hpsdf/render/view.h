@@ -43,7 +43,7 @@ struct OrbitCamera {
   double azimuthDegrees = 30;      ///< angle about the up axis; at 0 the camera looks along −z (y up) or +y (z up)
   double elevationDegrees = 20;    ///< angle above the horizon, −90 to 90
   double distance = 1.1;           ///< distance from the eye to the target, in domain diagonals, above 0
-  double fieldOfViewDegrees = 35;  ///< vertical angle of view, above 0 and below 180
+  double fieldOfViewDegrees = 35;  ///< angle of view along the shorter side of the picture, above 0 and below 180
   UpAxis up = UpAxis::y;
   std::optional<Vector3> target = {};  ///< world units; unset for the centre of the domain
   Projection projection = Projection::perspective;
