@@ -146,6 +146,28 @@ std::string messageOf(const std::function<void()>& action) {
   return {};
 }
 
+TEST(Panel, showsSharesAsBarsFromTheHighestLevelDown) {
+  Overlay overlay;
+  const Frame layout = frame(960, 540);
+  const double next = addShares(overlay, layout, 100, "degrees by volume", {{2, 0.25}, {3, 0.7}, {6, 0.05}});
+  ASSERT_EQ(overlay.boxes.size(), 3U);
+  const auto lengthOf = [&](std::size_t row) { return overlay.boxes[row].x1 - overlay.boxes[row].x0; };
+  EXPECT_NEAR(lengthOf(0) / lengthOf(1), 0.05 / 0.7, 1e-9) << "degree 6 over degree 3";
+  EXPECT_NEAR(lengthOf(2) / lengthOf(1), 0.25 / 0.7, 1e-9) << "degree 2 over degree 3";
+  EXPECT_LT(overlay.boxes[0].y1, overlay.boxes[1].y0);
+  std::vector<std::string> texts;
+  for (const TextItem& item : overlay.texts) {
+    texts.push_back(item.text);
+    EXPECT_GE(item.x, layout.panel.x0);
+    EXPECT_LT(item.baseline, next);
+  }
+  EXPECT_THAT(texts, ::testing::ElementsAre("degrees by volume", "6", "5.0 %", "3", "70.0 %", "2", "25.0 %"));
+
+  Overlay none;
+  EXPECT_EQ(addShares(none, layout, layout.panel.y1 - 10, "degrees by volume", {{2, 1.0}}), layout.panel.y1 - 10);
+  EXPECT_TRUE(none.boxes.empty()) << "shares that have no room are left out";
+}
+
 TEST(DegreeSlice, hasTheColorsOfItsCells) {
   const Field field = planeField();
   FakeRenderer renderer(field);

@@ -2,11 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <vector>
 
 #include "hpsdf/error.h"
 #include "hpsdf/render/picture.h"
 #include "hpsdf/render/point_colors.h"
+#include "image/colormap.h"
 #include "support/random_field.h"
 
 namespace hpsdf::render {
@@ -63,6 +68,32 @@ TEST(PointColors, areThoseOfAPictureWithTheSameScale) {
   }
   EXPECT_THROW(pointColors(seen.field, {}, ColorBy::normal), Error);
   EXPECT_THROW(pointColors(seen.field, {}, ColorBy::error), Error);
+}
+
+TEST(PerCell, colorsEachCellByTheGreatestValueOfItsSamples) {
+  const Seen seen;
+  const auto renderer = makeCpuRenderer(seen.field);
+  SlicePicture picture{.plane = AxisPlane{2, 0.95}, .color = ColorBy::error, .width = 60, .height = 60, .bare = true};
+  picture.scale = {.limits = std::array{1e-3, 1.0}, .perCell = true};
+  const Drawn drawn = drawSlice(*renderer, seen.field, picture, seen.reference);
+  const std::vector<float> errors = quantityAt(seen.field, drawn.view, drawn.buffers, ColorBy::error, seen.reference);
+  std::map<std::uint32_t, float> greatest;
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    if (drawn.buffers.hit(i)) greatest[drawn.buffers.cell[i]] = std::max(greatest[drawn.buffers.cell[i]], errors[i]);
+  const ColorScale scale(1e-3, 1, true);
+  int inside = 0, raised = 0;
+  for (int y = 3; y < 60; ++y)
+    for (int x = 3; x < 60; ++x) {
+      const std::size_t i = std::size_t(y) * 60 + x;
+      const auto isOther = [&](std::size_t k) { return drawn.buffers.cell[k] != drawn.buffers.cell[i]; };
+      if (!drawn.buffers.hit(i) || isOther(i - 1) || isOther(i - 2) || isOther(i - 60) || isOther(i - 120)) continue;
+      const float most = greatest[drawn.buffers.cell[i]];
+      ++inside;
+      raised += encodeSrgb(scale(most)) != encodeSrgb(scale(errors[i]));
+      EXPECT_EQ(drawn.image.at(x, y), encodeSrgb(scale(most))) << x << ", " << y;
+    }
+  EXPECT_GT(inside, 100);
+  EXPECT_GT(raised, inside / 2) << "most samples show another value than their own";
 }
 
 TEST(Quantity, ofASliceIsThatOfItsPoints) {

@@ -91,6 +91,35 @@ std::optional<Box> kept(const SurfaceView& view, Box box) {
   return box;
 }
 
+TEST(ChosenCells, atTheSurfaceAreThoseThatItCrosses) {
+  const Field field = testField();
+  constexpr double kOffset = 0.05;
+  const std::vector<Cell> all = chosenCells(field, {}, kOffset);
+  const std::vector<Cell> kept = chosenCells(field, {.atSurface = true}, kOffset);
+  std::set<std::uint32_t> isKept;
+  for (const Cell& cell : kept) isKept.insert(cell.id);
+  EXPECT_GT(kept.size(), 10U);
+  EXPECT_LT(kept.size(), all.size() / 2);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> share(0, 1);
+  int missed = 0;
+  for (const Cell& cell : all) {
+    double low = kInfinity, high = -kInfinity;
+    for (int n = 0; n < 500; ++n) {
+      const Vector3 t(share(random), share(random), share(random));
+      const double value = field.value(cell.box.min() + t.cwiseProduct(cell.box.sizes()));
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+    const bool crosses = low < kOffset && high > kOffset;
+    missed += crosses && !isKept.contains(cell.id);
+    EXPECT_TRUE(crosses || !isKept.contains(cell.id) ||
+                std::min(std::abs(low - kOffset), std::abs(high - kOffset)) < 0.05)
+        << cell.id;
+  }
+  EXPECT_LE(missed, int(kept.size()) / 20) << "the points of a cell find nearly every crossing";
+}
+
 TEST(Scene, showsTheNearestOfSurfacePlaneAndBoxesInEachPixel) {
   const Field field = testField();
   const auto cpu = makeCpuRenderer(field);
