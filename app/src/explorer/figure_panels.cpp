@@ -238,11 +238,11 @@ void drawWorst(const Controls& controls, Explorer& explorer) {
     if (controls.ui.row(fmt::format("worst/{}", rank - first + 1), cells, kColumns)) controls.commands.push_back(fly);
   }
   const auto page = [](int number) { return fmt::format("worst page={}", number); };
-  controls.button("worst/previous", "previous", page(view.worstPage).c_str(), view.worstPage > 0,
-                  "Turn back to the places before these.");
+  controls.button("worst/previous", fmt::format("previous {}", kWorstRows).c_str(), page(view.worstPage).c_str(),
+                  view.worstPage > 0, "Turn back to the places before these.");
   ImGui::SameLine();
-  controls.button("worst/next", "next", page(view.worstPage + 2).c_str(), last < worst.size(),
-                  "Turn to the places that follow.");
+  controls.button("worst/next", fmt::format("next {}", kWorstRows).c_str(), page(view.worstPage + 2).c_str(),
+                  last < worst.size(), "Turn to the places that follow.");
 }
 
 }  // namespace hpsdf::app
