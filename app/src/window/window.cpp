@@ -35,7 +35,7 @@ constexpr double kSettledSeconds =
     0.1;                               // the same after a picture with one sample a pixel, if the finished one is slow
 constexpr double kStillSeconds = 0.3;  // the same while work runs, which full pictures would slow down
 constexpr double kSmoothSeconds = 0.045;    // frames that take longer are drawn with fewer pixels while the view moves
-constexpr double kPromptSeconds = 0.6;      // a picture that takes longer is drawn with one sample a pixel first
+constexpr double kPromptSeconds = 0.7;      // a picture that takes longer is drawn with one sample a pixel first
 constexpr double kFinishedOverPlain = 2.8;  // usual time of a finished picture over that with a sample a pixel
 constexpr int kCoarsest = 6;                // greatest divisor of the number of pixels along an axis
 constexpr int kRestSamples = 2;             // samples of a pixel along each axis, once nothing moves
