@@ -43,8 +43,8 @@ def vectors(table: dict[str, Any], names: tuple[str, str, str]) -> Any:
 def at_surface(program: Program, field: pathlib.Path, table: dict[str, Any], folder: pathlib.Path, edge: float) -> tuple[Any, Any]:
     """Returns which interfaces jump most at the surface, and which are torn, by the program's rules."""
     values = abs(queried(program, field, vectors(table, ("worst_x", "worst_y", "worst_z")), folder)["distance"])
-    half = 0.5 * edge / 2 ** numpy.maximum(table["depth0"], table["depth1"])
-    return values <= numpy.maximum(half, table["value_max"]), values < table["value_max"]
+    tenth = 0.1 * edge / 2 ** numpy.maximum(table["depth0"], table["depth1"])
+    return values <= numpy.maximum(tenth, table["value_max"]), values < table["value_max"]
 
 
 def test_jumps_equal_those_of_the_program(browser: Any, field: pathlib.Path, program: Program, tmp_path: pathlib.Path) -> None:
