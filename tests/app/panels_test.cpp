@@ -216,6 +216,43 @@ TEST(Panels, keysUseTheControlWithTheFocus) {
   EXPECT_EQ(bench.focus(), "") << "the mouse takes the focus away";
 }
 
+TEST(Panels, aTextIsEnteredWhenItsFieldLosesTheKeyboard) {
+  Bench bench;
+  bench.run("panel questions=false shown=false colors=false build=true ; show size=900x1000");
+  const auto wanted = [&] {
+    const auto& settings = bench.explorer().settings();
+    const auto found = settings.find("target-error");
+    return found == settings.end() ? "" : found->second;
+  };
+  const auto error = [&] { return bench.session.current().field.metadata().settings.targetError.weighted(); };
+  bench.run("ui click build/target-error");
+  bench.type("1e-3");
+  bench.run("ui click build/rebuild");
+  EXPECT_EQ(error(), 1e-3) << "the field is entered before the button is pressed";
+  bench.run("ui click build/target-error");
+  bench.type("1e-4");
+  bench.run("ui click build/mesh");  // a field above it
+  EXPECT_EQ(wanted(), "1e-4");
+  bench.tabTo("build/target-error");
+  bench.type("1e-5");
+  bench.key(Key::tab);
+  EXPECT_EQ(wanted(), "1e-5");
+  bench.run("ui click build/target-error");
+  bench.type("1e-6");
+  bench.key(Key::escape);
+  bench.run("ui click canvas");
+  EXPECT_EQ(wanted(), "1e-5") << "Escape discards the text";
+  bench.run("ui click build/target-error");
+  bench.type("1e-6");
+  bench.explorer().releaseInput();
+  EXPECT_EQ(wanted(), "1e-5") << "no line of a recording enters it";
+  bench.run("ui click build/target-error");
+  bench.type("none");
+  EXPECT_THAT(bench.failure("ui click build/rebuild"), HasSubstr("target-error"));
+  bench.explorer().input({.kind = Input::Kind::release});
+  EXPECT_EQ(error(), 1e-3) << "a click that fails to enter a text does nothing else";
+}
+
 TEST(Panels, theFocusIsSeenAndEndsWithTheInput) {
   Bench bench;
   const render::Image without = bench.explorer().frame();

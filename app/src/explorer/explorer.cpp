@@ -478,6 +478,7 @@ void Explorer::releaseInput() {
   for (int button = 0; button < 3; ++button)
     if (ui_.holds(button)) act({.kind = Input::Kind::release, .button = button});
   const auto pointer = ui_.pointer();
+  if (ui_.editing()) act({.kind = Input::Kind::key, .key = Key::escape});  // a click would enter the text
   // A click outside of the frame closes open lists and text fields.
   act({.kind = Input::Kind::move, .at = {-1, -1}});
   act({.kind = Input::Kind::press});
@@ -486,12 +487,28 @@ void Explorer::releaseInput() {
   if (inside) act({.kind = Input::Kind::move, .at = pointer});
 }
 
+/// Runs the commands that an event has caused. A press may enter the text of a field. If that fails, the press does
+/// nothing else, such as build a field without what was typed; if it succeeds, a drag begins with the view that it
+/// leaves.
+void Explorer::runCommandsOf(const Input& event, const std::vector<std::string>& commands) {
+  try {
+    for (const std::string& command : commands) run(command);
+  } catch (...) {
+    if (event.kind == Input::Kind::press) {
+      ui_.cancelPress();
+      dragged_.reset();
+    }
+    throw;
+  }
+  if (event.kind == Input::Kind::press && dragged_ == event.button) viewAtPress_ = view_;
+}
+
 void Explorer::input(const Input& event) {
   if (work) return inputWhileWorking(event);
   std::vector<std::string> commands;
   drawPanels(&event, commands);
   if (const auto command = canvasCommand(event)) commands.push_back(*command);
-  for (const std::string& command : commands) run(command);
+  runCommandsOf(event, commands);
   // Draw the panels once more, because an open list must be drawn once before it takes input.
   std::vector<std::string> late;
   drawPanels(nullptr, late);

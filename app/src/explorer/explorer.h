@@ -181,6 +181,7 @@ class Explorer final : public SessionExtension {
   render::Drawn drawn(render::Renderer& renderer, const Field& field, const render::ReferenceData& reference,
                       const render::ScaleOptions& scale, int coarseness) const;
   void drawPanels(const Input* event, std::vector<std::string>& commands);
+  void runCommandsOf(const Input& event, const std::vector<std::string>& commands);
   void settlePanels();
   void inputWhileWorking(const Input& event);
   void runOnPreview(const std::string& line);

@@ -112,10 +112,11 @@ struct Ui::State {
   bool frozen = false;
   std::string clipboard;
   std::string idText;
-  std::pair<std::string, double> held;  ///< path and value of a held slider that reports its value on release
-  std::optional<Key> key;               ///< key that was pressed in this frame for the control with the focus
-  bool focusMoved = false;              ///< the focus has moved in this frame
-  double scrollBy = 0;                  ///< distance by which a column must scroll to show the control with the focus
+  std::pair<std::string, double> held;        ///< path and value of a held slider that reports its value on release
+  std::map<std::string, std::string> drafts;  ///< paths of the text fields that are being edited, and their texts
+  std::optional<Key> key;                     ///< key that was pressed in this frame for the control with the focus
+  bool focusMoved = false;                    ///< the focus has moved in this frame
+  double scrollBy = 0;  ///< distance by which a column must scroll to show the control with the focus
   struct Tip {
     std::string text;
     UiRect widget, column;  ///< the widget with its label, and the column that it stands in
@@ -195,6 +196,7 @@ void Ui::frame(const FrameSize& size, const Input* input, const std::function<vo
   state_->chosen.reset();
   event_ = input;
   const auto end = [&] {
+    std::erase_if(state_->drafts, [&](const auto& draft) { return !widgets_.contains(draft.first); });
     state_->key.reset();
     state_->focusMoved = false;
     help_.clear();
@@ -219,11 +221,11 @@ void Ui::frame(const FrameSize& size, const Input* input, const std::function<vo
 }
 
 void Ui::takeKey(const Input& input) {
-  if (input.kind == Input::Kind::press) focus_.clear();
+  if (input.kind == Input::Kind::press) clearFocus();
   if (input.kind != Input::Kind::key || input.control) return;
   if (input.key == Key::tab) return moveFocus(input.shift ? -1 : 1);
   if (editing()) return;
-  if (input.key == Key::escape) focus_.clear();
+  if (input.key == Key::escape) clearFocus();
   if (!focus_.empty()) state_->key = input.key;
 }
 
@@ -240,6 +242,8 @@ void Ui::moveFocus(int step) {
 bool Ui::pressedByKey(const std::string& path) const {
   return path == focus_ && !state_->disabled && (state_->key == Key::enter || state_->key == Key::space);
 }
+
+bool Ui::isKey(Key key) const { return event_ != nullptr && event_->kind == Input::Kind::key && event_->key == key; }
 
 int Ui::stepByKey(const std::string& path) const {
   if (path != focus_ || state_->disabled || !state_->key) return 0;
@@ -298,6 +302,11 @@ bool Ui::holds(int button) const { return activate().MouseDown[button]; }
 bool Ui::editing() const {
   activate();
   return ImGui::GetActiveID() != 0 && ImGui::GetInputTextState(ImGui::GetActiveID()) != nullptr;
+}
+
+void Ui::cancelPress() {
+  activate();
+  ImGui::ClearActiveID();
 }
 
 const std::string& Ui::clipboard() const { return state_->clipboard; }
@@ -486,9 +495,15 @@ std::optional<std::string> Ui::field(const std::string& path, const char* text, 
   const double from = label(text);
   const bool entered = ImGui::InputText(id(path, ""), buffer.data(), buffer.size(),
                                         ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
+  std::optional<std::string> result;
+  if (ImGui::IsItemActive()) {
+    state_->drafts[path] = buffer.data();
+  } else if (const auto draft = state_->drafts.extract(path); !draft.empty() && !state_->disabled) {
+    if (!isKey(Key::escape)) result = entered ? std::string(buffer.data()) : draft.mapped();
+  }
   typeInto(path, true);
   note(path, true, from);
-  return entered && buffer.data() != value ? std::optional<std::string>(buffer.data()) : std::nullopt;
+  return result == value ? std::nullopt : result;
 }
 
 void Ui::entry(const std::string& path, std::string& text, bool focus) {

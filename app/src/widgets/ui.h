@@ -118,6 +118,8 @@ class Ui {
   /// slider. A press of the mouse and Escape end the choice.
   const std::string& focus() const { return focus_; }
   void clearFocus() { focus_.clear(); }
+  /// Lets go of the control that the mouse has pressed, which then does nothing when the button is released.
+  void cancelPress();
   /// Returns the event that the present frame handles, or nullptr.
   const Input* event() const { return event_; }
   const std::string& clipboard() const;
@@ -146,7 +148,8 @@ class Ui {
                                    const std::string& current);
   std::optional<double> slider(const std::string& path, const char* label, double value, double low, double high,
                                const char* format = "%.4g", When when = When::moved);
-  /// Draws a text field. Returns the text of the field when Enter is pressed, and std::nullopt otherwise.
+  /// Draws a text field. Returns its text, if it was changed, when Enter is pressed and when the field loses the
+  /// keyboard otherwise than by Escape, which discards the text.
   std::optional<std::string> field(const std::string& path, const char* label, const std::string& value);
   /// Draws a text field that changes `text` as the user types. If `focus` is true, it gets the keyboard, and what is
   /// typed replaces the text.
@@ -189,6 +192,8 @@ class Ui {
   void typeInto(const std::string& path, bool atOnce);
   void takeKey(const Input& input);
   void moveFocus(int step);
+  /// True if this key was pressed in this frame.
+  bool isKey(Key key) const;
   /// True if the key that was pressed in this frame presses the control.
   bool pressedByKey(const std::string& path) const;
   /// Returns 1 for the keys right and down, -1 for left and up, if they are pressed for this control, otherwise 0.
