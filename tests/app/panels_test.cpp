@@ -253,6 +253,16 @@ TEST(Panels, aTextIsEnteredWhenItsFieldLosesTheKeyboard) {
   EXPECT_EQ(error(), 1e-3) << "a click that fails to enter a text does nothing else";
 }
 
+TEST(Panels, escapeClosesAnOpenList) {
+  Bench bench;
+  bench.run("ui click view/cells");
+  EXPECT_TRUE(bench.explorer().widgets().contains("view/cells/lines"));
+  bench.run("ui key escape");
+  EXPECT_FALSE(bench.explorer().widgets().contains("view/cells/lines"));
+  bench.run("ui click bar/slice");
+  EXPECT_TRUE(bench.view().slice) << "the list has not taken the click";
+}
+
 TEST(Panels, theFocusIsSeenAndEndsWithTheInput) {
   Bench bench;
   const render::Image without = bench.explorer().frame();

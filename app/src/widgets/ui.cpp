@@ -14,6 +14,7 @@ namespace {
 
 constexpr float kTextSize = 13;     // points per em
 constexpr float kStep = 1.0F / 60;  // assumed seconds per frame; no clock is read
+constexpr ImGuiPopupFlags kAnyPopup = ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel;
 
 struct NamedKey {
   std::string_view name;
@@ -224,7 +225,7 @@ void Ui::takeKey(const Input& input) {
   if (input.kind == Input::Kind::press) clearFocus();
   if (input.kind != Input::Kind::key || input.control) return;
   if (input.key == Key::tab) return moveFocus(input.shift ? -1 : 1);
-  if (editing()) return;
+  if (editing() || (input.key == Key::escape && ImGui::IsPopupOpen(nullptr, kAnyPopup))) return;
   if (input.key == Key::escape) clearFocus();
   if (!focus_.empty()) state_->key = input.key;
 }
@@ -261,7 +262,7 @@ void Ui::hideTip() {
 void Ui::drawTip() {
   const auto& tip = state_->chosen ? state_->chosen : state_->hovered;
   if (!tip || tip->text.empty() || holds(0) || holds(1) || holds(2)) return;
-  if (ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel)) return;
+  if (ImGui::IsPopupOpen(nullptr, kAnyPopup)) return;
   const auto [width, height] = ImGui::GetIO().DisplaySize;
   const float em = ImGui::GetFontSize(), pad = 0.5F * em, gap = 0.4F * em;
   const ImVec2 text = ImGui::CalcTextSize(tip->text.c_str(), nullptr, false, 22 * em);
@@ -455,6 +456,7 @@ std::optional<std::string> Ui::combo(const std::string& path, const char* text, 
     chosen = item;
     ImGui::CloseCurrentPopup();
   }
+  if (isKey(Key::escape)) ImGui::CloseCurrentPopup();
   ImGui::EndCombo();
   return chosen;
 }
