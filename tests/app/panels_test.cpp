@@ -263,6 +263,24 @@ TEST(Panels, escapeClosesAnOpenList) {
   EXPECT_TRUE(bench.view().slice) << "the list has not taken the click";
 }
 
+TEST(Panels, tabGoesOnFromTheControlThatTheMouseHasPressed) {
+  Bench bench;
+  bench.run("panel camera=true build=true ; show size=900x1200");
+  const auto next = [&](const std::string& path, bool shift = false) {
+    bench.run("ui click " + path);
+    EXPECT_EQ(bench.focus(), "") << "the mouse shows no ring";
+    bench.key(Key::tab, shift);
+    return bench.focus();
+  };
+  EXPECT_EQ(next("view/azimuth"), "view/elevation");
+  EXPECT_EQ(next("view/elevation", true), "view/azimuth");
+  EXPECT_EQ(next("build/target-error"), "build/grid");
+  EXPECT_EQ(next("bar/surface"), "bar/slice");
+  bench.run("ui click view/cells");
+  EXPECT_EQ(next("view/cells/none"), "view/offset") << "an entry stands for its list";
+  EXPECT_EQ(next("canvas"), "bar/open");
+}
+
 TEST(Panels, theFocusIsSeenAndEndsWithTheInput) {
   Bench bench;
   const render::Image without = bench.explorer().frame();

@@ -234,10 +234,16 @@ void Ui::moveFocus(int step) {
   if (editing()) ImGui::ClearActiveID();
   if (order_.empty()) return;
   const auto count = std::ptrdiff_t(order_.size());
-  const auto found = std::ranges::find(order_, focus_) - order_.begin();
+  const auto found = std::ranges::find(order_, focus_.empty() ? pressed_ : focus_) - order_.begin();
   const auto from = found < count ? found : step > 0 ? -1 : count;
   focus_ = order_[std::size_t((from + step + count) % count)];
+  pressed_.clear();
   state_->focusMoved = true;
+}
+
+/// Lets Tab go on from the control if the mouse presses it in this frame.
+void Ui::notePress(const std::string& path, bool hovered) {
+  if (hovered && event_ != nullptr && event_->kind == Input::Kind::press) pressed_ = path;
 }
 
 bool Ui::pressedByKey(const std::string& path) const {
@@ -349,6 +355,7 @@ void Ui::note(const std::string& path, bool takesText, std::optional<double> fro
                        (ImGui::IsWindowHovered() && ImGui::IsMouseHoveringRect(labelled, high));
   if (hovered) state_->hovered = {help_, rectOf(labelled, high), column};
   if (!state_->disabled) order_.push_back(path);
+  if (!state_->disabled) notePress(path, hovered);
   if (path == focus_ && !state_->disabled) {
     state_->chosen = {help_, rectOf(labelled, high), column};
     ImGui::GetWindowDrawList()->AddRect({low.x - 1, low.y - 1}, {high.x + 1, high.y + 1}, ImGui::GetColorU32(kAccent),
@@ -366,6 +373,7 @@ bool Ui::addControl(const std::string& path, const UiRect& rect, std::string hel
   if (path == focus_) state_->chosen = {help, rect, rect};
   widgets_[path] = {.rect = rect.times(scale_), .enabled = !state_->frozen, .help = std::move(help)};
   if (!state_->frozen) order_.push_back(path);
+  if (!state_->frozen) notePress(path, over);
   return !state_->frozen && pressedByKey(path);
 }
 
@@ -452,6 +460,7 @@ std::optional<std::string> Ui::combo(const std::string& path, const char* text, 
     const std::string itemPath = path + "/" + item;
     if (ImGui::Selectable(id(itemPath, item.c_str()), item == shown)) chosen = item;
     note(itemPath);
+    if (pressed_ == itemPath) pressed_ = path;  // the entry is gone once it is chosen
     if (!pressedByKey(itemPath)) continue;
     chosen = item;
     ImGui::CloseCurrentPopup();

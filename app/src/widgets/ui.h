@@ -115,9 +115,12 @@ class Ui {
   bool editing() const;
   /// The path of the control that the keyboard has chosen, or "". Tab and Shift+Tab move on to the next and the
   /// previous control; then Enter and Space press it, arrows change a slider or a list, Enter begins to type into a
-  /// slider. A press of the mouse and Escape end the choice.
+  /// slider. A press of the mouse and Escape end the choice. After a press of a control, Tab goes on from there.
   const std::string& focus() const { return focus_; }
-  void clearFocus() { focus_.clear(); }
+  void clearFocus() {
+    focus_.clear();
+    pressed_.clear();
+  }
   /// Lets go of the control that the mouse has pressed, which then does nothing when the button is released.
   void cancelPress();
   /// Returns the event that the present frame handles, or nullptr.
@@ -192,6 +195,7 @@ class Ui {
   void typeInto(const std::string& path, bool atOnce);
   void takeKey(const Input& input);
   void moveFocus(int step);
+  void notePress(const std::string& path, bool hovered);
   /// True if this key was pressed in this frame.
   bool isKey(Key key) const;
   /// True if the key that was pressed in this frame presses the control.
@@ -208,7 +212,8 @@ class Ui {
   std::map<std::string, Widget> widgets_;
   std::vector<std::string> order_;  ///< paths of the controls that take input, in the order in which they are drawn
   std::string focus_;
-  std::string help_;  ///< tooltip of the next widget
+  std::string pressed_;  ///< the control that the mouse has pressed last, unless the keyboard has chosen another one
+  std::string help_;     ///< tooltip of the next widget
   std::array<double, 2> pointer_ = {-1, -1};
   const Input* event_ = nullptr;
   double scale_ = 0;  ///< pixels per point; 0 before the first frame
