@@ -214,6 +214,7 @@ TEST(LiveWork, showsAConstructionAndCancelsIt) {
   desk.run(std::string(kFirst) + "\npanel shown=false build=true");
   desk.explorer().frame();
   const std::uint64_t cells = desk.explorer().figures().leaves;
+  const auto places = desk.explorer().widgets();
   int frames = 0;
   double furthest = 0;
   {
@@ -226,6 +227,10 @@ TEST(LiveWork, showsAConstructionAndCancelsIt) {
       ASSERT_TRUE(widgets.contains("build/cancel"));
       for (const auto& [path, widget] : widgets)
         EXPECT_EQ(widget.enabled, path == "build/cancel" || path == "canvas") << path;
+      for (const char* button : {"build/rebuild", "build/compare"}) {  // a double click must not cancel
+        const UiRect &a = places.at(button).rect, &b = widgets.at("build/cancel").rect;
+        EXPECT_TRUE(a.x1 <= b.x0 || b.x1 <= a.x0 || a.y1 <= b.y0 || b.y1 <= a.y0) << button;
+      }
       furthest = std::max(furthest, explorer.work->fraction);
       // During the work, no other widget has an effect.
       const ViewState before = explorer.view();

@@ -200,12 +200,16 @@ void drawContinuity(const BuildControls& build, const Field& field) {
 /// Draws the progress of the construction. During the construction only the button that cancels it takes
 /// input.
 void drawProgress(Ui& ui, Explorer& explorer) {
-  ui.progress("build/progress", explorer.work->task, explorer.work->fraction);
+  constexpr const char* kCancel = "cancel";
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const float button = widthOf(kCancel) + 2 * style.FramePadding.x + style.ItemSpacing.x;
+  ui.progress("build/progress", explorer.work->task, explorer.work->fraction, explorer.work->cancellable ? button : 0);
   if (!explorer.work->cancellable) return;
+  ImGui::SameLine();
   ui.freeze(false);
   ui.enable(true);
   ui.help("Stop, and keep the field that there was before.");
-  if (ui.button("build/cancel", "cancel")) explorer.cancelWanted = true;
+  if (ui.button("build/cancel", kCancel)) explorer.cancelWanted = true;
   ui.freeze(true);
   ui.enable(true);
 }
@@ -273,6 +277,12 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer) {
   drawContinuity(build, field);
   const bool bounds = build.value("bounds", field.data().bounds.empty() ? "false" : "true") == "true";
   controls.checkbox("build/bounds", "bounds", bounds, "settings bounds=");
+  const bool canBuild = !build.value("mesh", current.madeFrom()).empty();
+  controls.button("build/rebuild", "rebuild", "rebuild", canBuild);
+  ImGui::SameLine();
+  controls.button("build/compare", "rebuild and compare", "rebuild keep=true", canBuild,
+                  "Build the field anew, and show the one before it beside it.", widthLeft());
+  // The progress is below the buttons, so that a second click on one of them does not cancel what the first has begun.
   if (explorer.work) return drawProgress(controls.ui, explorer);
   if (const auto all = explorer.allSteps()) {
     const auto steps = double(field.metadata().steps.value_or(*all));
@@ -280,11 +290,6 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer) {
     if (const auto v = controls.ui.slider("build/steps", "steps", steps, 0, double(*all), "%.0f", When::released))
       controls.commands.push_back(fmt::format("rebuild max-steps={:.0f}", *v));
   }
-  const bool canBuild = !build.value("mesh", current.madeFrom()).empty();
-  controls.button("build/rebuild", "rebuild", "rebuild", canBuild);
-  ImGui::SameLine();
-  controls.button("build/compare", "rebuild and compare", "rebuild keep=true", canBuild,
-                  "Build the field anew, and show the one before it beside it.", widthLeft());
 }
 
 }  // namespace hpsdf::app

@@ -591,8 +591,8 @@ void Ui::facts(std::span<const std::pair<std::string, std::string>> rows) {
   ImGui::PopStyleVar();
 }
 
-void Ui::progress(const std::string& path, const std::string& task, double fraction) {
-  ImGui::ProgressBar(float(fraction), {-1, 0}, task.c_str());
+void Ui::progress(const std::string& path, const std::string& task, double fraction, double room) {
+  ImGui::ProgressBar(float(fraction), {-1 - float(room), 0}, task.c_str());
   addArea(path, visiblePart(ImGui::GetItemRectMin(), ImGui::GetItemRectMax()));
   widgets_[path].enabled = !state_->disabled;
 }

@@ -169,7 +169,8 @@ class Ui {
   bool row(const std::string& path, std::span<const std::string> cells, std::span<const double> columns);
   void text(const std::string& line, bool soft = false);
   void facts(std::span<const std::pair<std::string, std::string>> rows);
-  void progress(const std::string& path, const std::string& task, double fraction);
+  /// Draws a bar that shows how much of a task is done. `room` is left free on its right.
+  void progress(const std::string& path, const std::string& task, double fraction, double room = 0);
   /// Enables or disables all widgets that are drawn after this call.
   void enable(bool enabled);
   /// While `frozen` is true, `enable` cannot enable any widgets.
