@@ -202,8 +202,8 @@ TEST(ExplorerFiles, theEndingTellsWhatIsWritten) {
     bench.run("ui type files/name " + bench.file(name));
     return lines.back();
   };
-  EXPECT_EQ(save("frame.png"), "shot output=" + bench.file("frame.png"));
-  EXPECT_EQ(render::loadPng(bench.file("frame.png")).pixels, bench.explorer().frame().pixels) << "without the dialog";
+  EXPECT_EQ(save("frame.png"), "shot panels=false output=" + bench.file("frame.png"));
+  EXPECT_TRUE(same(render::loadPng(bench.file("frame.png")), bench.explorer().picture()->image)) << "nothing over it";
   EXPECT_EQ(save("ball.hpsdf"), "save output=" + bench.file("ball.hpsdf"));
   bench.run("surface offset=0.125");
   EXPECT_EQ(save("ball.stl"), "contour output=" + bench.file("ball.stl") + " offset=0.125");
@@ -218,6 +218,25 @@ TEST(ExplorerFiles, theEndingTellsWhatIsWritten) {
   EXPECT_TRUE(proposed());
   bench.run("ui key escape");
   EXPECT_FALSE(proposed());
+}
+
+TEST(ExplorerFiles, aPictureWithoutPanelsIsWhatTheCanvasShows) {
+  Bench bench;
+  bench.run(std::string(kSphere) + "save output=" + bench.file("ball.hpsdf"));
+  bench.run("show size=1280x720; ui hover bar/save; shot panels=false output=" + bench.file("one.png"));
+  EXPECT_TRUE(same(render::loadPng(bench.file("one.png")), bench.explorer().picture()->image)) << "no tooltip, no axes";
+  EXPECT_EQ(bench.session.picture().corner, (std::array{0, 0})) << "for the command pick";
+  bench.run("ui hover 640,715; show slice; beside " + bench.file("ball.hpsdf") +
+            "; shot panels=false output=" + bench.file("two.png"));
+  const render::Image two = render::loadPng(bench.file("two.png")), frame = bench.explorer().frame();
+  const Layout layout = layoutOf(bench.view());
+  ASSERT_EQ(two.width, int(layout.beside.x1 - layout.canvas.x0));
+  ASSERT_EQ(two.height, int(layout.canvas.height()));
+  int different = 0;
+  for (int y = 0; y < two.height; ++y)
+    for (int x = 0; x < two.width; ++x)
+      different += two.at(x, y) != frame.at(int(layout.canvas.x0) + x, int(layout.canvas.y0) + y);
+  EXPECT_EQ(different, 0) << "with the names of the fields";
 }
 
 TEST(ExplorerFiles, besideAndOtherPickAFile) {

@@ -430,7 +430,7 @@ TEST_F(WindowTest, filesAreOpenedInTheWindow) {
   EXPECT_THAT(window_->err(), HasSubstr("nowhere.hpsdf"));
   const std::string script = contents(file("session.hps"));
   EXPECT_THAT(script, AllOf(HasSubstr("show size=960x640 scale=1 samples=2 gl=software\nopen one.hpsdf\n"),
-                            HasSubstr("\nshot output=frame.png\n")));
+                            HasSubstr("\nshot panels=false output=frame.png\n")));
   EXPECT_THAT(script, Not(HasSubstr("nowhere")));
   EXPECT_THAT(contents(file("hpsdf/recent")), HasSubstr("/one.hpsdf\n"));
   const std::string first = contents(file("frame.png")), last = contents(file("last.png"));

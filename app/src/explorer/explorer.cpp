@@ -773,6 +773,24 @@ render::Image Explorer::frame(int coarseness) {
   return image;
 }
 
+render::Image Explorer::canvasImage() {
+  drawsCanvasOnly_ = true;
+  render::Image whole;
+  try {
+    whole = frame();
+  } catch (...) {
+    drawsCanvasOnly_ = false;
+    throw;
+  }
+  drawsCanvasOnly_ = false;
+  const Layout layout = layoutOf(view_);
+  const auto x0 = int(layout.canvas.x0), y0 = int(layout.canvas.y0);
+  const auto x1 = int(layout.beside.width() > 0 ? layout.beside.x1 : layout.canvas.x1);
+  render::Image image(x1 - x0, int(layout.canvas.height()), {});
+  for (int y = 0; y < image.height; ++y) std::copy_n(&whole.at(x0, y0 + y), image.width, &image.at(0, y));
+  return image;
+}
+
 const FieldStatistics& Explorer::figures() {
   if (!figures_) figures_ = statistics(session_.current().field);
   return *figures_;

@@ -88,6 +88,11 @@ class Explorer final : public SessionExtension {
   /// divides the picture's resolution along each axis. During long work the last picture is shown again or, if there is
   /// no field yet, what stands for it.
   render::Image frame(int coarseness = 0);
+  /// Draws and returns what the canvas shows: the picture or both pictures, with names and marks, but without panels,
+  /// tooltips and the axes that take clicks.
+  render::Image canvasImage();
+  /// True while `canvasImage` draws.
+  bool drawsCanvasOnly() const { return drawsCanvasOnly_; }
   /// True if the picture must be redrawn: there is none yet, or the last one was coarse or drawn for another state of
   /// the explorer.
   bool isStale() const;
@@ -217,7 +222,8 @@ class Explorer final : public SessionExtension {
   std::vector<std::string> later_;  ///< lines that ran within another one and are still to be told to `onCommand`
   std::string lastKind_;            ///< command and parameter names in the gesture's last line of script
   bool running_ = false;
-  bool opening_ = false;   ///< true while `openFile` makes a field
+  bool opening_ = false;  ///< true while `openFile` makes a field
+  bool drawsCanvasOnly_ = false;
   bool replaces_ = false;  ///< true if the running command replaces the previous one
 
   std::optional<std::uint64_t> allSteps_;

@@ -190,14 +190,15 @@ void runRebuild(Session& session, const Arguments& arguments) {
 
 void runOpen(Session& session, const Arguments& arguments) { explorerOf(session).openFile(arguments.text("file")); }
 
-render::Image drawShot(Session& session, const Arguments&) {
+render::Image drawShot(Session& session, const Arguments& arguments) {
   session.current();  // throws `Error` if there is no field
   Explorer& explorer = explorerOf(session);
-  const render::Image frame = explorer.frame();
+  const bool panels = arguments.flag("panels");
+  const render::Image frame = panels ? explorer.frame() : explorer.canvasImage();
   render::Drawn picture = *explorer.picture();
   const UiRect canvas = layoutOf(explorer.view()).canvas;  // `pick` works only in the current field's picture
   picture.image = frame;
-  picture.corner = {int(canvas.x0), int(canvas.y0)};
+  picture.corner = panels ? std::array{int(canvas.x0), int(canvas.y0)} : std::array{0, 0};
   session.setPicture(std::move(picture));
   return frame;
 }
@@ -364,10 +365,12 @@ void addFieldAndShotCommands(Registry& registry) {
   registry.addForScripts({
       .name = "shot",
       .summary = "Write the explorer's frame: the picture and the panels around it.",
-      .help = "Pending work is finished first. 'pick' and 'expect pick(…)' then speak of its pixels. 'panel all=false' "
-              "leaves the picture alone.",
-      .examples = {"shot output=frame.png"},
-      .parameters = {{"output", outputFile().as('o').required(), "*.png."}},
+      .help = "Pending work is finished first. 'pick' and 'expect pick(…)' then speak of its pixels.",
+      .examples = {"shot output=frame.png", "shot output=view.png panels=false"},
+      .parameters = {{"output", outputFile().as('o').required(), "*.png."},
+                     {"panels", flag("true"),
+                      "With the panels; false writes only the picture, as large as it is between them: of both fields "
+                      "if two are shown, with their names and marks."}},
       .action = runShot,
       .draw = drawShot,
       .view = [](Session& session, const Arguments&) { return scriptOf(explorerOf(session).view()); },

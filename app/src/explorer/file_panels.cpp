@@ -40,7 +40,7 @@ std::string contourLine(const ViewState& view, const std::string& word) {
 /// Returns the command that writes a file; the ending of its name tells what is written.
 std::string savingLine(const ViewState& view, const std::string& file) {
   const std::string ending = lowerExtension(file), word = scriptWord(file);
-  if (ending == ".png") return "shot output=" + word;
+  if (ending == ".png") return "shot panels=false output=" + word;
   if (ending == ".hpsdf") return "save output=" + word;
   if (isMeshFileName(file)) return contourLine(view, word);
   return "export output=" + word;
@@ -72,7 +72,7 @@ FileQuestion saveQuestion(const Explorer& explorer) {
     return std::ranges::find(endings, lowerExtension(file), &FileEnding::ending) != endings.end();
   };
   return {.id = kSave,
-          .title = "Write what is shown into a file; the ending of its name tells what is written",
+          .title = "Save the picture without panels, the field, its triangles or a grid",
           .accepts = isWritten,
           .endings = endings,
           .name = proposedName(explorer) + ".png"};
@@ -130,7 +130,7 @@ void drawFileButtons(const Controls& controls, const Explorer& explorer) {
   controls.ui.help("Open a mesh or a field. Key: Ctrl+O");
   if (controls.ui.button("bar/open", "open")) controls.files.ask(openQuestion(explorer));
   ImGui::SameLine(0, 2);
-  controls.ui.help("Write the picture, the field, its triangles or a grid into a file. Key: Ctrl+S");
+  controls.ui.help("Write the picture without panels, the field, its triangles or a grid into a file. Key: Ctrl+S");
   if (controls.ui.button("bar/save", "save")) controls.files.ask(saveQuestion(explorer));
 }
 

@@ -338,7 +338,7 @@ void drawParts(const Controls& controls, Explorer& explorer) {
   drawMark(explorer, layout);
   drawFieldNames(explorer, layout);
   drawExplanation(explorer, layout);
-  drawGizmo(ui, view, layout.canvas, controls.commands);
+  if (!explorer.drawsCanvasOnly()) drawGizmo(ui, view, layout.canvas, controls.commands);
   ui.addArea("canvas", layout.canvas);
   if (layout.beside.width() > 0) ui.addArea("beside", layout.beside);
 }
@@ -354,6 +354,7 @@ void Controls::describe(const std::string& command, const char* help) const {
 void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) {
   const Controls controls{ui, explorer.session().registry(), commands, explorer.files};
   drawParts(controls, explorer);
+  if (explorer.drawsCanvasOnly()) return ui.hideTip();
   const ViewState& view = explorer.view();
   if (view.isOpen(Panel::keys)) {
     drawKeys(view);

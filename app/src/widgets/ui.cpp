@@ -50,6 +50,7 @@ void setStyle() {
   ImGui::StyleColorsLight();
   ImGuiStyle& style = ImGui::GetStyle();
   style.WindowPadding = {10, 5};
+  style.WindowMinSize = {1, 1};  // the bar must not cover the upper rows of the picture
   style.FramePadding = {6, 2};
   style.ItemSpacing = {6, 4};
   style.ItemInnerSpacing = {6, 4};
