@@ -177,7 +177,7 @@ TEST(Recording, randomInputReplaysToTheSameFrameAndHistory) {
       } catch (const Error&) {  // a plane outside of the domain cannot be drawn
         desk.explorer().run("undo");
       }
-    desk.explorer().message.clear();
+    desk.explorer().message = {};
     recording.notePointer();
     Desk again;
     again.run(recording.script());
@@ -493,7 +493,7 @@ TEST(LiveWork, theContourOfShownTrianglesCanBeCancelled) {
   // A cancelled contour of a new field leaves the field, without triangles.
   desk.explorer().run("build analytic:torus target-error=1e-3");
   EXPECT_FALSE(desk.explorer().view().triangles);
-  EXPECT_THAT(desk.explorer().message, HasSubstr("the triangles are hidden: their contour was cancelled"));
+  EXPECT_THAT(desk.explorer().message.text, HasSubstr("the triangles are hidden: their contour was cancelled"));
   const int before = listener.contours;
   desk.explorer().frame();
   EXPECT_EQ(listener.contours, before) << "no frame makes a contour";

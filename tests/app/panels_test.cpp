@@ -290,6 +290,27 @@ TEST(Panels, theFocusIsSeenAndEndsWithTheInput) {
   EXPECT_TRUE(same(bench.explorer().frame(), without));
 }
 
+/// Returns the number of reddish pixels of the panel below the picture.
+int reddish(Bench& bench) {
+  const render::Image frame = bench.explorer().frame();
+  const UiRect rect = layoutOf(bench.view()).readout;
+  int count = 0;
+  for (int y = int(rect.y0); y < int(rect.y1); ++y)
+    for (int x = int(rect.x0); x < int(rect.x1); ++x) count += frame.at(x, y)[0] > frame.at(x, y)[2] + 80;
+  return count;
+}
+
+TEST(Panels, problemsHaveAnInkOfTheirOwn) {
+  Bench bench;
+  bench.explorer().message = {"view copied as 12 lines of script"};
+  EXPECT_EQ(reddish(bench), 0);
+  for (const char* script : {"open", "panel", "preset"}) {
+    bench.explorer().tellProblem(std::string("panel:1:1: ") + script + ":1:7: bunny.obj:3:1: not a number");
+    EXPECT_EQ(bench.explorer().message.text, "bunny.obj:3:1: not a number") << "without the explorer's scripts";
+  }
+  EXPECT_GT(reddish(bench), 100);
+}
+
 TEST(Panels, keysChangeTheView) {
   Bench bench;
   bench.type("p");

@@ -30,6 +30,10 @@ constexpr double kSmallestCanvas = 160;
 constexpr double kClick = 3;  // distance that the pointer may move during a click
 constexpr double kDegreesPerPoint = 0.4;
 
+// Names of the scripts that the explorer makes, with which messages of their errors begin.
+constexpr const char *kPanelScript = "panel", *kOpenScript = "open", *kPresetScript = "preset",
+                     *kRebuildScript = "rebuild";
+
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
 std::string vectorWord(const Vector3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v.x(), v.y(), v.z()); }
@@ -139,6 +143,15 @@ Layout layoutInPoints(const ViewState& view) {
   return layout;
 }
 
+std::string withoutPosition(std::string message) {
+  constexpr std::array kScripts = {kPanelScript, kOpenScript, kPresetScript, kRebuildScript};
+  const auto isBefore = [&](const char* script) { return message.starts_with(fmt::format("{}:1:", script)); };
+  while (std::ranges::any_of(kScripts, isBefore)) message.erase(0, message.find(": ") + 2);
+  return message;
+}
+
+void Explorer::tellProblem(const std::string& text) { message = {printable(withoutPosition(text)), true}; }
+
 Explorer::Explorer(Session& session) : session_(session) {
   if (session.hasField()) fieldChanged();
 }
@@ -166,7 +179,7 @@ void Explorer::changeBy(const std::string& line) {
     return std::exchange(view_, history.view);
   };
   try {
-    runScript(session_, parseScript(session_.registry(), "preset", line, {}));
+    runScript(session_, parseScript(session_.registry(), kPresetScript, line, {}));
   } catch (...) {
     goBackTo(before);
     throw;
@@ -271,7 +284,7 @@ void Explorer::rebuild(std::optional<int> maxSteps, bool keeps) {
   if (keeps) before = session_.current().field;
   rebuilding_ = maxSteps ? Rebuilding::steps : Rebuilding::whole;
   try {
-    runScript(session_, parseScript(session_.registry(), "rebuild", line, {}));
+    runScript(session_, parseScript(session_.registry(), kRebuildScript, line, {}));
   } catch (...) {
     rebuilding_ = Rebuilding::no;
     throw;
@@ -326,7 +339,7 @@ void Explorer::hideTriangles(ViewState& view, const std::string& why) {
   view.triangles = false;
   const std::string text = "the triangles are hidden: " + why;
   warn(session_.console(), text);
-  if (running_) message = printable(text);
+  if (running_) tellProblem(text);
 }
 
 /// Ends a gesture if the mouse is idle. During a gesture, such as the drag of a slider, no contour is made, because it
@@ -339,7 +352,7 @@ void Explorer::finishGesture() {
     run("triangles shown=true");
   } catch (const Error& error) {
     run("triangles shown=false");
-    message = printable(error.what());
+    tellProblem(error.what());
   } catch (const Cancelled&) {
     run(canUndo() ? "undo" : "triangles shown=false");
     throw;
@@ -378,7 +391,7 @@ void Explorer::openFile(const std::string& name) {
   const auto undone = std::exchange(undone_, {}), redone = std::exchange(redone_, {});
   opening_ = true;
   try {
-    runScript(session_, parseScript(session_.registry(), "open",
+    runScript(session_, parseScript(session_.registry(), kOpenScript,
                                     (kind == FileKind::field ? "load " : "build ") + scriptWord(name), {}));
   } catch (...) {
     opening_ = false;
@@ -405,7 +418,7 @@ void Explorer::perform(const std::string& line) {
 }
 
 void Explorer::run(const std::string& line) {
-  message.clear();
+  message = {};
   const bool isWithinAnother = running_;
   const std::string kind = ui_.busy() ? kindOf(line) : "";
   replaces_ = !kind.empty() && kind == lastKind_;
@@ -505,6 +518,7 @@ void Explorer::runCommandsOf(const Input& event, const std::vector<std::string>&
 
 void Explorer::input(const Input& event) {
   if (work) return inputWhileWorking(event);
+  if (event.kind == Input::Kind::press) message = {};
   std::vector<std::string> commands;
   drawPanels(&event, commands);
   if (const auto command = canvasCommand(event)) commands.push_back(*command);
@@ -612,8 +626,8 @@ std::optional<std::string> Explorer::clickCommand() {
   const std::optional<Readout> at = readout();
   if (!at || !session_.current().field.domain().contains(at->pick.position)) return std::nullopt;
   if (!session_.knowsSurface()) {
-    message = "Why this cell is as it is can be told only beside its mesh, " + session_.current().madeFrom() +
-              ": open the field in the folder of the mesh.";
+    tellProblem("Why this cell is as it is can be told only beside its mesh, " + session_.current().madeFrom() +
+                ": open the field in the folder of the mesh.");
     return std::nullopt;
   }
   return "why point=" + vectorWord(at->pick.position);

@@ -36,6 +36,10 @@ Layout layoutInPoints(const ViewState& view);
 /// was built within a tolerance and changed afterwards, they have the default target error.
 BuildOptions rebuildOptions(const Field& field);
 
+/// Removes the position in a script from the beginning of an error message if the explorer itself has made the script,
+/// because the users of a window do not know it.
+std::string withoutPosition(std::string message);
+
 class Explorer final : public SessionExtension {
  public:
   explicit Explorer(Session& session);
@@ -146,7 +150,14 @@ class Explorer final : public SessionExtension {
   /// The dialog that asks for files. While it is open, the panels take no input.
   FileDialog files;
 
-  std::string message;  ///< error or result, shown in the readout panel until the next command
+  /// What the readout panel tells until the next command or press of the mouse.
+  struct Message {
+    std::string text;
+    bool isProblem = false;  ///< an error or a warning, not a result
+  };
+  Message message;
+  /// Tells why something failed, without the position in a script of the explorer.
+  void tellProblem(const std::string& text);
   Session& session() const { return session_; }
   /// The last picture of the field, without the panels.
   const std::optional<render::Drawn>& picture() const { return picture_; }

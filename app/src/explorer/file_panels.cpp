@@ -160,12 +160,8 @@ void drawStart(const Controls& controls, const Explorer& explorer, const Layout&
   ImGui::GetBackgroundDrawList()->AddRectFilled(from, to, ImGui::GetColorU32(ImGuiCol_WindowBg), 6);
   ImGui::GetBackgroundDrawList()->AddRect(from, to, ImGui::GetColorU32(ImGuiCol_Border), 6);
   controls.ui.column("start", {x, y, x + width, y + height}, {}, [&] { drawStartPanel(controls, explorer, recent); });
-  if (layout.readout.width() > 0 && !explorer.message.empty())
-    controls.ui.column("readout", layout.readout, {}, [&] {
-      ImGui::PushTextWrapPos(0);
-      controls.ui.text(explorer.message);
-      ImGui::PopTextWrapPos();
-    });
+  if (layout.readout.width() > 0 && !explorer.message.text.empty())
+    controls.ui.column("readout", layout.readout, {}, [&] { drawMessage(controls.ui, explorer); });
 }
 
 std::string currentName(const Explorer& explorer) {

@@ -222,12 +222,7 @@ void drawReadout(Ui& ui, Explorer& explorer) {
     if (work->cancellable) ui.text("Escape: cancel", true);
     return;
   }
-  if (!explorer.message.empty()) {
-    ImGui::PushTextWrapPos(0);
-    ui.text(explorer.message);
-    ImGui::PopTextWrapPos();
-    return;
-  }
+  if (!explorer.message.text.empty()) return drawMessage(ui, explorer);
   if (const auto readout = explorer.readout()) {
     for (const std::string& line : readoutText(*readout)) ui.text(line);
     return;
@@ -349,6 +344,13 @@ void Controls::describe(const std::string& command, const char* help) const {
   const bool isUnfinished = command.ends_with('=') || command.ends_with(' ');
   ui.help(fmt::format("{}\nIn scripts: {}{}", help != nullptr ? help : helpOf(registry, command), command,
                       isUnfinished ? "…" : ""));
+}
+
+void drawMessage(Ui& ui, const Explorer& explorer) {
+  const auto& [text, isProblem] = explorer.message;
+  ImGui::PushTextWrapPos(0);
+  isProblem ? ui.problem(text) : ui.text(text);
+  ImGui::PopTextWrapPos();
 }
 
 void drawPanels(Ui& ui, Explorer& explorer, std::vector<std::string>& commands) {

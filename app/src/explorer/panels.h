@@ -115,6 +115,9 @@ void fieldFile(const Controls& controls, const std::string& path, const char* la
 void surfaceFile(const Controls& controls, const std::string& path, const char* label, const std::string& value,
                  const std::string& command);
 
+/// Draws the explorer's message.
+void drawMessage(Ui& ui, const Explorer& explorer);
+
 /// Draws an invitation to open a file, in the middle of a frame without a field.
 void drawStart(const Controls& controls, const Explorer& explorer, const Layout& layout);
 

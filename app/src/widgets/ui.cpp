@@ -21,7 +21,7 @@ struct NamedKey {
   Key key;
   ImGuiKey code;
 };
-const ImVec4 kAccent(0.20F, 0.36F, 0.62F, 1);
+const ImVec4 kAccent(0.20F, 0.36F, 0.62F, 1), kProblemInk(0.62F, 0.18F, 0.06F, 1);
 constexpr NamedKey kKeys[] = {{"enter", Key::enter, ImGuiKey_Enter},
                               {"escape", Key::escape, ImGuiKey_Escape},
                               {"backspace", Key::backspace, ImGuiKey_Backspace},
@@ -580,6 +580,12 @@ void Ui::text(const std::string& line, bool soft) {
     ImGui::TextDisabled("%s", line.c_str());
   else
     ImGui::TextUnformatted(line.c_str());
+}
+
+void Ui::problem(const std::string& line) {
+  ImGui::PushStyleColor(ImGuiCol_Text, kProblemInk);
+  text(line);
+  ImGui::PopStyleColor();
 }
 
 void Ui::facts(std::span<const std::pair<std::string, std::string>> rows) {

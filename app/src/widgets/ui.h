@@ -168,6 +168,8 @@ class Ui {
   /// Draws a row of a table, with its cells from `columns` on, measured in widths of a digit.
   bool row(const std::string& path, std::span<const std::string> cells, std::span<const double> columns);
   void text(const std::string& line, bool soft = false);
+  /// Writes why something failed, in a colour of its own.
+  void problem(const std::string& line);
   void facts(std::span<const std::pair<std::string, std::string>> rows);
   /// Draws a bar that shows how much of a task is done. `room` is left free on its right.
   void progress(const std::string& path, const std::string& task, double fraction, double room = 0);

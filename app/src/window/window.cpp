@@ -167,14 +167,6 @@ std::optional<Key> keyOf(int key, int scancode) {
   return letter == nullptr ? std::nullopt : keyNamed(letter);
 }
 
-/// Removes the script position from the beginning of an error message, because users do not know the explorer's
-/// internal scripts.
-std::string withoutPosition(std::string message) {
-  for (const std::string_view script : {"panel:1:", "rebuild:1:", "preset:1:"})
-    if (message.starts_with(script)) message.erase(0, message.find(": ") + 2);
-  return message;
-}
-
 /// Returns the first of the names hpsdf-0001.png, hpsdf-0002.png, … for which no file exists.
 std::string freeShotName() {
   for (int number = 1;; ++number) {
@@ -335,9 +327,9 @@ class Window {
 
   /// Shows an error in the window and writes it to the terminal, since the readout panel may be closed.
   void showError(const std::string& error) {
-    explorer_.message = printable(withoutPosition(error));
+    explorer_.tellProblem(error);
     const std::lock_guard lock(messageMutex());
-    explorer_.session().console().err << "hpsdf: " << explorer_.message << std::endl;
+    explorer_.session().console().err << "hpsdf: " << explorer_.message.text << std::endl;
   }
 
   /// Runs an action. If the action throws, shows the error in the window, which stays open.
@@ -454,7 +446,7 @@ class Window {
   void endGestures() {
     attempt([&] { explorer_.releaseInput(); });  // a released slider may start long work
     frame(0);                                    // if drawing fails, undoes changes of the view, also in the recording
-    explorer_.message.clear();
+    explorer_.message = {};
     recording_->notePointer();
   }
 
@@ -464,7 +456,7 @@ class Window {
     attempt([&] {
       const std::string name = freeShotName();
       explorer_.run("shot output=" + name);
-      explorer_.message = name + " written";
+      explorer_.message = {name + " written"};
     });
   }
 
