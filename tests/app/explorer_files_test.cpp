@@ -239,6 +239,47 @@ TEST(ExplorerFiles, aPictureWithoutPanelsIsWhatTheCanvasShows) {
   EXPECT_EQ(different, 0) << "with the names of the fields";
 }
 
+/// The dialog asks before it replaces a file, and names that it cannot write stay in it.
+TEST(ExplorerFiles, theDialogStaysOpenUntilAFileCanBeWritten) {
+  Bench bench;
+  bench.run(kSphere);
+  const auto isOpen = [&] { return bench.explorer().widgets().contains("files/name"); };
+  const auto save = [&](const std::string& name) {
+    bench.key(Key::s, true);
+    bench.run("ui type files/name " + bench.file(name));
+  };
+  save("ball.foo");
+  ASSERT_TRUE(isOpen()) << "nothing is written with this ending";
+  bench.run("ui click files/as-field; ui click files/choose");
+  EXPECT_FALSE(isOpen());
+  EXPECT_TRUE(std::filesystem::exists(bench.file("ball.hpsdf"))) << "the name was kept";
+  EXPECT_EQ(bench.explorer().message.text, bench.file("ball.hpsdf") + " written");
+  EXPECT_FALSE(bench.explorer().message.isProblem);
+  save("view");
+  EXPECT_FALSE(isOpen());
+  EXPECT_TRUE(std::filesystem::exists(bench.file("view.png"))) << "a name without an ending is a picture's";
+
+  std::ofstream(bench.file("kept.png")) << "not yet";
+  const auto size = [&] { return std::filesystem::file_size(bench.file("kept.png")); };
+  save("kept.png");
+  ASSERT_TRUE(isOpen());
+  EXPECT_EQ(size(), 7u) << "the dialog asks first";
+  bench.key(Key::escape);
+  save("kept.png");
+  ASSERT_TRUE(isOpen()) << "it asks each time";
+  bench.key(Key::enter);
+  EXPECT_FALSE(isOpen());
+  EXPECT_GT(size(), 7u);
+}
+
+TEST(ExplorerFiles, aCopiedViewIsTold) {
+  Bench bench;
+  bench.run(std::string(kSphere) + "ui click bar/copy-view");
+  EXPECT_THAT(bench.explorer().message.text, testing::MatchesRegex("view copied as [0-9]+ lines of script"));
+  bench.explorer().input({.kind = Input::Kind::press});
+  EXPECT_EQ(bench.explorer().message.text, "") << "the next press ends it";
+}
+
 TEST(ExplorerFiles, besideAndOtherPickAFile) {
   Bench bench;
   bench.run(std::string(kSphere) + "save output=" + bench.file("ball.hpsdf"));

@@ -405,16 +405,28 @@ void Explorer::openFile(const std::string& name) {
   opening_ = false;
 }
 
-/// Runs a line of script, perhaps while another line is running.
-void Explorer::perform(const std::string& line) {
+/// Returns what the user is told after a command, or "" if the frame shows what it has done.
+std::string Explorer::resultOf(const Command& command, const Arguments& arguments) const {
+  if (const auto written = outputFiles(command, arguments); !written.empty())
+    return fmt::format("{} written", printable(fmt::format("{}", fmt::join(written, ", "))));
+  if (command.name != "copy-view") return "";
+  return fmt::format("view copied as {} lines of script", std::ranges::count(ui_.clipboard(), '\n'));
+}
+
+/// Runs a line of script, perhaps while another line is running. Returns what the user is told afterwards.
+std::string Explorer::perform(const std::string& line) {
   const bool isWithinAnother = std::exchange(running_, true);
+  std::string result;
   try {
-    runScript(session_, parseScript(session_.registry(), "panel", line, {}));
+    const std::vector<Call> calls = parseScript(session_.registry(), kPanelScript, line, {});
+    runScript(session_, calls);
+    for (const Call& call : calls) result = resultOf(*call.command, call.arguments);
   } catch (...) {
     running_ = isWithinAnother;
     throw;
   }
   running_ = isWithinAnother;
+  return result;
 }
 
 void Explorer::run(const std::string& line) {
@@ -424,7 +436,8 @@ void Explorer::run(const std::string& line) {
   replaces_ = !kind.empty() && kind == lastKind_;
   lastKind_.clear();  // if this line fails, the next line must not replace it
   try {
-    perform(line);
+    const std::string result = perform(line);
+    if (message.text.empty()) message = {result};
   } catch (...) {
     replaces_ = false;
     if (!isWithinAnother) later_.clear();

@@ -185,7 +185,8 @@ class Explorer final : public SessionExtension {
   /// The domain of the picture that is shown, and the field in it. While there is only a mesh, there is no field.
   const Box& shownDomain() const;
   const Field& shownField() const;
-  void perform(const std::string& line);
+  std::string perform(const std::string& line);
+  std::string resultOf(const Command& command, const Arguments& arguments) const;
   void tellLater();
   void drawPreview(int coarseness);
   /// Returns 0 for a coarseness that is none, since the view has one sample for each pixel.

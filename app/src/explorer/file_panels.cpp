@@ -4,6 +4,7 @@
 #include "explorer/panels.h"
 #include "hpsdf/detail/text.h"
 #include "hpsdf/mesh_file.h"
+#include "language/script.h"
 #include "session/field_summary.h"
 #include "text/text.h"
 
@@ -19,6 +20,16 @@ constexpr std::array kShapes = {"torus", "gear", "helix-bowl", "box"};
 
 bool canBeOpened(const std::string& file) { return kindOfFile(file) != FileKind::unknown; }
 bool isField(const std::string& file) { return lowerExtension(file) == ".hpsdf"; }
+
+/// True if the command `export` takes a file of this name.
+bool isGrid(const Registry& registry, const std::string& file) {
+  try {
+    parseScript(registry, "export", "export output=" + scriptWord(file), {});
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
 
 /// Returns a name for a file to be written: that of the field without its folder and its ending.
 std::string proposedName(const Explorer& explorer) {
@@ -67,9 +78,13 @@ FileQuestion openQuestion(const Explorer& explorer) {
 /// Returns the question into which file the picture, the field, its triangles or a grid is to be written.
 FileQuestion saveQuestion(const Explorer& explorer) {
   const std::vector<FileEnding> endings = {
-      {"picture", ".png"}, {"field", ".hpsdf"}, {"triangles", ".stl"}, {"grid", ".vti"}};
-  const auto isWritten = [endings](const std::string& file) {
-    return std::ranges::find(endings, lowerExtension(file), &FileEnding::ending) != endings.end();
+      {"picture", ".png", "The picture as it is shown, without the panels. F12 writes the whole window."},
+      {"field", ".hpsdf", "The field, which hpsdf opens again."},
+      {"triangles", ".stl", "The triangles of the surface that is shown; .obj, .ply and .glb can be typed, too."},
+      {"grid", ".vti",
+       "The field's values on a grid, for ParaView; .vtu, .npy, .vdb, .nvdb and .cdf can be typed, too."}};
+  const auto isWritten = [&registry = explorer.session().registry()](const std::string& file) {
+    return lowerExtension(file) == ".png" || isField(file) || isMeshFileName(file) || isGrid(registry, file);
   };
   return {.id = kSave,
           .title = "Save the picture without panels, the field, its triangles or a grid",

@@ -43,6 +43,8 @@ std::string fittingEnd(const std::string& text) {
 void FileDialog::ask(FileQuestion question) {
   question_ = std::move(question);
   name_ = question_->name;
+  ending_ = lowerExtension(name_);
+  objection_ = {};
   enter(isFolder(lastFolder_) ? lastFolder_ : "");
 }
 
@@ -109,16 +111,32 @@ void FileDialog::take(const std::string& path) {
     question_->suggested.clear();  // they stand above the first folder only
     return enter(path);
   }
+  if (const std::string objection = objectionTo(path); !objection.empty()) {
+    objection_ = {path, objection};
+    focusesName_ = true;
+    return;
+  }
   answer_ = {question_->id, path};
   lastFolder_ = fs::path(path).parent_path().string();
   close();
 }
 
+/// Returns why a file is not written, or not without being asked for twice; otherwise "".
+std::string FileDialog::objectionTo(const std::string& file) const {
+  if (!writes()) return "";
+  if (!question_->accepts(file))
+    return fmt::format("no file with the ending {} can be written here: choose one of the endings above",
+                       fs::path(file).extension().string());
+  if (!exists(file) || isObjectedTo(file)) return "";
+  return fmt::format("{} exists: press Enter or \"replace\" to overwrite it", fs::path(file).filename().string());
+}
+
 void FileDialog::takeChosen() {
-  if (selected_)
-    take(entries_[*selected_].path);
-  else if (!name_.empty())
-    take(pathOf(name_));
+  if (selected_) return take(entries_[*selected_].path);
+  if (name_.empty()) return;
+  const fs::path named(name_);
+  if (writes() && !isFolder(pathOf(name_)) && named.has_filename() && !named.has_extension()) name_ += ending_;
+  take(pathOf(name_));
 }
 
 void FileDialog::close() {
@@ -145,11 +163,12 @@ void FileDialog::drawEntries(Ui& ui) {
 
 /// Draws a button for each kind of file, which gives the name the ending of the kind.
 void FileDialog::drawEndings(Ui& ui) {
-  const std::string now = lowerExtension(name_);
-  for (const auto& [name, ending] : question_->endings) {
-    ui.help(fmt::format("Give the name the ending {}.", ending));
+  const std::string typed = lowerExtension(name_), now = typed.empty() ? ending_ : typed;
+  for (const auto& [name, ending, help] : question_->endings) {
+    ui.help(help);
     if (ui.button("files/as-" + name, fmt::format("{} {}", name, ending).c_str(), now == ending)) {
       name_ = fs::path(name_).replace_extension(ending).string();
+      ending_ = ending;
       focusesName_ = true;
     }
     ImGui::SameLine(0, 4);
@@ -165,16 +184,18 @@ void FileDialog::drawContents(Ui& ui) {
   ImGui::SameLine();
   ui.text(fittingEnd(folder), true);
   if (writes()) drawEndings(ui);
-  ui.list("entries", ImGui::GetContentRegionAvail().y - 2 * ImGui::GetFrameHeightWithSpacing(),
+  const bool objects = isObjectedTo(pathOf(name_));
+  ui.list("entries", ImGui::GetContentRegionAvail().y - (objects ? 3 : 2) * ImGui::GetFrameHeightWithSpacing(),
           [&] { drawEntries(ui); });
   if (!isOpen()) return;  // a click has chosen an entry
   const std::string shown = name_;
   ui.help("Name of the file, or of a folder to list.");
   ui.entry("files/name", name_, std::exchange(focusesName_, false));
   if (name_ != shown) selected_.reset();
-  const bool replaces = writes() && exists(pathOf(name_)) && !isFolder(pathOf(name_));
+  if (objects) ui.problem(objection_.second);
+  const bool replaces = objects && question_->accepts(pathOf(name_));
   ui.help(writes() ? "Write the file of this name." : "Open the file of this name.");
-  const bool isDone = ui.button("files/choose", replaces ? "replace the file" : writes() ? "write" : "open");
+  const bool isDone = ui.button("files/choose", replaces ? "replace" : writes() ? "save" : "open");
   ImGui::SameLine();
   ui.help("Close this dialog. Key: Escape");
   if (ui.button("files/cancel", "cancel")) return close();

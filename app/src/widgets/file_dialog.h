@@ -15,13 +15,14 @@ class Ui;
 struct FileEnding {
   std::string name;    ///< such as "picture"
   std::string ending;  ///< such as ".png"
+  std::string help;    ///< tells more about it
 };
 
 /// A question for a file.
 struct FileQuestion {
   std::string id;                                        ///< names the answer, see `FileDialog::chosen`
   std::string title;                                     ///< such as "Open a mesh or a field"
-  std::function<bool(const std::string& file)> accepts;  ///< tells which files are listed
+  std::function<bool(const std::string& file)> accepts;  ///< tells which files are listed and can be written
   std::vector<std::string> suggested = {};               ///< files that are listed first, such as recent ones
   std::vector<FileEnding> endings = {};                  ///< the kinds of a file to be written; empty to open a file
   std::string name = {};                                 ///< proposed name of a file to be written
@@ -56,6 +57,8 @@ class FileDialog {
   void drawEndings(Ui& ui);
   void take(const std::string& path);
   void takeChosen();
+  std::string objectionTo(const std::string& file) const;
+  bool isObjectedTo(const std::string& file) const { return !objection_.second.empty() && objection_.first == file; }
   void close();
   std::string pathOf(const std::string& name) const;
   bool writes() const { return !question_->endings.empty(); }
@@ -66,10 +69,12 @@ class FileDialog {
   std::vector<Entry> entries_;
   std::string problem_;  ///< why the folder cannot be read, or ""
   std::optional<std::size_t> selected_;
-  bool showsSelected_ = false;                  ///< the selected entry is to be scrolled into sight
-  std::string name_;                            ///< text of the name's field
-  bool focusesName_ = false;                    ///< the keyboard is to be given to the name's field
-  std::pair<std::string, std::string> answer_;  ///< id of a question, and the file that was chosen for it
+  bool showsSelected_ = false;                     ///< the selected entry is to be scrolled into sight
+  std::string name_;                               ///< text of the name's field
+  std::string ending_;                             ///< ending that a name without one gets
+  std::pair<std::string, std::string> objection_;  ///< a file that was not written at once, and why
+  bool focusesName_ = false;                       ///< the keyboard is to be given to the name's field
+  std::pair<std::string, std::string> answer_;     ///< id of a question, and the file that was chosen for it
 };
 
 }  // namespace hpsdf::app

@@ -456,7 +456,6 @@ class Window {
     attempt([&] {
       const std::string name = freeShotName();
       explorer_.run("shot output=" + name);
-      explorer_.message = {name + " written"};
     });
   }
 
