@@ -311,6 +311,27 @@ TEST(Panels, problemsHaveAnInkOfTheirOwn) {
   EXPECT_GT(reddish(bench), 100);
 }
 
+TEST(Panels, aLongPathShowsTheNameOfItsFile) {
+  Bench bench;
+  bench.run("panel questions=false shown=false colors=false build=true");
+  const auto drawn = [&](const std::string& path) {
+    bench.run("settings mesh=" + path);
+    const render::Image frame = bench.explorer().frame();
+    const UiRect rect = bench.explorer().widgets().at("build/mesh").rect;
+    std::vector<render::Color> pixels;
+    for (int y = int(rect.y0); y < int(rect.y1); ++y)
+      for (int x = int(rect.x0); x < int(rect.x1); ++x) pixels.push_back(frame.at(x, y));
+    return pixels;
+  };
+  const std::string folder = "/a/folder/whose/name/is/longer/than/the/field/";
+  EXPECT_NE(drawn(folder + "bunny.obj"), drawn(folder + "horse.obj"));
+  EXPECT_EQ(drawn("/other" + folder + "bunny.obj"), drawn("/there" + folder + "bunny.obj"));
+  bench.run("ui click build/mesh");
+  bench.type("x.obj");
+  bench.key(Key::enter);
+  EXPECT_EQ(bench.explorer().settings().at("mesh"), "x.obj") << "the whole path is edited";
+}
+
 TEST(Panels, keysChangeTheView) {
   Bench bench;
   bench.type("p");

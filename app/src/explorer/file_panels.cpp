@@ -109,7 +109,7 @@ void drawStartPanel(const Controls& controls, const Explorer& explorer, std::siz
   for (std::size_t i = 0; i < recent; ++i) {
     const std::string file = explorer.recentFiles[i];
     controls.describe("open " + scriptWord(file), "Open this file.");
-    if (ui.item(fmt::format("start/{}", i + 1), file.c_str(), false))
+    if (ui.item(fmt::format("start/{}", i + 1), fittingEnd(file, widthLeft()).c_str(), false))
       controls.commands.push_back("open " + scriptWord(file));
   }
   gap();

@@ -28,16 +28,6 @@ bool exists(const std::string& path) {
   return fs::exists(path, unknown);
 }
 
-/// Returns the end of a text, so much as fits into the rest of the line.
-std::string fittingEnd(const std::string& text) {
-  std::string end = text;
-  while (end.size() > 1 && ImGui::CalcTextSize(("…" + end).c_str()).x > ImGui::GetContentRegionAvail().x) {
-    end.erase(0, 1);
-    while (end.size() > 1 && (static_cast<unsigned char>(end[0]) & 0xc0) == 0x80) end.erase(0, 1);
-  }
-  return end == text ? text : "…" + end;
-}
-
 }  // namespace
 
 void FileDialog::ask(FileQuestion question) {
@@ -182,7 +172,7 @@ void FileDialog::drawContents(Ui& ui) {
   ui.help("List the folder that holds this one.");
   const bool goesUp = ui.button("files/up", "up");
   ImGui::SameLine();
-  ui.text(fittingEnd(folder), true);
+  ui.text(fittingEnd(folder, ImGui::GetContentRegionAvail().x), true);
   if (writes()) drawEndings(ui);
   const bool objects = isObjectedTo(pathOf(name_));
   ui.list("entries", ImGui::GetContentRegionAvail().y - (objects ? 3 : 2) * ImGui::GetFrameHeightWithSpacing(),

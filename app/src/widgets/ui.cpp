@@ -107,6 +107,16 @@ std::optional<Key> keyNamed(std::string_view name) {
   return found == std::end(kKeys) ? std::nullopt : std::optional(found->key);
 }
 
+std::string fittingEnd(const std::string& text, double width) {
+  if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
+  std::string end = text;
+  do {
+    end.erase(0, 1);
+    while (end.size() > 1 && (static_cast<unsigned char>(end[0]) & 0xc0) == 0x80) end.erase(0, 1);
+  } while (end.size() > 1 && ImGui::CalcTextSize(("…" + end).c_str()).x > width);
+  return "…" + end;
+}
+
 struct Ui::State {
   ImGuiContext* context = nullptr;
   Coverage texture;
@@ -505,8 +515,18 @@ std::optional<std::string> Ui::field(const std::string& path, const char* text, 
   std::array<char, 1024> buffer{};
   value.copy(buffer.data(), buffer.size() - 1);
   const double from = label(text);
+  const ImVec2 padding = ImGui::GetStyle().FramePadding;
+  const std::string end = fittingEnd(value, ImGui::CalcItemWidth() - 2 * padding.x);
+  const bool isCut = end != value && ImGui::GetActiveID() != ImGui::GetID(id(path, ""));
+  if (isCut) ImGui::PushStyleColor(ImGuiCol_Text, {0, 0, 0, 0});
   const bool entered = ImGui::InputText(id(path, ""), buffer.data(), buffer.size(),
                                         ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
+  if (isCut) {
+    ImGui::PopStyleColor();
+    const ImVec2 corner = ImGui::GetItemRectMin();
+    ImGui::GetWindowDrawList()->AddText({corner.x + padding.x, corner.y + padding.y}, ImGui::GetColorU32(ImGuiCol_Text),
+                                        end.c_str());
+  }
   std::optional<std::string> result;
   if (ImGui::IsItemActive()) {
     state_->drafts[path] = buffer.data();

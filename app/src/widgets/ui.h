@@ -83,6 +83,9 @@ struct Widget {
   std::string help = {};   ///< text of the tooltip
 };
 
+/// Returns the end of a text, so much as fits into a width in points. Must be called within `Ui::frame`.
+std::string fittingEnd(const std::string& text, double width);
+
 /// When a slider returns its value: at each movement, or once it is released.
 enum class When : std::uint8_t { moved, released };
 
@@ -151,7 +154,8 @@ class Ui {
                                    const std::string& current);
   std::optional<double> slider(const std::string& path, const char* label, double value, double low, double high,
                                const char* format = "%.4g", When when = When::moved);
-  /// Draws a text field. Returns its text, if it was changed, when Enter is pressed and when the field loses the
+  /// Draws a text field. While it is not edited, it shows the end of a text that is too long, which names the file of a
+  /// path. Returns its text, if it was changed, when Enter is pressed and when the field loses the
   /// keyboard otherwise than by Escape, which discards the text.
   std::optional<std::string> field(const std::string& path, const char* label, const std::string& value);
   /// Draws a text field that changes `text` as the user types. If `focus` is true, it gets the keyboard, and what is
