@@ -352,8 +352,8 @@ void addFieldAndShotCommands(Registry& registry) {
   });
   registry.addForScripts({
       .name = "rebuild",
-      .summary = "Build the field anew, as 'settings' says.",
-      .help = "What 'settings' does not say is as it was for the current field.",
+      .summary = "Build the field anew, with the settings that were changed.",
+      .help = "What 'settings' has not changed is as it was for the current field.",
       .examples = {"rebuild", "rebuild max-steps=100", "settings target-error=1e-3 ; rebuild keep=true"},
       .parameters = {{"max-steps", settingKind("max-steps").under(setting_group::kAsked).advanced(),
                       "End after so many steps of the refinement: an earlier state of the field."},

@@ -218,7 +218,8 @@ void addSurfaceCommands(Registry& registry) {
           {{"orbit", numbers("AZIMUTH,ELEVATION,DISTANCE", {3}).positional(),
             "Azimuth and elevation in degrees, and the eye's distance from the target in diagonals of the "
             "domain; 30,20,1.1 at first."},
-           {"view", choice(directions).under(kCamera), "A named direction instead; any leaves it."},
+           {"view", choice(directions).under(kCamera),
+            "A named direction from which the camera looks; any leaves it as it is."},
            targetParameter("The point in the picture's middle; center is the domain's."),
            {"up", choice({"auto", "y", "z"}).under(kCamera).advanced(),
             "The axis that points up; auto guesses it for this field and for each later one: z if the surface has "
@@ -235,7 +236,7 @@ void addSurfaceCommands(Registry& registry) {
       .help = "As 'render' has it, of the picture that 'show surface' chooses. What is not given stays as it is.",
       .examples = {"surface offset=0.05", "surface clip=z clip-offset=0.1"},
       .parameters =
-          {{"shown", flag(""), "Whether it is drawn: without it, planes and cells can be looked at alone."},
+          {{"shown", flag(""), "Draw the surface; without it, planes and cells can be looked at alone."},
            {"offset", number().in("world units"), "The distance whose surface is drawn; 0 at first."},
            {"shadows", flag("").under(kDrawn).advanced(),
             "Darken folds, and let the solid throw a soft shadow, once the view rests."},
@@ -268,13 +269,13 @@ void addPlaneAndColorCommands(Registry& registry) {
             "Where the plane crosses that axis; auto is the middle of the surface's box."},
            {"through", numbers("PX,PY,PZ,NX,NY,NZ", {6}).in("world units"),
             "A point of the plane and its normal instead."},
-           {"in-space", flag(""), "Whether the plane stands in the surface's picture too."},
+           {"in-space", flag(""), "Draw the plane in the surface's picture, too."},
            {"zoom", number().above(0), "How many times larger than with the whole section in the picture."},
            targetParameter("The point in the picture's middle, moved into the plane; center is the "
                            "section's middle."),
            {"operands", text("EXPRESSION|own|none").under(kDrawn).advanced(),
-            "Outline the operands of this expression, as 'slice' does. The word own stands for the expression "
-            "from which 'combine' built the field."}},
+            "Draw the outlines of the operands of an expression such as union(a.obj, b.obj), each in a colour of its "
+            "own. The word own stands for the expression from which the field was combined."}},
       .action = changing(changePlane),
       .check = checkPlane,
   });
@@ -284,20 +285,21 @@ void addPlaneAndColorCommands(Registry& registry) {
       .help = "As in 'slice' and 'render'; the surface and the slice have colours of their own. Another quantity than "
               "before gets an automatic range.",
       .examples = {"color degree", "color value-jump range=1e-6,1e-2 scale=log"},
-      .parameters = {{"by", choice(colorNames()).positional().required(),
-                      "As in 'slice' and 'render'. normal is for surfaces, distance for slices."},
-                     {"of", choice({"surface", "slice"}), "Of which picture; of the one that is shown when left out."},
-                     {"range", numbers("LOW,HIGH", {2}).orWords({"auto"}).under(kColours),
-                      "What the ends of the scale of a jump, slope or error stand for; auto chooses."},
-                     {"per-cell", flag("").under(kColours),
-                      "Colour each cell by the greatest value that the picture shows of it."},
-                     {"scale", choice({"log", "linear"}).under(kColours).advanced(),
-                      "How such colours run between them; log at first."},
-                     {"map", choice(maps).under(kColours).advanced(),
-                      "The colour map, as in 'slice' and 'render'; auto is the standard one of the quantity."},
-                     {"other", file("FIELD"), "For difference: the field to compare with, or none."},
-                     {"mesh", text("MESH"),
-                      "For error: what the field was made from, where it does not know that; or none."}},
+      .parameters =
+          {{"by", choice(colorNames()).positional().required(),
+            "normal lights a surface, distance shows iso-lines in a slice; degree and depth show the cells. " +
+                quantityHelp()},
+           {"of", choice({"surface", "slice"}), "Of which picture; of the one that is shown when left out."},
+           {"range", numbers("LOW,HIGH", {2}).orWords({"auto"}).under(kColours),
+            "The jumps, slopes or errors at the ends of the colour scale; auto chooses them."},
+           {"per-cell", flag("").under(kColours),
+            "Colour each cell by the greatest value that the picture shows of it."},
+           {"scale", choice({"log", "linear"}).under(kColours).advanced(),
+            "How the colours of a jump, slope or error run between the ends of their scale; log at first."},
+           {"map", choice(maps).under(kColours).advanced(),
+            "The colour map; auto is the standard one of what the colours show."},
+           {"other", file("FIELD"), "For difference: the field to compare with, or none."},
+           {"mesh", text("MESH"), "For error: what the field was made from, where it does not know that; or none."}},
       .action = changing(changeColor),
   });
 }
@@ -315,13 +317,12 @@ void addTrianglesCommand(Registry& registry) {
               "they are hidden. The statistics say how many there are and how far they are from the surface.",
       .examples = {"triangles shown=true", "triangles tolerance=0.5% simplify=true"},
       .parameters =
-          {{"shown", flag(""), "Draws the triangles."},
+          {{"shown", flag(""), "Draw the triangles of the surface, as a file of triangles would have them."},
            {"tolerance", number().above(0).orShare().in("field units"),
-            "The tolerance of the mesh, as for 'contour': a length, or a percentage of the longest side of the "
-            "domain. It is 0.1% unless you set it."},
+            "How far the triangles may be from the surface: a length, or a percentage of the longest side of the "
+            "domain; 0.1% at first."},
            {"simplify", flag(""),
-            "Merges vertices as far as the tolerance allows, as 'contour' does. It takes five to seven times as "
-            "long."}},
+            "Merge vertices as far as the tolerance allows. It takes five to seven times as long."}},
       .action = changing(changeTriangles),
   });
 }
@@ -347,7 +348,7 @@ void addCellsAndArrowsCommands(Registry& registry) {
           "Where its length is 1, an arrow is 0.8 of their distance long, but for what the projection takes from it.",
       .examples = {"arrows 40", "arrows 0"},
       .parameters = {{"apart", wholeNumber().within(0, 1000).in("points").positional().required(),
-                      "How far apart; 0 for none. A point is a pixel unless 'show' has another scale."}},
+                      "How far apart the arrows are; 0 for none. A point is a pixel at a scale of 1."}},
       .action = changing(changeArrows),
   });
   registry.addForScripts({
@@ -356,9 +357,10 @@ void addCellsAndArrowsCommands(Registry& registry) {
       .help = "Left is the current field, right the other one; camera, plane, colours and their scale are the same for "
               "both. 'color difference' shows how far they are apart.",
       .examples = {"beside coarse.hpsdf", "beside none"},
-      .parameters = {{"field", text("FIELD").positional().required(),
-                      "The other field's file, or kept for the one that 'rebuild keep=true' has kept; none for the "
-                      "current one alone."}},
+      .parameters =
+          {{"field", text("FIELD").positional().required(),
+            "The other field's file, or kept for the field before the last one that was rebuilt for comparison; none "
+            "for the current one alone."}},
       .action = changing(changeBeside),
   });
 }
