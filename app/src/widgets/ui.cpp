@@ -282,7 +282,8 @@ void Ui::drawTip() {
   if (ImGui::IsPopupOpen(nullptr, kAnyPopup)) return;
   const auto [width, height] = ImGui::GetIO().DisplaySize;
   const float em = ImGui::GetFontSize(), pad = 0.5F * em, gap = 0.4F * em;
-  const ImVec2 text = ImGui::CalcTextSize(tip->text.c_str(), nullptr, false, 22 * em);
+  const float wrap = 22 * em;
+  const ImVec2 text = ImGui::CalcTextSize(tip->text.c_str(), nullptr, false, wrap);
   const float w = text.x + 2 * pad, h = text.y + 2 * pad;
   const UiRect &item = tip->widget, &column = tip->column;
   ImVec2 at(std::clamp(float(item.x0), 0.0F, std::max(0.0F, width - w)),
@@ -301,7 +302,7 @@ void Ui::drawTip() {
   ImDrawList& list = *ImGui::GetForegroundDrawList();
   list.AddRectFilled(at, {at.x + w, at.y + h}, IM_COL32(40, 43, 54, 245), 0.25F * em);
   list.AddText(ImGui::GetFont(), em, {at.x + pad, at.y + pad}, IM_COL32(245, 245, 242, 255), tip->text.c_str(), nullptr,
-               22 * em + 1);
+               wrap);
 }
 
 void Ui::paint(render::Image& image) const {
