@@ -79,7 +79,7 @@ TEST(Panels, eachQuestionIsOneStepAndShowsAnotherView) {
   bench.run("preset worst");
   const Interface& worst = bench.session.jumps().interfaces[bench.explorer().worst(1)[0]];
   EXPECT_EQ(bench.view().mark, worst.worst);
-  EXPECT_EQ(bench.view().surfaceColors.by, render::ColorBy::error);
+  EXPECT_EQ(bench.view().surfaceColors.by, render::ColorBy::valueJump);
   EXPECT_TRUE(bench.view().worstOnSurface);
   EXPECT_TRUE(bench.view().isUnfolded(Panel::worst));
   bench.run("preset whole");

@@ -22,6 +22,7 @@
 #include "hpsdf/shapes.h"
 #include "scene/body_view.h"
 #include "scene/feature_edges.h"
+#include "support/random_field.h"
 #include "view/view_buffers.h"
 
 namespace hpsdf::render {
@@ -130,6 +131,47 @@ TEST(FieldLight, isMeasuredOnceForAnEvenPixelAndSampleBySampleAtBorders) {
     }
   EXPECT_GT(even, kWidth * kHeight * 7 / 10);
   EXPECT_LT(different, kWidth * kHeight / 50);
+}
+
+TEST(FieldLight, isTheSameAtACrackAsBesideIt) {
+  const Field field = randomField(4, {.radius = 0.6, .roughness = 0.03, .maxDepth = 3});
+  const Lit scene = lit(field, {cameraOf({}, field.domain(), kWidth, kHeight)});
+  constexpr int kReach = 4;
+  int cracks = 0, between = 0;
+  for (int y = kReach; y < kHeight - kReach; ++y)
+    for (int x = kReach; x < kWidth - kReach; ++x) {
+      const std::size_t i = std::size_t(y) * kWidth + x;
+      if (scene.buffers.crack[i] == 0) continue;
+      ++cracks;
+      for (int n = 0; n < (2 * kReach + 1) * (2 * kReach + 1); ++n) {
+        const std::size_t other =
+            std::size_t(y + n / (2 * kReach + 1) - kReach) * kWidth + std::size_t(x + n % (2 * kReach + 1) - kReach);
+        const bool isWhole = scene.buffers.crack[other] == 0 && scene.buffers.hit(other);
+        if (!isWhole || scene.light.open[other] != scene.light.open[i] || scene.light.lit[other] != scene.light.lit[i])
+          continue;
+        ++between;
+        break;
+      }
+    }
+  EXPECT_GT(cracks, 20);
+  EXPECT_GT(between, cracks * 9 / 10);
+}
+
+TEST(FieldLight, hasNoGroundBelowTheRestOfAClippedSolid) {
+  const Field& field = fieldOf("sphere");
+  SurfaceView view{cameraOf({.elevationDegrees = -5}, field.domain(), kWidth, kHeight)};
+  const double radius = -field.value(Vector3::Zero());
+  ASSERT_LT(view.camera.eye.y(), 0);
+  ASSERT_GT(view.camera.eye.y(), -radius);
+  const auto darkened = [&] {
+    const Lit scene = lit(field, view);
+    int count = 0;
+    for (std::size_t i = 0; i < scene.light.lit.size(); ++i) count += !scene.buffers.hit(i) && scene.light.lit[i] < 0.9;
+    return count;
+  };
+  EXPECT_GT(darkened(), 50) << "the eye is above the ground of the whole sphere";
+  view.clip = ClipPlane{1, 0};
+  EXPECT_EQ(darkened(), 0) << "the eye is below the upper half, which would stand on the plane of the cut";
 }
 
 TEST(FieldLight, isLessAmbientInTheHoleOfATorusThanOnItsOutside) {

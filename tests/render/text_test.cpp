@@ -90,6 +90,9 @@ TEST(Text, drawsBrokenUtf8AsReplacementSigns) {
                                   "b",
                                   "a\nb"})
     EXPECT_EQ(drawn(broken, 20).pixels, replacement.pixels);
+  // Two bytes for a letter that takes one, half of a UTF-16 pair, a code point that XML excludes, one beyond the last.
+  for (std::string_view noCharacter : {"\xc1\xa1", "\xed\xa0\x80", "\xef\xbf\xbf", "\xf4\x90\x80\x80"})
+    EXPECT_EQ(drawn("a" + std::string(noCharacter) + "b", 20).pixels, replacement.pixels);
   EXPECT_EQ(drawn("a\xe2\x82", 20).pixels, drawn("a\uFFFD\uFFFD", 20).pixels);
 }
 

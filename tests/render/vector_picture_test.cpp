@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "hpsdf/error.h"
+#include "hpsdf/render/color_maps.h"
 #include "hpsdf/render/picture.h"
 #include "image/color.h"
 #include "support/random_field.h"
@@ -108,6 +109,28 @@ TEST(VectorPicture, areasHaveTheColorsOfThePixels) {
       EXPECT_GT(compared, 500);
       EXPECT_LT(differing, compared / 20) << "plane " << plane.index() << ", zoom " << zoom;
     }
+}
+
+TEST(VectorPicture, areasStayNearTheWindowAtAnyZoom) {
+  const Field field = randomField(7);
+  SlicePicture settings = picture(ColorBy::degree, FreePlane{{0.1, 0, 0.05}, {0.3, -1, 0.6}});
+  settings.target = Vector3(0.11, 0, 0.06);
+  for (const double zoom : {1e4, 1e7, 1e10}) {
+    settings.zoom = zoom;
+    const Drawn result = drawn(field, settings);
+    const VectorLayer& cells = layer(result.vectors, "cells");
+    const ViewBuffers& buffers = result.buffers;
+    for (const VectorShape& shape : cells.shapes) {
+      const auto* area = std::get_if<FilledShape>(&shape);
+      if (area == nullptr) continue;
+      for (const Polyline& border : area->borders)
+        for (const Eigen::Vector2d& x : border) EXPECT_LT(x.cwiseAbs().maxCoeff(), 20.0 * buffers.width) << zoom;
+    }
+    const int x = buffers.width / 2, y = buffers.height / 2;
+    const std::vector<Color> colors = colorsAt(cells, {x + 0.5, y + 0.5});
+    ASSERT_EQ(colors.size(), 1U) << zoom;
+    EXPECT_EQ(colors[0], levelColor(buffers.degree[std::size_t(y) * buffers.width + std::size_t(x)])) << zoom;
+  }
 }
 
 TEST(VectorPicture, anAreaInAnotherColorIsNoticed) {

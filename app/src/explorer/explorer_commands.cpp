@@ -138,8 +138,7 @@ std::string presetLine(Session& session, const std::string& name) {
       "worst by=value on=surface page=1 ; panel legend=true worst=true histograms=false statistics=false";
   const bool isUpY = explorerOf(session).view().camera.up == render::UpAxis::y;
   if (name == "inside") return whole + fmt::format("surface clip={} ; color degree ; {}", isUpY ? "z" : "y", levels);
-  if (name == "worst")
-    return plain + fmt::format("color {} ; {} ; fly 1", session.knowsExact() ? "error" : "value-jump", list);
+  if (name == "worst") return plain + fmt::format("color value-jump ; {} ; fly 1", list);
   if (name == "torn") return whole + "surface cracks=true ; color normal ; " + list;
   if (name == "degrees") return "show slice ; plane axis=z offset=auto zoom=1 target=center ; color degree ; " + levels;
   if (name == "mesh") {
@@ -273,7 +272,7 @@ void addFrameCommands(Registry& registry) {
       .summary = "Choose what the explorer's list of worst interfaces is sorted by, and its page.",
       .help =
           "An interface is where two cells meet; it is measured by its greatest jump, as in 'jumps'. The list calls "
-          "it torn where the jump is greater than the field's value: there the surface has a gap.",
+          "it torn where f has different signs in the two cells: there the surface has a gap.",
       .examples = {"worst on=surface", "worst by=gradient page=2"},
       .parameters = {{"by", choice({"value", "gradient"}), "Greatest jump of the value, or of the gradient."},
                      {"on", choice({"all", "surface"}), "All interfaces, or those at the surface."},

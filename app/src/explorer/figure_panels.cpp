@@ -11,6 +11,7 @@ namespace hpsdf::app {
 namespace {
 
 constexpr std::size_t kWorstRows = 8;
+constexpr int kMostDecimals = 4;  // of coordinates in the list of worst interfaces
 
 void drawLevelSwatches(const std::vector<render::Legend::Level>& levels) {
   ImDrawList& list = *ImGui::GetWindowDrawList();
@@ -222,14 +223,17 @@ void drawWorst(const Controls& controls, Explorer& explorer) {
   const auto& worst = explorer.worst(first + kWorstRows + 1);  // one more tells whether there is a next page
   const std::size_t last = std::min(worst.size(), first + kWorstRows);
   const int decimals = decimalsFor(field.domain());
+  // Coordinates of very small domains would have more digits than there is room for.
+  const auto coordinate = [&](double value) {
+    return decimals <= kMostDecimals ? fmt::format("{:.{}f}", value, decimals) : fmt::format("{:.2g}", value);
+  };
   for (std::size_t rank = first; rank < last; ++rank) {
     const Interface& face = jumps.interfaces[worst[rank]];
     const Vector3& x = face.worst;
-    const std::array cells = {
-        fmt::format("{}.", rank + 1), shortNumber(jumpOf(face, view.worstBy).max),
-        std::string(isTorn(field, face) ? "torn" : ""),
-        fmt::format("{:.{}f}, {:.{}f}, {:.{}f}", x.x(), decimals, x.y(), decimals, x.z(), decimals)};
-    constexpr std::array kColumns = {0.0, 3.0, 10.5, 14.5};
+    const std::array cells = {fmt::format("{}.", rank + 1), shortNumber(jumpOf(face, view.worstBy).max),
+                              std::string(isTorn(field, face) ? "torn" : ""),
+                              fmt::format("{}, {}, {}", coordinate(x.x()), coordinate(x.y()), coordinate(x.z()))};
+    constexpr std::array kColumns = {0.0, 3.0, 11.5, 15.5};
     const std::string fly = fmt::format("fly {}", rank + 1);
     // The shortest numbers that are read back as the same floats: they can be typed after 'fly to='.
     controls.describe(

@@ -7,6 +7,8 @@ namespace hpsdf::app {
 namespace {
 
 constexpr double kAtSurface = 0.1;  // greatest |f| at the surface, in edges of the smaller cell
+constexpr double kAcross = 1e-9;    // distance from a face at which one of its sides is evaluated, in domain sizes
+constexpr double kLeastGap = 1e-7;  // a jump that is smaller tears nothing: it may be rounding; in domain sizes
 
 }  // namespace
 
@@ -16,10 +18,15 @@ double cellSizeAt(const Field& field, int depth) {
 
 bool isAtSurface(const Field& field, const Interface& face) {
   const double edge = cellSizeAt(field, std::max(face.depths[0], face.depths[1]));
-  return std::abs(field.value(face.worst)) <= std::max(kAtSurface * edge, face.value.max);
+  return std::abs(field.value(face.worst)) <= kAtSurface * edge || isTorn(field, face);
 }
 
-bool isTorn(const Field& field, const Interface& face) { return std::abs(field.value(face.worst)) < face.value.max; }
+bool isTorn(const Field& field, const Interface& face) {
+  const double size = field.domain().sizes()[face.axis];
+  if (face.value.max < kLeastGap * size) return false;
+  const Vector3 across = kAcross * size * Vector3::Unit(face.axis);
+  return field.value(face.worst - across) * field.value(face.worst + across) < 0;
+}
 
 std::vector<std::size_t> worstPlaces(const Field& field, const Jumps& jumps, JumpKind kind, bool atSurface,
                                      std::size_t count) {

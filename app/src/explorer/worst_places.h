@@ -13,11 +13,11 @@ namespace hpsdf::app {
 double cellSizeAt(const Field& field, int depth);
 
 /// Tells whether the greatest jump of an interface is at the surface: whether |f| there is at most a tenth of the edge
-/// of the smaller cell, or at most the jump itself.
+/// of the smaller cell, or whether the surface is torn there.
 bool isAtSurface(const Field& field, const Interface& face);
 
-/// Tells whether the surface is torn at the place of an interface's greatest jump: whether the jump is greater than
-/// |f|, which at the surface is the error of f.
+/// Tells whether the surface is torn at the place of an interface's greatest jump: whether f has different signs on its
+/// two sides.
 bool isTorn(const Field& field, const Interface& face);
 
 /// Returns the indices of at most `count` interfaces with the greatest jumps, greatest first: of all interfaces, or of

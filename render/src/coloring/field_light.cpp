@@ -10,6 +10,7 @@
 
 #include "hpsdf/types.h"
 #include "image/color.h"
+#include "scene/cell_boxes.h"
 
 namespace hpsdf::render {
 namespace {
@@ -29,6 +30,7 @@ constexpr double kGroundReach = 1.25;  // the ground is darkened up to this dist
 constexpr double kFadesFrom = 0.8;     // share of the view's width from which on the shadow on the ground fades
 constexpr int kRowsTogether = 4;       // rows of pixels whose points are evaluated together
 constexpr float kEvenCosine = 0.9F;    // least cosine between normals of an even piece of a surface
+constexpr int kCrackReach = 4;         // pixels from a crack within which the light of the surface beside it is sought
 constexpr double kEvenDepth = 4;       // greatest difference of the distances of an even piece, in samples
 
 /// The distance to the solid that casts shadows, at many points at once.
@@ -101,7 +103,8 @@ class LightMeter {
  public:
   LightMeter(const ShadowCaster& caster, const ViewBuffers& buffers, int samples, const Vector3& toKey)
       : view_(caster.view), buffers_(buffers), samples_(samples), toKey_(toKey), distances_(caster) {
-    const Box box = solidBox(caster.field, caster.view.offset);
+    const Box whole = solidBox(caster.field, caster.view.offset), rest = clipped(whole, caster.view);
+    const Box& box = rest.isEmpty() ? whole : rest;
     size_ = box.diagonal().norm();
     around_ = Box(box.min().array() - kAround * size_, box.max().array() + kAround * size_);
     if (!caster.onGround) return;
@@ -265,6 +268,36 @@ class LightMeter {
   std::optional<Ground> ground_;
 };
 
+/// Returns the sample nearest to (x, y), within `reach` along each axis, that shows the surface and no crack.
+std::optional<std::size_t> nearestWhole(const ViewBuffers& buffers, int x, int y, int reach) {
+  std::optional<std::size_t> nearest;
+  int least = std::numeric_limits<int>::max();
+  for (int j = std::max(0, y - reach); j <= std::min(buffers.height - 1, y + reach); ++j)
+    for (int i = std::max(0, x - reach); i <= std::min(buffers.width - 1, x + reach); ++i) {
+      const std::size_t at = std::size_t(j) * buffers.width + i;
+      const int squared = (i - x) * (i - x) + (j - y) * (j - y);
+      if (squared >= least || buffers.crack[at] != 0 || !buffers.shows(at, Shown::surface)) continue;
+      least = squared;
+      nearest = at;
+    }
+  return nearest;
+}
+
+/// Gives samples of cracks the light of the surface beside them. A ray meets a crack at a face between two cells, below
+/// the surface, where the gradient points anywhere and all is dark.
+void lightCracks(const ViewBuffers& buffers, int samples, FieldLight& light) {
+  tbb::parallel_for(0, buffers.height, [&](int y) {
+    for (int x = 0; x < buffers.width; ++x) {
+      const std::size_t i = std::size_t(y) * buffers.width + x;
+      if (buffers.crack[i] == 0 || !buffers.shows(i, Shown::surface)) continue;
+      const auto whole = nearestWhole(buffers, x, y, kCrackReach * samples);
+      if (!whole) continue;
+      if (!light.open.empty()) light.open[i] = light.open[*whole];
+      light.lit[i] = light.lit[*whole];
+    }
+  });
+}
+
 }  // namespace
 
 FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, int samples, const Vector3& toKey) {
@@ -276,6 +309,7 @@ FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, in
   tbb::parallel_for(0, strips, [&](int strip) {
     meter.measure(strip * kRowsTogether, std::min(rows, (strip + 1) * kRowsTogether), light);
   });
+  lightCracks(buffers, samples, light);
   return light;
 }
 

@@ -15,8 +15,8 @@ namespace {
 /// checks. They become darker from level to level, so that coarse cells, which fill large areas, are light. Cool and
 /// warm hues take turns among the dark ones, because lightness alone gives fewer distinct colours.
 constexpr std::array<Color, kDistinctLevels> kLevels = {
-    {{252, 213, 13}, {147, 158, 91}, {54, 156, 148}, {21, 85, 171}, {81, 70, 81}, {64, 9, 9}, {7, 3, 57}}};
-constexpr Color kExact = {179, 23, 0};
+    {{252, 210, 9}, {149, 159, 99}, {71, 157, 152}, {22, 82, 176}, {88, 75, 87}, {86, 8, 19}}};
+constexpr Color kExact = {180, 36, 5};
 
 Oklab mixOklab(const Oklab& a, const Oklab& b, double t) {
   return {std::lerp(a.lightness, b.lightness, t), std::lerp(a.a, b.a, t), std::lerp(a.b, b.b, t)};
@@ -81,7 +81,7 @@ Color levelColor(int level) {
   if (level < 0 || level > kMaxDegree) return {255, 0, 255};
   if (level < kDistinctLevels) return kLevels[std::size_t(level)];
   // Higher levels are greens, the darker the higher. The lowest of them, which occur most, are the farthest apart.
-  return encodeSrgb(fromOklch(0.45 + 0.47 * std::pow(0.86, level - kDistinctLevels), 0.15, 130));
+  return encodeSrgb(fromOklch(0.38 + 0.44 * std::pow(0.87, level - kDistinctLevels), 0.15, 130));
 }
 
 std::span<const ColorMap> colorMaps() {

@@ -1,6 +1,7 @@
 #include "image/text.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
@@ -37,6 +38,14 @@ std::size_t sequenceLength(unsigned char first) {
   return first >= 0xc0 ? 2 : 1;
 }
 
+// Returns true if a code point that UTF-8 spells with `length` bytes is a character: spelled with as few bytes as
+// possible, no half of a UTF-16 pair, and not one of the two that XML excludes.
+bool isCharacter(char32_t code, std::size_t length) {
+  constexpr std::array<char32_t, 4> kFirstOfLength = {0, 0x80, 0x800, 0x10000};
+  const bool isSurrogate = code >= 0xd800 && code <= 0xdfff;
+  return code >= kFirstOfLength[length - 1] && code <= 0x10ffff && !isSurrogate && code != 0xfffe && code != 0xffff;
+}
+
 // Removes the first code point from the text. Invalid UTF-8 and control characters become U+FFFD, because file names
 // may contain any bytes.
 char32_t takeCodePoint(std::string_view& text) {
@@ -54,7 +63,7 @@ char32_t takeCodePoint(std::string_view& text) {
     code = (code << 6) | (next & 0x3f);
   }
   text.remove_prefix(taken);
-  return valid ? code : kReplacement;
+  return valid && isCharacter(code, length) ? code : kReplacement;
 }
 
 // Returns a code point in UTF-8.

@@ -11,7 +11,8 @@
 namespace hpsdf::render {
 namespace {
 
-/// A face of the octree's grid of smallest cells: its axis, and its coordinate in units of these cells.
+/// A face of the octree's grid of smallest cells: its axis, and its coordinate in units of these cells. For a face of
+/// the box that cells are cut to, 3 is added to the axis.
 using GridPlane = std::pair<int, std::int64_t>;
 
 /// The side of a cell's section that lies on a face of the cell.
@@ -38,10 +39,17 @@ class CellCutter {
     Eigen::Index axis = 0;
     normal_.cwiseAbs().maxCoeff(&axis);
     if (normal_[axis] < 0) normal_ = -normal_;
+    // Cells are cut to a box that is larger than the window, so that coordinates stay in the range of the formats.
+    for (const double across : {-0.5, 0.5})
+      for (const double upwards : {-0.5, 0.5}) near_.extend(view.origin + across * view.right + upwards * view.up);
+    const Vector3 around = Vector3::Constant(std::max(view.right.norm(), view.up.norm()));
+    near_ = Box(near_.min() - around, near_.max() + around);
   }
 
   void cut(const Cell& cell) {
-    const Vector3 low = cell.box.min() - view_.origin, high = cell.box.max() - view_.origin;
+    const Box box = cell.box.intersection(near_);
+    if (box.isEmpty()) return;
+    const Vector3 low = box.min() - view_.origin, high = box.max() - view_.origin;
     const double middle = normal_.dot(0.5 * (low + high)), reach = normal_.cwiseAbs().dot(0.5 * (high - low));
     if (std::abs(middle) > reach * (1 + 1e-9)) return;
     std::array<Vector3, 8> corners;
@@ -57,10 +65,12 @@ class CellCutter {
       if (ends.size() != 2) continue;
       for (const Eigen::Vector2d& end : ends) extent.extend(end);
       const int axis = face / 2;
-      const double coordinate = (face % 2 ? cell.box.max() : cell.box.min())[axis];
-      const auto number = std::int64_t(std::llround((coordinate - lower_[axis]) * cellsPerUnit_[axis]));
+      const double coordinate = (face % 2 ? box.max() : box.min())[axis];
+      const bool isCut = coordinate != (face % 2 ? cell.box.max() : cell.box.min())[axis];
+      const auto number =
+          isCut ? face % 2 : std::int64_t(std::llround((coordinate - lower_[axis]) * cellsPerUnit_[axis]));
       CutSide side{numbers_(ends[0]), numbers_(ends[1]), int(section_.parts.size()), face % 2 == 0};
-      if (side.from != side.to) sides.emplace_back(GridPlane{axis, number}, side);
+      if (side.from != side.to) sides.emplace_back(GridPlane{isCut ? axis + 3 : axis, number}, side);
     }
     if (sides.size() < 3 || !extent.intersects(window_)) return;
     section_.parts.push_back({cell, extent});
@@ -126,6 +136,7 @@ class CellCutter {
   SliceView view_;
   Vector3 lower_, cellsPerUnit_;
   Eigen::AlignedBox2d window_;
+  Box near_;           ///< the part of space to which cells are cut
   Vector3 xOf_, yOf_;  ///< turn a vector from the view's middle to pixels to the right and downwards
   Vector3 normal_;
   PointNumbers numbers_;

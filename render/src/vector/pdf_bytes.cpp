@@ -30,19 +30,25 @@ void checkCairo(cairo_status_t status) {
 
 /// Returns the built-in font for cairo.
 CairoFont embeddedFont() {
-  // Cairo keeps fonts for later use, so that FreeType must stay until the process ends.
-  static const FT_Library library = [] {
-    FT_Library made = nullptr;
-    return FT_Init_FreeType(&made) == 0 ? made : nullptr;
-  }();
+  // Cairo keeps fonts for later use, perhaps until the process ends. Each has a library of its own, because those of
+  // FreeType must not be used by several threads at a time.
+  FT_Library library = nullptr;
   FT_Face face = nullptr;
   const std::span<const unsigned char> bytes = dejavuSans();
-  if (library == nullptr || FT_New_Memory_Face(library, bytes.data(), FT_Long(bytes.size()), 0, &face) != 0)
+  if (FT_Init_FreeType(&library) != 0 ||
+      FT_New_Memory_Face(library, bytes.data(), FT_Long(bytes.size()), 0, &face) != 0) {
+    FT_Done_FreeType(library);
     throw Error("cannot write the picture as PDF: FreeType does not read the built-in font");
+  }
   CairoFont font(cairo_ft_font_face_create_for_ft_face(face, FT_LOAD_NO_HINTING), cairo_font_face_destroy);
   static const cairo_user_data_key_t key = {};
-  const auto release = [](void* data) { FT_Done_Face(static_cast<FT_Face>(data)); };
-  checkCairo(cairo_font_face_set_user_data(font.get(), &key, face, release));
+  const auto release = [](void* data) { FT_Done_FreeType(static_cast<FT_Library>(data)); };  // and its face
+  if (const auto status = cairo_font_face_set_user_data(font.get(), &key, library, release);
+      status != CAIRO_STATUS_SUCCESS) {
+    font.reset();
+    release(library);
+    checkCairo(status);
+  }
   return font;
 }
 

@@ -87,16 +87,16 @@ export function orderedColor(t) {
   return fromOklch(0.385 + 0.445 * at, chroma, 302 - 227 * at ** 0.8);
 }
 
-const LEVELS = ["#fcd50d", "#939e5b", "#369c94", "#1555ab", "#514651", "#400909", "#070339"];
+const LEVELS = ["#fcd209", "#959f63", "#479d98", "#1652b0", "#584b57", "#560813"];
 
 /**
  * The colour of a level, which is a degree or a depth, or of exact cells.
  * @param {number} level
  */
 export function levelColor(level) {
-  if (level === EXACT_DEGREE) return fromHex("#b31700");
+  if (level === EXACT_DEGREE) return fromHex("#b42405");
   if (level < LEVELS.length) return fromHex(LEVELS[level]);
-  return fromOklch(0.45 + 0.47 * 0.86 ** (level - LEVELS.length), 0.15, 130);
+  return fromOklch(0.38 + 0.44 * 0.87 ** (level - LEVELS.length), 0.15, 130);
 }
 
 /**

@@ -30,6 +30,7 @@ import { evaluateIn, gridPoint, leafAt, query, tabulateLegendre, worldPoint } fr
 
 const ROW_OF_DEGREES = 31; // degrees 0 to 30
 const MOST_SAMPLES = 33; // along one axis of a face: a Gauss rule for degree 30, and both ends
+const LEAST_GAP = 1e-7; // a jump that is smaller tears nothing: it may be rounding; in sizes of the domain
 const EXACT_SAMPLE_DEGREE = 6; // distances to triangles are smooth but for a few bends
 
 /**
@@ -197,6 +198,7 @@ export class FaceMeter {
     this.value = 0; // greatest jumps on the face that was measured last
     this.gradient = 0;
     this.worst = /** @type {Vector} */ ([0, 0, 0]); // where its value jumps most
+    this.isTorn = false; // whether the field has different signs on the two sides there
   }
 
   /**
@@ -264,6 +266,7 @@ export class FaceMeter {
       worst = at;
     }
     this.value = value;
+    this.isTorn = worst >= 0 && lower.values[worst] * upper.values[worst] < 0;
     this.gradient = Math.sqrt(squared);
     this.worst = worldPoint(this.field, worst < 0 ? centreOfFace(face) : gridPointOf(face, samples, worst));
   }
@@ -410,6 +413,8 @@ export class Jumps {
     this.depths = [];
     /** @type {number[]} */
     this.values = []; // |f| where it jumps most
+    /** @type {boolean[]} */
+    this.torn = []; // whether f has different signs on the two sides there
     /** For each node, the greatest jump on the faces of a leaf; 0 for internal nodes. */
     this.ofCells = { value: new Float32Array(field.low.length), gradient: new Float32Array(field.low.length) };
     this.depthOfNode = new Uint8Array(field.low.length);
@@ -461,6 +466,7 @@ export class Jumps {
     this.worstPoints.push(...worst);
     this.jumps.value.push(value);
     this.jumps.gradient.push(gradient);
+    this.torn.push(meter.isTorn && value >= LEAST_GAP * this.field.size[axis]);
     this.values.push(Math.abs(query(this.field, worst)?.value ?? Infinity));
     for (const { node } of [small, large]) {
       this.ofCells.value[node] = Math.max(this.ofCells.value[node], value);
@@ -478,17 +484,17 @@ export class Jumps {
     const worst = /** @type {Vector} */ (this.worstPoints.slice(3 * n, 3 * n + 3));
     return {
       cells: [lower, upper], axis: this.axes[n], depth: this.depths[n], worst, value, gradient: this.jumps.gradient[n],
-      isAtSurface: this.isAtSurface(n), isTorn: this.values[n] < value,
+      isAtSurface: this.isAtSurface(n), isTorn: this.torn[n],
     };
   }
 
   /**
-   * Returns whether the field at the greatest jump is at most a tenth of the edge of the smaller cell, or at most the jump itself.
+   * Returns whether the field at the greatest jump is at most a tenth of the edge of the smaller cell, or whether the surface is torn there.
    * @param {number} n
    */
   isAtSurface(n) {
     const edge = this.field.size[0] / this.field.grid[0] / 2 ** this.depths[n];
-    return this.values[n] <= Math.max(0.1 * edge, this.jumps.value[n]);
+    return this.values[n] <= 0.1 * edge || this.torn[n];
   }
 
   /**

@@ -12,9 +12,9 @@ namespace hpsdf::render {
 
 /// Each level, a polynomial degree or an octree depth, has one colour in all pictures. The colours of the levels below
 /// this one, of exact leaves, of cracks and of the paper differ by at least 20 (CIEDE2000) from each other, also for
-/// readers with protanopia, deuteranopia or tritanopia, and their lightness rises with the level. The colours of higher
+/// readers with protanopia, deuteranopia or tritanopia, and their lightness falls with the level. The colours of higher
 /// levels are greens that darken with the level; they are closer to each other and to those of the others.
-constexpr int kDistinctLevels = 7;
+constexpr int kDistinctLevels = 6;
 
 /// Returns the colour of a level, 0 to 30, or of exact leaves (`kExactDegree`). Any other number
 /// gets magenta, which the palette does not contain, so that a fault in the buffers becomes visible.
