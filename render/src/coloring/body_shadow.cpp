@@ -10,12 +10,12 @@
 namespace hpsdf::render {
 namespace {
 
-constexpr int kMapSize = 2048;           // pixels of the lamp's view along each side
-constexpr double kLargestCaster = 3;     // of the bodies that throw shadows, in lengths of the scene
-constexpr int kTapsAcross = 7;           // samples of the lamp's view at a point, along each side of a square
-constexpr double kShadowBorder = 0.004;  // half the width of a shadow's border, in lengths of the scene
-constexpr double kLeastCosine = 0.1;     // least cosine, towards the lamp, by which the slope of a surface is computed
-constexpr double kClearance = 2;         // pixels of the lamp's view by which a point is lifted off its own surface
+constexpr int kMapSize = 2048;            // pixels of the lamp's view along each side
+constexpr double kLargestCaster = 3;      // of the bodies that throw shadows, in lengths of the scene
+constexpr int kTapsAcross = 7;            // samples of the lamp's view at a point, along each side of a square
+constexpr double kShadowBorder = 0.004;   // half the width of a shadow's border, in lengths of the scene
+constexpr double kLeastLampCosine = 0.1;  // least cosine, towards the lamp, by which the slope of a surface is computed
+constexpr double kClearance = 2;          // pixels of the lamp's view by which a point is lifted off its own surface
 
 /// The bodies that throw shadows, as the lamp sees them.
 class LampView {
@@ -48,7 +48,7 @@ class LampView {
     const double y = (1 - from.dot(camera_.up) / camera_.up.squaredNorm()) * 0.5 * kMapSize;
     const double depth = from.dot(camera_.forward) - kClearance * pixel_;
     // A tap beside the point is compared with the tangent plane there, so that a slanted surface does not hide itself.
-    const double towardsLamp = std::max(kLeastCosine, -normal.dot(camera_.forward));
+    const double towardsLamp = std::max(kLeastLampCosine, -normal.dot(camera_.forward));
     const double slopeX = step_ * pixel_ * normal.dot(camera_.right.normalized()) / towardsLamp;
     const double slopeY = -step_ * pixel_ * normal.dot(camera_.up.normalized()) / towardsLamp;
     int hidden = 0;

@@ -64,13 +64,8 @@ class CellCutter {
       const std::vector<Eigen::Vector2d> ends = cutFace(corners, above, face);
       if (ends.size() != 2) continue;
       for (const Eigen::Vector2d& end : ends) extent.extend(end);
-      const int axis = face / 2;
-      const double coordinate = (face % 2 ? box.max() : box.min())[axis];
-      const bool isCut = coordinate != (face % 2 ? cell.box.max() : cell.box.min())[axis];
-      const auto number =
-          isCut ? face % 2 : std::int64_t(std::llround((coordinate - lower_[axis]) * cellsPerUnit_[axis]));
       CutSide side{numbers_(ends[0]), numbers_(ends[1]), int(section_.parts.size()), face % 2 == 0};
-      if (side.from != side.to) sides.emplace_back(GridPlane{isCut ? axis + 3 : axis, number}, side);
+      if (side.from != side.to) sides.emplace_back(planeOf(face, box, cell), side);
     }
     if (sides.size() < 3 || !extent.intersects(window_)) return;
     section_.parts.push_back({cell, extent});
@@ -89,6 +84,15 @@ class CellCutter {
   Eigen::Vector2d inPicture(const Vector3& fromOrigin) const {
     const Eigen::Vector2d middle = 0.5 * window_.max();
     return middle + Eigen::Vector2d(xOf_.dot(fromOrigin), yOf_.dot(fromOrigin));
+  }
+
+  /// Returns the plane in which a face of a cell lies, of which `box` is left.
+  GridPlane planeOf(int face, const Box& box, const Cell& cell) const {
+    const int axis = face / 2;
+    const auto coordinateOf = [&](const Box& b) { return (face % 2 ? b.max() : b.min())[axis]; };
+    const double coordinate = coordinateOf(box);
+    if (coordinate != coordinateOf(cell.box)) return {axis + 3, face % 2};
+    return {axis, std::llround((coordinate - lower_[axis]) * cellsPerUnit_[axis])};
   }
 
   /// Returns the points in which the plane cuts the edges of a face: none or two.
