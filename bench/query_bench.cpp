@@ -50,8 +50,8 @@ void batchedGradients(benchmark::State& state, const Field& field) {
   timeEach(state, kPoints, [&] { field.valuesAndGradients(points, out); });
 }
 
-/// What the queries of a field read for some points: for each point the entry of the lookup grid and the nodes on the
-/// way down, each of which tells where the next one is, and the cache lines of the coefficients.
+/// The data that queries of a field read for some points: for each point the entry of the lookup grid and the nodes on
+/// the way down, each of which tells where the next one is, and the cache lines of the coefficients.
 class Reads {
  public:
   Reads(const Field& field, const std::vector<Vector3>& points) {

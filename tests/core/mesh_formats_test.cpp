@@ -1,5 +1,5 @@
-// What the readers of mesh formats take and refuse: one test for each trait of files that readers are known to get
-// wrong.
+// Tests the input that readers of mesh formats take and refuse: one test for each trait of files that readers are known
+// to get wrong.
 #include <draco/compression/encode.h>
 #include <draco/mesh/triangle_soup_mesh_builder.h>
 #include <gmock/gmock.h>

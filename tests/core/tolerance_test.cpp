@@ -166,7 +166,7 @@ TEST(Tolerance, includesBlending) {
   EXPECT_LE(greatestRatio(field, distance, mesh), 1);
 }
 
-/// What was checked during the construction does not hold for a field that was changed afterwards.
+/// The checks of the construction do not hold for a field that was changed afterwards.
 TEST(Tolerance, isForgottenWhenTheFieldIsChanged) {
   const TriangleMesh mesh = support::boxOfTwo();
   const ExactDistance distance(mesh);

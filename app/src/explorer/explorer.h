@@ -150,7 +150,7 @@ class Explorer final : public SessionExtension {
   /// The dialog that asks for files. While it is open, the panels take no input.
   FileDialog files;
 
-  /// What the readout panel tells until the next command or press of the mouse.
+  /// The text that the readout panel shows until the next command or press of the mouse.
   struct Message {
     std::string text;
     bool isProblem = false;  ///< an error or a warning, not a result

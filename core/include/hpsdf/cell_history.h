@@ -29,7 +29,7 @@ enum class CellChoice : std::uint8_t {
   keep,    ///< the cell remained as it was; it is the leaf of the field
 };
 
-/// What the construction could have done with a cell.
+/// A choice that the construction had for a cell.
 struct CellAlternative {
   /// Algorithm 1: bytes of coefficients and nodes that the refinement adds. Within a tolerance: bytes of the leaf, or
   /// of all descendants.

@@ -206,7 +206,7 @@ void addPieces(const Arrangement& all, std::uint32_t triangle, std::vector<Piece
   });
 }
 
-/// Whether the two sides of each piece are inside one solid.
+/// For the two sides of each piece: true if the side is inside one solid.
 struct Sides {
   std::vector<char> front, behind;
 };

@@ -86,7 +86,7 @@ std::string decodeBase64(std::string_view text, std::size_t count) {
 
 constexpr std::size_t kMostArrays = 10'000;
 
-/// How the arrays of a file are stored.
+/// The encoding of a file's arrays.
 struct Encoding {
   bool hasLongHeaders = false;  ///< sizes have 64 bits instead of 32
   bool isCompressed = false;

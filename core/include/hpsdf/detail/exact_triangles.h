@@ -61,7 +61,7 @@ struct WindingReference {
   std::int32_t winding = 0;
 };
 
-/// How the distance in an exact leaf gets its sign.
+/// The rule by which the distance in an exact leaf gets its sign.
 struct LeafSign {
   ExactSign rule = ExactSign::pseudonormal;
   WindingReference reference = {};  ///< for `ExactSign::winding`

@@ -34,7 +34,7 @@ struct SampledBlocks {
   std::vector<Block> blocks;
 };
 
-/// How much the interpolation between samples is likely to be wrong near the surface.
+/// The likely error of the interpolation between samples near the surface.
 struct InterpolationError {
   std::size_t samples = 0;  ///< samples near the surface at which it was estimated
   double rms = 0;

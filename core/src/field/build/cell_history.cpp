@@ -282,7 +282,7 @@ class RefinementReplay {
     // When the refinement by errors ended is not known. The pass for the maximum error went on from the last of its
     // leaves from which it leads to the leaf of the field.
     if (options_.maxError > 0 && !goOnByProbes(way, false)) goOnByProbes(way, true);
-    // Whether a leaf that was pruned had been refined further is not known: `finish` records what became of it.
+    // It is not known whether a leaf that was pruned had been refined further: `finish` records what became of it.
     const std::size_t known = isPruned() && !way.back().node.fit.isFinal ? way.size() - 1 : way.size();
     for (std::size_t i = 0; i < known; ++i) record(way[i], i + 1 == way.size());
     history_.isAtLimit = !refiner_.allowed(way.back().node) && !way.back().node.fit.isFinal;

@@ -141,8 +141,8 @@ ErrorTotals sumOfErrors(const BuildTree& tree);
 /// bytes is reached.
 void growByErrors(Refiner& refiner);
 
-/// What the pass for a maximum error makes of a leaf: the leaf's greatest error and, if that error is too great, the
-/// fits of its possible refinements.
+/// The result of the pass for a maximum error in a leaf: the leaf's greatest error and, if that error is too great,
+/// the fits of its possible refinements.
 struct Probed {
   double worst = 0;  ///< greatest error, from `worstError`
   std::optional<Trial> trial;

@@ -26,7 +26,7 @@ struct alignas(64) Group {
   static constexpr std::uint32_t kTerminalBit = std::uint32_t{1} << 31;
 };
 
-/// What a query needs of the cells of a group only where it evaluates the leaf.
+/// The data of the cells of a group that a query needs only where it evaluates the leaf.
 struct Details {
   std::array<float, 8> bend, noise;
   std::uint8_t levelsBelowLeaf = 0;  ///< 0 for nodes of the octree, 1 for the eighths of a leaf, and so on
@@ -39,8 +39,8 @@ struct Cube {
   double half;  ///< half of its edge, which is the unit of local coordinates
 };
 
-/// What a field and the exact distance can be in a box. `distance` is empty, from infinity to −infinity, for a field
-/// without bounds.
+/// The intervals of a field's values and of the exact distance in a box. `distance` is empty, from infinity to
+/// −infinity, for a field without bounds.
 struct Extent {
   Interval value, distance;
 };
