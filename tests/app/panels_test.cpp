@@ -253,6 +253,19 @@ TEST(Panels, aTextIsEnteredWhenItsFieldLosesTheKeyboard) {
   EXPECT_EQ(error(), 1e-3) << "a click that fails to enter a text does nothing else";
 }
 
+TEST(Panels, tellThatSettingsAreNotThoseOfTheField) {
+  Bench bench;
+  bench.run("build analytic:sphere target-error=1e-3 grid=4 ; panel build=true");
+  const auto below = [&] { return bench.explorer().widgets().at("build/steps").rect.y0; };
+  const double without = below();
+  bench.run("settings target-error=0.001 grid=4,4,4");
+  EXPECT_EQ(below(), without) << "the field has these settings already";
+  bench.run("settings target-error=1e-4");
+  EXPECT_GT(below(), without + 5) << "a line stands above the slider";
+  bench.run("rebuild");
+  EXPECT_EQ(below(), without);
+}
+
 TEST(Panels, escapeClosesAnOpenList) {
   Bench bench;
   bench.run("ui click view/cells");

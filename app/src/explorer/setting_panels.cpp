@@ -42,8 +42,11 @@ void drawOrbit(const Controls& controls, const ViewState& view) {
                   c.projection == render::Projection::perspective ? "perspective" : "orthographic",
                   "camera projection=");
   drawUp(controls, view);
-  controls.button("view/center", "back to the centre", "camera target=center", c.target.has_value(),
-                  "Put the middle of the domain into the middle of the picture.");
+  constexpr double kUsual = render::OrbitCamera{}.distance;
+  const std::string whole = fmt::format("camera {},{},{} target=center", number(c.azimuthDegrees),
+                                        number(c.elevationDegrees), number(kUsual));
+  controls.button("view/center", "whole in view", whole.c_str(), c.target.has_value() || c.distance != kUsual,
+                  "Look at the middle of the domain, from so far that all of it is in view.");
 }
 
 void drawSurface(const Controls& controls, const ViewState& view, const Box& domain) {
@@ -152,15 +155,30 @@ void drawColors(const Controls& controls, Explorer& explorer) {
 
 namespace {
 
+/// Returns a number that stands for all three axes in place of three equal ones, and any other text as it is.
+std::string oneForAll(const std::string& text) {
+  const std::string first = text.substr(0, text.find(','));
+  return text == fmt::format("{0},{0},{0}", first) ? first : text;
+}
+
+/// Returns true if two texts spell different values.
+bool differ(const std::string& one, const std::string& other) {
+  const auto number = parseNumber(oneForAll(one));
+  return one != other && (!number || number != parseNumber(oneForAll(other)));
+}
+
 /// The controls for the parameters of `build`. Each control shows its parameter's value in `settings`, or the value of
 /// the current field if `settings` does not contain the parameter.
 struct BuildControls {
   const Controls& controls;
   const std::map<std::string, std::string>& settings;
+  mutable bool areChanged = false;  ///< true if a value that was asked for is not that of the field
 
   std::string value(const char* name, const std::string& ofField) const {
     const auto found = settings.find(name);
-    return found == settings.end() ? ofField : found->second;
+    if (found == settings.end()) return ofField;
+    areChanged = areChanged || differ(found->second, ofField);
+    return found->second;
   }
 
   void field(const char* name, const std::string& ofField) const {
@@ -284,6 +302,7 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer) {
                   "Build the field anew, and show the one before it beside it.", widthLeft());
   // The progress is below the buttons, so that a second click on one of them does not cancel what the first has begun.
   if (explorer.work) return drawProgress(controls.ui, explorer);
+  if (build.areChanged) controls.ui.text("changed: the field is built with other settings", true);
   if (const auto all = explorer.allSteps()) {
     const auto steps = double(field.metadata().steps.value_or(*all));
     controls.describe("rebuild max-steps=");
