@@ -268,17 +268,26 @@ class LightMeter {
   std::optional<Ground> ground_;
 };
 
-/// Returns the sample nearest to (x, y), within `reach` along each axis, that shows the surface and no crack.
+/// Returns the sample nearest to (x, y), within `reach` along each axis, that shows the surface and no crack; the first
+/// of those at one distance.
 std::optional<std::size_t> nearestWhole(const ViewBuffers& buffers, int x, int y, int reach) {
   std::optional<std::size_t> nearest;
   int least = std::numeric_limits<int>::max();
-  for (int j = std::max(0, y - reach); j <= std::min(buffers.height - 1, y + reach); ++j)
-    for (int i = std::max(0, x - reach); i <= std::min(buffers.width - 1, x + reach); ++i) {
-      const std::size_t at = std::size_t(j) * buffers.width + i;
-      const int squared = (i - x) * (i - x) + (j - y) * (j - y);
-      if (squared >= least || buffers.crack[at] != 0 || !buffers.shows(at, Shown::surface)) continue;
-      least = squared;
-      nearest = at;
+  const auto look = [&](int dx, int dy) {
+    const int i = x + dx, j = y + dy, squared = dx * dx + dy * dy;
+    if (i < 0 || i >= buffers.width || j < 0 || j >= buffers.height || squared > least) return;
+    const std::size_t at = std::size_t(j) * buffers.width + i;
+    if ((squared == least && at > *nearest) || buffers.crack[at] != 0 || !buffers.shows(at, Shown::surface)) return;
+    least = squared;
+    nearest = at;
+  };
+  // Search squares around the sample, from the smallest on.
+  for (int ring = 1; ring <= reach && ring * ring <= least; ++ring)
+    for (int n = -ring; n <= ring; ++n) {
+      look(n, -ring);
+      look(n, ring);
+      look(-ring, n);
+      look(ring, n);
     }
   return nearest;
 }
