@@ -42,10 +42,10 @@ void drawOrbit(const Controls& controls, const ViewState& view) {
                   c.projection == render::Projection::perspective ? "perspective" : "orthographic",
                   "camera projection=");
   drawUp(controls, view);
-  constexpr double kUsual = render::OrbitCamera{}.distance;
-  const std::string whole = fmt::format("camera {},{},{} target=center", number(c.azimuthDegrees),
-                                        number(c.elevationDegrees), number(kUsual));
-  controls.button("view/center", "whole in view", whole.c_str(), c.target.has_value() || c.distance != kUsual,
+  const double usual = render::OrbitCamera{}.distance;
+  const std::string whole =
+      fmt::format("camera {},{},{} target=center", number(c.azimuthDegrees), number(c.elevationDegrees), number(usual));
+  controls.button("view/center", "whole in view", whole.c_str(), c.target.has_value() || c.distance != usual,
                   "Look at the middle of the domain, from so far that all of it is in view.");
 }
 
