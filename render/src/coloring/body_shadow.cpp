@@ -34,6 +34,8 @@ class LampView {
     const Vector3 across = toKey.unitOrthogonal();
     camera_ = {box.center() + 1.01 * half * toKey, -toKey, half * across, half * toKey.cross(across),
                Projection::orthographic};
+    right_ = camera_.right.normalized();
+    up_ = camera_.up.normalized();
     pixel_ = 2 * half / kMapSize;
     step_ = kShadowBorder * extent / pixel_ / (kTapsAcross / 2);
     map_ = renderer.view(camera_, casters, kMapSize, kMapSize);
@@ -49,8 +51,8 @@ class LampView {
     const double depth = from.dot(camera_.forward) - kClearance * pixel_;
     // A tap beside the point is compared with the tangent plane there, so that a slanted surface does not hide itself.
     const double towardsLamp = std::max(kLeastLampCosine, -normal.dot(camera_.forward));
-    const double slopeX = step_ * pixel_ * normal.dot(camera_.right.normalized()) / towardsLamp;
-    const double slopeY = -step_ * pixel_ * normal.dot(camera_.up.normalized()) / towardsLamp;
+    const double slopeX = step_ * pixel_ * normal.dot(right_) / towardsLamp;
+    const double slopeY = -step_ * pixel_ * normal.dot(up_) / towardsLamp;
     int hidden = 0;
     for (int j = -kTapsAcross / 2; j <= kTapsAcross / 2; ++j)
       for (int i = -kTapsAcross / 2; i <= kTapsAcross / 2; ++i)
@@ -66,6 +68,7 @@ class LampView {
   }
 
   Camera camera_ = {};
+  Vector3 right_ = Vector3::Zero(), up_ = Vector3::Zero();  ///< unit vectors of the lamp's view
   double pixel_ = 0, step_ = 0;  ///< size of a pixel in world units; distance of samples in pixels
   BodyBuffers map_ = {};
 };
