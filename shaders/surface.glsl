@@ -1,7 +1,11 @@
 // Code shared by the two passes that trace a surface (surface_march.frag, then surface_hit.frag): the ray of a pixel,
 // the lookup of octree nodes along the ray, and the state of a pixel between the passes.
 
+#ifdef HPSDF_WEB
 layout(location = 1) uniform ivec2 firstPixel;
+#else
+flat in ivec2 toView;  // added to a pixel of the render target, gives the pixel of the view
+#endif
 layout(location = 2) uniform ivec2 size;
 layout(location = 3) uniform dvec3 eye;      // the camera's eye, grid coordinates
 layout(location = 4) uniform dvec3 forward;  // direction of view, world units
@@ -38,7 +42,11 @@ struct Ray {
 
 // Adds to `middle` the vector from the centre of the picture to this pixel.
 dvec3 onPicture(dvec3 middle) {
+#ifdef HPSDF_WEB
   ivec2 pixel = firstPixel + ivec2(gl_FragCoord.xy);
+#else
+  ivec2 pixel = toView + ivec2(gl_FragCoord.xy);
+#endif
   return middle + right * (double(2 * pixel.x + 1 - size.x) * pixelStep.x) +
          up * (double(size.y - 2 * pixel.y - 1) * pixelStep.y);
 }

@@ -15,6 +15,15 @@ layout(binding = 4) uniform samplerBuffer linearParts;  // a leaf's linear part:
 
 flat in float start;  // distance along the ray at which the march starts (Block::start)
 
+#ifndef HPSDF_WEB
+flat in uvec2 chosen;  // the pixels of the block whose rays are traced (Block::chosen)
+
+bool isChosen() {
+  uvec2 inBlock = uvec2(gl_FragCoord.xy) % 8u;
+  return ((inBlock.y < 4u ? chosen.x : chosen.y) >> (8u * (inBlock.y % 4u) + inBlock.x) & 1u) != 0u;
+}
+#endif
+
 layout(location = 0) out uvec4 integers;
 layout(location = 1) out vec4 floats;
 
@@ -380,6 +389,9 @@ void main() {
   ray.length = float(pixel.length);
   ray.nudge = kNudge * diagonal;
   March march = startMarch(pixel, ray);
+#ifndef HPSDF_WEB
+  if (!isChosen()) march.kind = kMiss;
+#endif
   while (march.kind == kUnderWay && march.steps < mostSteps) {
     LeafPoint leaf;
     bool blended = marchByPolynomials(ray, march, leaf);

@@ -313,6 +313,40 @@ int reddish(Bench& bench) {
   return count;
 }
 
+/// Returns the first control of a section of levels, such as "degrees/3".
+std::string firstLevel(Bench& bench, const std::string& section) {
+  for (const auto& [path, widget] : bench.explorer().widgets())
+    if (path.starts_with(section + "/") && path != section + "/fold") return path;
+  ADD_FAILURE() << "no level in " << section;
+  return "bar/keys";
+}
+
+TEST(Panels, aLevelThatIsPressedShowsItsCellsAndHidesThemAgain) {
+  Bench bench;
+  bench.run("panel histograms=true worst=false statistics=false ; color degree");
+  for (const std::string section : {"degrees", "depths", "legend"}) {
+    const std::string path = firstLevel(bench, section);
+    const std::vector<int> level = {std::stoi(path.substr(path.find('/') + 1))};
+    const auto shown = [&] { return section == "depths" ? bench.view().cells.depths : bench.view().cells.degrees; };
+    EXPECT_THAT(bench.explorer().widgets().at(path).help, HasSubstr("Show the cells of"));
+    bench.run("ui click " + path);
+    EXPECT_EQ(bench.view().cells.style, render::CellStyle::lines) << path;
+    EXPECT_EQ(shown(), level) << path;
+    EXPECT_THAT(bench.explorer().widgets().at(path).help, HasSubstr("Hide the cells of"));
+    bench.run("ui click " + path);
+    EXPECT_EQ(bench.view().cells.style, render::CellStyle::none) << path;
+    EXPECT_THAT(shown(), IsEmpty()) << path;
+  }
+  bench.run("cells boxes");
+  bench.run("ui click " + firstLevel(bench, "degrees"));
+  EXPECT_EQ(bench.view().cells.style, render::CellStyle::boxes) << "boxes stay boxes";
+  bench.run("cells none degrees=all ; show slice ; ui click " + firstLevel(bench, "degrees"));
+  EXPECT_FALSE(bench.view().slice) << "cells stand in the picture of the surface";
+  EXPECT_EQ(bench.view().cells.style, render::CellStyle::lines);
+  bench.run("undo");
+  EXPECT_TRUE(bench.view().slice) << "a press is one step";
+}
+
 TEST(Panels, problemsHaveAnInkOfTheirOwn) {
   Bench bench;
   bench.explorer().message = {"view copied as 12 lines of script"};

@@ -63,7 +63,7 @@ class FakeRenderer : public Renderer {
     return buffers;
   }
 
-  ViewBuffers surface(const SurfaceView&, int width, int height) override {
+  ViewBuffers surface(const SurfaceView&, int width, int height, std::span<const std::uint8_t>) override {
     ViewBuffers buffers = empty(width, height);
     buffers.normal.assign(buffers.cell.size(), Eigen::Vector3f::UnitX());
     buffers.distance.assign(buffers.cell.size(), 1);

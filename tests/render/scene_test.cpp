@@ -355,7 +355,9 @@ TEST(Pick, tellsTheContentOfEachKindOfPixel) {
 class NoRenderer : public Renderer {
  public:
   ViewBuffers slice(const SliceView&, int, int) override { throw std::logic_error("asked for a slice"); }
-  ViewBuffers surface(const SurfaceView&, int, int) override { throw std::logic_error("asked for a surface"); }
+  ViewBuffers surface(const SurfaceView&, int, int, std::span<const std::uint8_t>) override {
+    throw std::logic_error("asked for a surface");
+  }
   std::string description() const override { return "none"; }
 };
 

@@ -419,7 +419,9 @@ std::string Explorer::perform(const std::string& line) {
   std::string result;
   try {
     const std::vector<Call> calls = parseScript(session_.registry(), kPanelScript, line, {});
+    const std::size_t steps = undone_.size();
     runScript(session_, calls);
+    if (calls.size() > 1 && undone_.size() > steps + 1) undone_.resize(steps + 1);  // the line is one step of undo
     for (const Call& call : calls) result = resultOf(*call.command, call.arguments);
   } catch (...) {
     running_ = isWithinAnother;

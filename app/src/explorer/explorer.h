@@ -105,7 +105,7 @@ class Explorer final : public SessionExtension {
   /// The coarseness of the last picture.
   int coarseness() const { return coarseness_; }
 
-  /// Runs one line of script. Widgets act by calling this function.
+  /// Runs one line of script, as one step of `undo`. Widgets act by calling this function.
   void run(const std::string& line);
   /// Runs the line of script that loads or builds the first field, without calling `onCommand` for it.
   void open(const std::string& line);

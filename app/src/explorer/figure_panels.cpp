@@ -13,7 +13,33 @@ namespace {
 constexpr std::size_t kWorstRows = 8;
 constexpr int kMostDecimals = 4;  // of coordinates in the list of worst interfaces
 
-void drawLevelSwatches(const std::vector<render::Legend::Level>& levels) {
+/// The kinds of levels that cells have.
+enum class LevelKind : std::uint8_t { degree, depth };
+
+/// The places in a panel that show the cells of one level when they are pressed.
+struct LevelPlaces {
+  const Controls& controls;
+  const ViewState& view;
+  std::string panel;
+  LevelKind kind;
+
+  /// Draws the place of a level at the present position. A press of a place whose cells are the ones that are shown
+  /// hides them.
+  void draw(int level, double width, double height) const {
+    const std::string name = levelName(level), kindName = kind == LevelKind::degree ? "degree" : "depth";
+    const std::vector<int>& shown = kind == LevelKind::degree ? view.cells.degrees : view.cells.depths;
+    const bool isShown = !view.slice && view.cells.style != render::CellStyle::none && shown == std::vector<int>{level};
+    const auto style = view.cells.style == render::CellStyle::boxes ? "boxes" : "lines";
+    const std::string command =
+        isShown ? fmt::format("cells none {}s=all", kindName)
+                : fmt::format("{}cells {} {}s={}", view.slice ? "show surface ; " : "", style, kindName, name);
+    controls.describe(command,
+                      fmt::format("{} the cells of {} {}.", isShown ? "Hide" : "Show", kindName, name).c_str());
+    if (controls.ui.place(panel + "/" + name, width, height, isShown)) controls.commands.push_back(command);
+  }
+};
+
+void drawLevelSwatches(const std::vector<render::Legend::Level>& levels, const LevelPlaces& places) {
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const ImVec2 from = ImGui::GetCursorScreenPos();
   const float width = widthLeft() / float(std::max<std::size_t>(levels.size(), 1)), height = 20;
@@ -24,8 +50,9 @@ void drawLevelSwatches(const std::vector<render::Legend::Level>& levels) {
     const bool dark = 2 * levels[i].color[0] + 5 * levels[i].color[1] + levels[i].color[2] < 4 * 255;
     if (widthOf(label) + 2 <= x1 - x0)
       textAt((x0 + x1 - widthOf(label)) / 2, from.y + 3, label, dark ? IM_COL32_WHITE : IM_COL32(20, 20, 30, 255));
+    ImGui::SetCursorScreenPos({x0, from.y});
+    places.draw(levels[i].level, x1 - x0, height);
   }
-  ImGui::Dummy({widthLeft(), height});
 }
 
 void drawColorBar(const render::Legend& legend) {
@@ -74,11 +101,13 @@ void drawHistogramColumn(float x, float width, float bottom, float bar, ImU32 co
 }
 
 /// Draws a histogram with one column for each level (a degree or depth). The column shows the level's share of the
-/// volume. If `legend` is given, the columns have the colours of the legend.
-void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& shares, const render::Legend* legend) {
+/// volume. If `legend` is given, the columns have the colours of the legend. If `places` is given, the columns can be
+/// pressed.
+void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& shares, const render::Legend* legend,
+                   const std::optional<LevelPlaces>& places) {
   ui.text(title);
   const ImVec2 from = ImGui::GetCursorScreenPos();
-  const float height = 36, line = ImGui::GetTextLineHeight();
+  const float height = 36, line = ImGui::GetTextLineHeight(), whole = height + 2 * line + 2;
   const float width = std::min(44.0F, widthLeft() / float(std::max<std::size_t>(shares.size(), 1)));
   double greatest = 0;
   for (const auto& [level, share] : shares) greatest = std::max(greatest, share);
@@ -90,15 +119,22 @@ void drawHistogram(Ui& ui, const char* title, const std::map<int, double>& share
         if (known.level == level) color = packed(known.color);
     const float bar = std::max(1.0F, std::round(height * float(share / greatest)));
     drawHistogramColumn(x, width, from.y + line + height, bar, color, level, 100 * share);
+    if (places) {
+      ImGui::SetCursorScreenPos({x, from.y});
+      places->draw(level, width, whole);
+    }
     x += width;
   }
-  ImGui::Dummy({widthLeft(), height + 2 * line + 2});
+  ImGui::SetCursorScreenPos(from);
+  ImGui::Dummy({widthLeft(), whole});
 }
 
 }  // namespace
 
-void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
+void drawLegend(const Controls& controls, const Explorer& explorer) {
+  const std::optional<render::Drawn>& picture = explorer.picture();
   if (!picture) return;
+  Ui& ui = controls.ui;
   const render::Legend& legend = picture->legend;
   for (const auto& [name, count, color] : legend.defects) drawSwatch(color, name + ": " + count);
   for (const auto& [name, color] : legend.lines) drawSwatch(color, name);
@@ -107,26 +143,34 @@ void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture) {
     return;
   }
   ui.text(legend.title);
-  if (!legend.levels.empty()) drawLevelSwatches(legend.levels);
+  const ViewState& view = explorer.view();
+  const LevelKind kind = view.colors().by == render::ColorBy::depth ? LevelKind::depth : LevelKind::degree;
+  if (!legend.levels.empty()) drawLevelSwatches(legend.levels, {controls, view, "legend", kind});
   if (!legend.bar.empty()) drawColorBar(legend);
 }
 
-void drawHistograms(Ui& ui, Explorer& explorer) {
+void drawHistograms(const Controls& controls, Explorer& explorer) {
+  Ui& ui = controls.ui;
+  const ViewState& view = explorer.view();
   const auto& picture = explorer.picture();
-  const auto legendOf = [&](render::ColorBy color) {
-    return picture && explorer.view().colors().by == color ? &picture->legend : nullptr;
+  const auto draw = [&](LevelKind kind, const std::map<int, double>& shares, bool takesPresses) {
+    const bool isDegree = kind == LevelKind::degree;
+    const auto colored = isDegree ? render::ColorBy::degree : render::ColorBy::depth;
+    const std::string names = isDegree ? "degrees" : "depths";
+    drawHistogram(ui, (names + ", % of the volume").c_str(), shares,
+                  picture && view.colors().by == colored ? &picture->legend : nullptr,
+                  takesPresses ? std::optional(LevelPlaces{controls, view, names, kind}) : std::nullopt);
   };
-  const auto draw = [&](const FieldStatistics& figures) {
-    drawHistogram(ui, "degrees, % of the volume", figures.degreeVolume, legendOf(render::ColorBy::degree));
-    drawHistogram(ui, "depths, % of the volume", figures.depthVolume, legendOf(render::ColorBy::depth));
+  const auto drawBoth = [&](const FieldStatistics& figures, bool takesPresses) {
+    draw(LevelKind::degree, figures.degreeVolume, takesPresses);
+    draw(LevelKind::depth, figures.depthVolume, takesPresses);
   };
-  const std::string& beside = explorer.view().beside;
-  if (beside.empty()) return draw(explorer.figures());
+  if (view.beside.empty()) return drawBoth(explorer.figures(), true);
   ui.text("left: " + currentName(explorer));
-  draw(explorer.figures());
+  drawBoth(explorer.figures(), true);
   if (!explorer.pictureBeside()) return;  // the other field has not been read yet
   ui.text("right: " + besideName(explorer));
-  draw(explorer.session().otherFigures(beside));
+  drawBoth(explorer.session().otherFigures(view.beside), false);
 }
 
 namespace {

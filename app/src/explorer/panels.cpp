@@ -324,8 +324,8 @@ void drawParts(const Controls& controls, Explorer& explorer) {
     section(controls, view, Panel::build, "Construction", [&] { drawBuildPanel(controls, explorer); });
   });
   scrolling("right", layout.right, view.scroll[1], [&] {
-    section(controls, view, Panel::legend, "Legend", [&] { drawLegend(ui, explorer.picture()); });
-    section(controls, view, Panel::histograms, "Degrees and depths", [&] { drawHistograms(ui, explorer); });
+    section(controls, view, Panel::legend, "Legend", [&] { drawLegend(controls, explorer); });
+    section(controls, view, Panel::histograms, "Degrees and depths", [&] { drawHistograms(controls, explorer); });
     section(controls, view, Panel::worst, "Worst interfaces", [&] { drawWorst(controls, explorer); });
     section(controls, view, Panel::statistics, "Statistics", [&] { drawStatistics(ui, explorer); });
   });

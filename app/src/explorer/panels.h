@@ -92,10 +92,11 @@ void drawCamera(const Controls& controls, Explorer& explorer);
 /// Draws the parameters of the next construction, its progress while it runs, and the button that starts it.
 void drawBuildPanel(const Controls& controls, Explorer& explorer);
 
-/// Draws the colour legend of the present picture.
-void drawLegend(Ui& ui, const std::optional<render::Drawn>& picture);
-/// Draws two histograms: the shares of the domain's volume by degree and by depth of the cells.
-void drawHistograms(Ui& ui, Explorer& explorer);
+/// Draws the colour legend of the present picture. A degree or depth that is pressed shows its cells.
+void drawLegend(const Controls& controls, const Explorer& explorer);
+/// Draws two histograms: the shares of the domain's volume by degree and by depth of the cells. A column that is
+/// pressed shows the cells of its degree or depth.
+void drawHistograms(const Controls& controls, Explorer& explorer);
 /// Draws a table of statistics of the field, such as its number of cells.
 void drawStatistics(Ui& ui, Explorer& explorer);
 /// Draws one page of the list of cell interfaces with the greatest jumps, and the buttons that turn the page.

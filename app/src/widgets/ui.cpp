@@ -596,6 +596,16 @@ bool Ui::row(const std::string& path, std::span<const std::string> cells, std::s
   return clicked || pressedByKey(path);
 }
 
+bool Ui::place(const std::string& path, double width, double height, bool chosen) {
+  const bool clicked = ImGui::InvisibleButton(id(path, ""), {float(width), float(height)});
+  const bool isOver = ImGui::IsItemHovered();
+  if (chosen || isOver)
+    ImGui::GetWindowDrawList()->AddRect(ImGui::GetItemRectMin(), ImGui::GetItemRectMax(), ImGui::GetColorU32(kAccent),
+                                        ImGui::GetStyle().FrameRounding, 0, chosen ? 2.0F : 1.0F);
+  note(path);
+  return clicked || pressedByKey(path);
+}
+
 void Ui::text(const std::string& line, bool soft) {
   if (soft)
     ImGui::TextDisabled("%s", line.c_str());

@@ -171,6 +171,9 @@ class Ui {
   std::array<double, 2> pointerInPoints() const { return {pointer_[0] / scale_, pointer_[1] / scale_}; }
   /// Draws a row of a table, with its cells from `columns` on, measured in widths of a digit.
   bool row(const std::string& path, std::span<const std::string> cells, std::span<const double> columns);
+  /// Reserves a rectangle that the caller has drawn or will draw, which can be pressed. A thin frame marks it while the
+  /// pointer is over it, and a thicker one if it is `chosen`.
+  bool place(const std::string& path, double width, double height, bool chosen);
   void text(const std::string& line, bool soft = false);
   /// Writes why something failed, in a colour of its own.
   void problem(const std::string& line);

@@ -22,6 +22,9 @@ constexpr Color kPaper = {250, 250, 248};
 constexpr Color kSection = {238, 222, 205};  // cut through a solid without a colour scale
 constexpr Color kAir = {222, 228, 235};      // part of a plane that lies outside of the solid
 
+// The least cosine between normals of samples that are coloured alike: of 1.8 degrees.
+constexpr float kSameNormal = 0.9995F;
+
 // The greatest shares of the light that shadow and occlusion take from the ground.
 constexpr float kGroundShadow = 0.34F, kGroundOcclusion = 0.42F;
 
@@ -30,20 +33,60 @@ constexpr float kGroundShadow = 0.34F, kGroundOcclusion = 0.42F;
 constexpr double kFlattestSlope = 0.25;
 
 // Returns a picture in which each pixel is the mean of its samples' colours, where colorOf(x, y, i) is the
-// colour of sample i at (x, y). Uses several threads.
-template <typename ColorOf>
-Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
+// colour of sample i at (x, y). If isUniform(x, y) is true for the upper left sample of a pixel, its colour is that of
+// the pixel. Uses several threads.
+template <typename ColorOf, typename IsUniform>
+Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf, const IsUniform& isUniform) {
   Image image(buffers.width / samples, buffers.height / samples, kPaper);
   const float share = 1.0F / float(samples * samples);
+  const auto sampleColor = [&](int x, int y) { return colorOf(x, y, std::size_t(y) * buffers.width + x); };
+  const auto mean = [&](int left, int top) {
+    LinearColor sum = LinearColor::Zero();
+    for (int y = top; y < top + samples; ++y)
+      for (int x = left; x < left + samples; ++x) sum += sampleColor(x, y);
+    return LinearColor(share * sum);
+  };
   tbb::parallel_for(0, image.height, [&](int row) {
-    std::vector<LinearColor> sums(image.width, LinearColor::Zero());
-    for (int y = row * samples; y < (row + 1) * samples; ++y)
-      for (int x = 0; x < image.width * samples; ++x)
-        sums[x / samples] += colorOf(x, y, std::size_t(y) * buffers.width + x);
-    for (int x = 0; x < image.width; ++x) image.at(x, row) = encodeSrgb(share * sums[x]);
+    for (int column = 0; column < image.width; ++column) {
+      const int x = column * samples, y = row * samples;
+      image.at(column, row) = encodeSrgb(isUniform(x, y) ? sampleColor(x, y) : mean(x, y));
+    }
   });
   return image;
 }
+
+template <typename ColorOf>
+Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
+  return average(buffers, samples, colorOf, [](int, int) { return false; });
+}
+
+// Tells which pixels have samples that plain light shows in one colour: those that show nothing, or the surface turned
+// the same way.
+class UniformPixels {
+ public:
+  UniformPixels(const ViewBuffers& buffers, int samples, const FieldLight& light)
+      : buffers_(buffers), samples_(samples), light_(light) {}
+
+  bool operator()(int left, int top) const {
+    const std::size_t first = std::size_t(top) * buffers_.width + left;
+    for (int y = 0; y < samples_; ++y)
+      for (int x = 0; x < samples_; ++x)
+        if (!isSame(first, first + std::size_t(y) * buffers_.width + x)) return false;
+    return true;
+  }
+
+ private:
+  bool isSame(std::size_t i, std::size_t j) const {
+    if (buffers_.hit(i) != buffers_.hit(j) || buffers_.showsBody(i) || buffers_.showsBody(j)) return false;
+    if (!light_.lit.empty() && light_.lit[i] != light_.lit[j]) return false;
+    if (!light_.open.empty() && light_.open[i] != light_.open[j]) return false;
+    return !buffers_.hit(i) || buffers_.normal[i].dot(buffers_.normal[j]) >= kSameNormal;
+  }
+
+  const ViewBuffers& buffers_;
+  int samples_;
+  const FieldLight& light_;
+};
 
 // Returns the share of a sample, 0 to 1, that a line of the given width covers. The sample is at `distance` from the
 // centre of the line. Both lengths are in samples.
@@ -303,7 +346,7 @@ Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const Surfa
   std::vector<LinearColor> backdrop;
   for (int y = 0; y < buffers.height; ++y)
     backdrop.push_back(sampling.paper ? decodeSrgb(*sampling.paper) : backdropColor((y + 0.5) / buffers.height));
-  return average(buffers, sampling.samples, [&](int x, int y, std::size_t i) {
+  const auto colorOf = [&](int x, int y, std::size_t i) {
     LinearColor sample = !buffers.covered(i)  ? backdrop[y] * groundLight(look.light, i)
                          : isFlat(buffers, i) ? flatColor(i)
                                               : shader(x, y);
@@ -313,7 +356,10 @@ Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const Surfa
       sample = surfaceLine(sample, contours.toZero(x, y, slope));
     }
     return lines.empty() ? sample : mix(sample, outline, float(kOutlineStrength) * lines[i]);
-  });
+  };
+  const bool isPlain = !look.color && lines.empty() && buffers.shown.empty();
+  if (!isPlain) return average(buffers, sampling.samples, colorOf);
+  return average(buffers, sampling.samples, colorOf, UniformPixels(buffers, sampling.samples, look.light));
 }
 
 Image backdropPicture(int width, int height, int viewHeight) {

@@ -28,7 +28,8 @@ constexpr double kAround = 0.1;        // rays to the lamp are followed within t
 constexpr double kLampRadius = 0.13;   // tangent of the angle under which half of the lamp is seen
 constexpr double kGroundReach = 1.25;  // the ground is darkened up to this distance from the solid's middle
 constexpr double kFadesFrom = 0.8;     // share of the view's width from which on the shadow on the ground fades
-constexpr int kRowsTogether = 4;       // rows of pixels whose points are evaluated together
+constexpr int kGroundBlock = 8;        // pixels along each side of a block of ground whose light is interpolated
+constexpr double kSmoothLight = 0.12;  // greatest difference of the light in a block of which it is interpolated
 constexpr float kEvenCosine = 0.9F;    // least cosine between normals of an even piece of a surface
 constexpr int kCrackReach = 4;         // pixels from a crack within which the light of the surface beside it is sought
 constexpr double kEvenDepth = 4;       // greatest difference of the distances of an even piece, in samples
@@ -114,32 +115,146 @@ class LightMeter {
     if (view_.camera.eye[axis] > middle[axis]) ground_ = Ground{axis, middle[axis], middle};
   }
 
-  /// Measures the light in the rows of pixels from `first` to before `last`.
-  void measure(int first, int last, FieldLight& light) const {
+  /// Measures the light in kGroundBlock rows of pixels from row `top` on.
+  void measure(int top, FieldLight& light) const {
+    const std::vector<bool> isLit = lightGround(top, light);
     std::vector<Place> places;
-    for (int y = first; y < last; ++y)
-      for (int x = 0; x < buffers_.width / samples_; ++x) addPlaces(x, y, places);
-    if (!light.open.empty()) measureAmbient(places);
-    followKey(places);
-    for (const Place& place : places) {
-      const double open = place.open + place.fade * (1 - place.open), lit = place.lit + place.fade * (1 - place.lit);
-      for (int y = 0; y < place.side; ++y)
-        for (int x = 0; x < place.side; ++x) {
-          const std::size_t i = place.sample + std::size_t(y) * buffers_.width + x;
-          if (!light.open.empty()) light.open[i] = float(open);
-          light.lit[i] = float(lit);
-        }
+    for (int y = top; y < std::min(top + kGroundBlock, rows()); ++y)
+      for (int x = 0; x < columns(); ++x)
+        if (!isLit[std::size_t(x / kGroundBlock)] && !takesMean(x, y)) addPlaces(x, y, places);
+    measure(places, !light.open.empty());
+    for (const Place& place : places) setLight(place.sample, place.side, place.light, light);
+  }
+
+  /// Lights the pixels of a row whose light is the mean of that beside them, which has been measured.
+  void spread(int y, FieldLight& light) const {
+    for (int x = 0; x < columns(); ++x) {
+      if (!takesMean(x, y)) continue;
+      Light mean{0, 0};
+      forEachBeside(x, y, [&](std::size_t sample) {
+        mean.open += light.open.empty() ? 0 : 0.25 * double(light.open[sample]);
+        mean.lit += 0.25 * double(light.lit[sample]);
+      });
+      setLight(sampleOf(x, y), samples_, mean, light);
     }
   }
 
  private:
+  struct Light {
+    double open = 1, lit = 1;
+  };
+
   struct Place {
     std::size_t sample;
     Vector3 point, normal;
     double fade;   ///< 0 on the surface and on the ground near it; 1 where the shadow on the ground ends
     int side = 1;  ///< the light is that of side × side samples, of which `sample` is the upper left one
-    double open = 1, lit = 1;
+    Light light = {};
   };
+
+  int columns() const { return buffers_.width / samples_; }
+  int rows() const { return buffers_.height / samples_; }
+
+  void measure(std::vector<Place>& places, bool asksAmbient) const {
+    if (asksAmbient) measureAmbient(places);
+    followKey(places);
+    for (Place& place : places)
+      for (double* share : {&place.light.open, &place.light.lit}) *share += place.fade * (1 - *share);
+  }
+
+  /// Sets the light of side × side samples, of which `sample` is the upper left one.
+  void setLight(std::size_t sample, int side, const Light& measured, FieldLight& light) const {
+    for (int y = 0; y < side; ++y)
+      for (int x = 0; x < side; ++x) {
+        const std::size_t i = sample + std::size_t(y) * buffers_.width + x;
+        if (!light.open.empty()) light.open[i] = float(measured.open);
+        light.lit[i] = float(measured.lit);
+      }
+  }
+
+  /// The light on the ground at the corners and in the middle of the blocks of a row, each at the upper left pixel.
+  struct GroundLight {
+    std::vector<std::optional<Light>> above, below;  ///< at the left ends of the blocks' upper and lower sides
+    std::vector<std::optional<Light>> middle;
+
+    /// Returns true if the light changes so little over block i that it can be interpolated between its corners.
+    bool isSmooth(std::size_t i) const {
+      if (!above[i] || !above[i + 1] || !below[i] || !below[i + 1] || !middle[i]) return false;
+      const auto spread = [&](double Light::*share) {
+        const auto [least, greatest] = std::minmax({(*above[i]).*share, (*above[i + 1]).*share, (*below[i]).*share,
+                                                    (*below[i + 1]).*share, (*middle[i]).*share});
+        return greatest - least;
+      };
+      return spread(&Light::open) <= kSmoothLight && spread(&Light::lit) <= kSmoothLight;
+    }
+
+    /// Interpolates the light in block i, at shares of its width and height.
+    Light at(std::size_t i, double right, double down) const {
+      const auto between = [&](double Light::*share) {
+        const double upper = std::lerp((*above[i]).*share, (*above[i + 1]).*share, right);
+        return std::lerp(upper, std::lerp((*below[i]).*share, (*below[i + 1]).*share, right), down);
+      };
+      return {between(&Light::open), between(&Light::lit)};
+    }
+  };
+
+  /// Lights the blocks of pixels in a row of blocks that show nothing but ground on which the light is smooth. Returns
+  /// for each block of the row if it is lit.
+  std::vector<bool> lightGround(int top, FieldLight& light) const {
+    const auto blocks = std::size_t((columns() + kGroundBlock - 1) / kGroundBlock);
+    std::vector<bool> isLit(blocks, false);
+    if (!ground_ || top + kGroundBlock >= rows()) return isLit;
+    const GroundLight ground = groundLightOf(top, blocks);
+    for (std::size_t i = 0; i < blocks; ++i) {
+      const int left = int(i) * kGroundBlock;
+      if (!ground.isSmooth(i) || !isBare(left, top, kGroundBlock)) continue;
+      isLit[i] = true;
+      for (int y = 0; y < kGroundBlock; ++y)
+        for (int x = 0; x < kGroundBlock; ++x)
+          setLight(sampleOf(left + x, top + y), samples_,
+                   ground.at(i, double(x) / kGroundBlock, double(y) / kGroundBlock), light);
+    }
+    return isLit;
+  }
+
+  /// Measures the light on the ground at the corners and in the middle of a row of blocks. There is none where a pixel
+  /// shows something else.
+  GroundLight groundLightOf(int top, std::size_t blocks) const {
+    std::vector<Place> places;
+    std::vector<std::pair<std::optional<Light>*, std::size_t>> measured;  // the place whose light goes there
+    const auto ask = [&](int x, int y, std::optional<Light>& answer) {
+      if (x >= columns() || !isBare(x, y, 1)) return;
+      answer = Light{};  // beyond the reach of the shadow there is no place
+      const auto place = placeAt(x * samples_, y * samples_);
+      if (!place) return;
+      measured.emplace_back(&answer, places.size());
+      places.push_back(*place);
+    };
+    GroundLight ground{.above = {}, .below = {}, .middle = {}};
+    for (auto* lights : {&ground.above, &ground.below}) lights->resize(blocks + 1);
+    ground.middle.resize(blocks);
+    for (std::size_t i = 0; i <= blocks; ++i) {
+      const int left = int(i) * kGroundBlock;
+      ask(left, top, ground.above[i]);
+      ask(left, top + kGroundBlock, ground.below[i]);
+      if (i < blocks) ask(left + kGroundBlock / 2, top + kGroundBlock / 2, ground.middle[i]);
+    }
+    measure(places, true);
+    for (const auto& [answer, place] : measured) *answer = places[place].light;
+    return ground;
+  }
+
+  /// Returns the upper left sample of a pixel.
+  std::size_t sampleOf(int x, int y) const { return std::size_t(y * samples_) * buffers_.width + x * samples_; }
+
+  /// Returns true if nothing is in front of the ground in side × side pixels, of which (left, top) is the upper left
+  /// one.
+  bool isBare(int left, int top, int side) const {
+    for (int y = top * samples_; y < (top + side) * samples_; ++y)
+      for (int x = left * samples_; x < (left + side) * samples_; ++x)
+        if (x >= buffers_.width || buffers_.covered(std::size_t(y) * buffers_.width + x)) return false;
+    return true;
+  }
 
   /// Adds the places at which the samples of pixel (x, y) are measured: one for all of them where they show an even
   /// piece of a surface or the ground alone, since light changes little within a pixel.
@@ -157,19 +272,41 @@ class LightMeter {
   /// surface with similar normals, or nothing.
   bool isEven(int left, int top) const {
     const std::size_t first = std::size_t(top) * buffers_.width + left;
-    const bool covered = buffers_.covered(first);
-    const float farthest =
-        covered ? float(kEvenDepth * pixelSize(view_.camera, buffers_.distance[first], buffers_.height)) : 0;
     for (int y = 0; y < samples_; ++y)
-      for (int x = 0; x < samples_; ++x) {
-        const std::size_t i = first + std::size_t(y) * buffers_.width + x;
-        if (buffers_.covered(i) != covered) return false;
-        if (!covered) continue;
-        if (buffers_.showsBody(i) != buffers_.showsBody(first)) return false;
-        if (std::abs(buffers_.distance[i] - buffers_.distance[first]) > farthest) return false;
-        if (buffers_.normal[i].dot(buffers_.normal[first]) < kEvenCosine) return false;
-      }
+      for (int x = 0; x < samples_; ++x)
+        if (!continues(first, first + std::size_t(y) * buffers_.width + x, kEvenDepth)) return false;
     return true;
+  }
+
+  /// Returns true if samples i and j show points of one surface with similar normals, of which one is no more than
+  /// `depth` samples farther away, or if both show nothing.
+  bool continues(std::size_t i, std::size_t j, double depth) const {
+    if (buffers_.covered(i) != buffers_.covered(j)) return false;
+    if (!buffers_.covered(i)) return true;
+    const double farthest = depth * pixelSize(view_.camera, buffers_.distance[i], buffers_.height);
+    return buffers_.showsBody(i) == buffers_.showsBody(j) &&
+           std::abs(buffers_.distance[i] - buffers_.distance[j]) <= farthest &&
+           buffers_.normal[i].dot(buffers_.normal[j]) >= kEvenCosine;
+  }
+
+  /// Calls f(sample) for the upper left samples of the four pixels beside a pixel.
+  template <typename F>
+  void forEachBeside(int x, int y, const F& f) const {
+    for (const auto& [beside, line] : {std::pair(x - 1, y), {x + 1, y}, {x, y - 1}, {x, y + 1}})
+      f(sampleOf(beside, line));
+  }
+
+  /// Returns true if a pixel takes the mean of the light that is measured at the four pixels beside it: every other
+  /// pixel, as on a chessboard, where all five show an even piece of a surface.
+  bool takesMean(int x, int y) const {
+    if ((x + y) % 2 == 0 || x == 0 || y == 0 || x + 1 == columns() || y + 1 == rows()) return false;
+    const std::size_t here = sampleOf(x, y);
+    if (!buffers_.covered(here) || !isEven(x * samples_, y * samples_)) return false;
+    bool isOnePiece = true;
+    forEachBeside(x, y, [&](std::size_t there) {
+      isOnePiece = isOnePiece && buffers_.crack[there] == 0 && continues(here, there, kEvenDepth * samples_);
+    });
+    return isOnePiece;
   }
 
   std::optional<Place> placeAt(int x, int y) const {
@@ -202,7 +339,8 @@ class LightMeter {
       weights += weight;
       weight *= 0.85;
     }
-    for (std::size_t i = 0; i < places.size(); ++i) places[i].open = std::exp(-kAmbientStrength * closed[i] / weights);
+    for (std::size_t i = 0; i < places.size(); ++i)
+      places[i].light.open = std::exp(-kAmbientStrength * closed[i] / weights);
   }
 
   /// The part of a ray towards the lamp on which the solid can hide the lamp.
@@ -229,12 +367,20 @@ class LightMeter {
     return ray.length < ray.last ? std::optional(ray) : std::nullopt;
   }
 
+  /// Returns the length of a step of a ray at which the distance is `value`. The longest step is the one over which the
+  /// whole lamp is certain to be seen, because distances change no faster than places.
+  double stepOf(const Ray& ray, double value) const {
+    const double clear = (value - kLampRadius * ray.length) / (1 + kLampRadius);
+    return std::max(clear,
+                    std::clamp(kShadowStep * std::abs(value), kLeastShadowStep * size_, kGreatestShadowStep * size_));
+  }
+
   /// Follows the rays from all places to the lamp, a step of all rays at a time.
   void followKey(std::vector<Place>& places) const {
     std::vector<Ray> rays;
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (places[i].normal.dot(toKey_) <= kBehind)
-        places[i].lit = 0;
+        places[i].light.lit = 0;
       else if (const auto ray = rayFrom(places, i))
         rays.push_back(*ray);
     }
@@ -248,10 +394,9 @@ class LightMeter {
       for (std::size_t i = 0; i < rays.size(); ++i) {
         Ray ray = rays[i];
         ray.clear = std::min(ray.clear, values[i] / (kLampRadius * ray.length));
-        ray.length +=
-            std::clamp(kShadowStep * std::abs(values[i]), kLeastShadowStep * size_, kGreatestShadowStep * size_);
+        ray.length += stepOf(ray, values[i]);
         const double seen = std::clamp(ray.clear, -1.0, 1.0);
-        places[ray.place].lit = 0.25 * (1 + seen) * (1 + seen) * (2 - seen);
+        places[ray.place].light.lit = 0.25 * (1 + seen) * (1 + seen) * (2 - seen);
         if (ray.clear > -1 && ray.length < ray.last) rays[kept++] = ray;
       }
       rays.resize(kept);
@@ -313,11 +458,9 @@ FieldLight fieldLight(const ShadowCaster& caster, const ViewBuffers& buffers, in
   FieldLight light{{}, std::vector<float>(buffers.cell.size(), 1)};
   if (!caster.amongBodies) light.open.assign(buffers.cell.size(), 1);
   const LightMeter meter(caster, buffers, samples, toKey);
-  const int rows = buffers.height / samples;
-  const int strips = (rows + kRowsTogether - 1) / kRowsTogether;
-  tbb::parallel_for(0, strips, [&](int strip) {
-    meter.measure(strip * kRowsTogether, std::min(rows, (strip + 1) * kRowsTogether), light);
-  });
+  const int strips = (buffers.height / samples + kGroundBlock - 1) / kGroundBlock;
+  tbb::parallel_for(0, strips, [&](int strip) { meter.measure(strip * kGroundBlock, light); });
+  tbb::parallel_for(0, buffers.height / samples, [&](int row) { meter.spread(row, light); });
   lightCracks(buffers, samples, light);
   return light;
 }

@@ -54,12 +54,14 @@ class CpuRenderer final : public Renderer {
     return buffers;
   }
 
-  ViewBuffers surface(const SurfaceView& view, int width, int height) override {
+  ViewBuffers surface(const SurfaceView& view, int width, int height, std::span<const std::uint8_t> chosen) override {
     checkOffset(view.offset);
     const RayGeometry geometry(field_.space(), view.camera, width, height, view.clip);
     ViewBuffers buffers = emptyBuffers(width, height, true);
     tbb::parallel_for(0, height, [&](int y) {
-      for (int x = 0; x < width; ++x) surfacePixel(geometry, view.offset, x, y, buffers);
+      for (int x = 0; x < width; ++x)
+        if (chosen.empty() || chosen[std::size_t(y) * width + x] != 0)
+          surfacePixel(geometry, view.offset, x, y, buffers);
     });
     return buffers;
   }

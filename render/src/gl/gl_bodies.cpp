@@ -170,7 +170,7 @@ class GlBodyRenderer final : public BodyRenderer {
     std::vector<BodyTriangle> pixels;
     for (const Tile& tile : tiles(whole)) {
       glViewport(0, 0, tile.width, tile.height);
-      target.clear();
+      target.clear(tile);
       drawAll(targetFromEye(camera, tile, width, height, farthest), camera.eye, bodies);
       target.read(tile, pixels);
       checkGl("draw bodies");

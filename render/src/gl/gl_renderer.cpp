@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,14 +21,15 @@
 namespace hpsdf::render {
 namespace {
 
-static_assert(kTile % kBlock == 0);
+constexpr int kBlocksInRow = kTile / kBlock;  // blocks beside each other in a render target
+constexpr std::size_t kMostBlocks = std::size_t(kBlocksInRow) * kBlocksInRow;
 
 /// The locations of the uniforms in the shaders.
 enum : GLint { kGrid = 0, kFirstPixel, kSize };
 enum : GLint { kSliceOrigin = 3, kSliceRight, kSliceUp, kSliceStep };
 enum : GLint { kEye = 3, kForward, kRight, kUp, kScale, kRayStep, kOffset, kDiagonal, kMostSteps, kResume };
 enum : GLint { kShownLo = 15, kShownHi, kParallel, kBlend, kBlendedSteps };
-enum : GLint { kViewport = 13, kStartSide };
+enum : GLint { kFirstBlock = 1, kViewport = 13, kStartSide };
 enum : GLint { kBaseCell = 20, kExactOffset, kAtTriangles };
 constexpr GLint kRefinementLimit = kMostSteps;
 
@@ -53,13 +55,9 @@ constexpr int blendedEvaluationLoops(int evaluation) {
 using Texel = std::array<std::uint32_t, 4>;
 using NormalTexel = std::array<float, 4>;
 
-/// The smallest rectangle of a view that contains all blocks. `blocks` must not be empty.
-Tile boundingTile(const std::vector<Block>& blocks, int width, int height) {
-  const auto [left, right] = std::ranges::minmax(blocks, {}, &Block::x);
-  const auto [top, bottom] = std::ranges::minmax(blocks, {}, &Block::y);
-  const int x = static_cast<int>(left.x);
-  const int y = static_cast<int>(top.y);
-  return {x, y, std::min(width, int(right.x) + kBlock) - x, std::min(height, int(bottom.y) + kBlock) - y};
+/// The part of a render target in which blocks stand in rows.
+Tile tileOf(std::size_t blocks) {
+  return {0, 0, kTile, static_cast<int>((blocks + kBlocksInRow - 1) / kBlocksInRow) * kBlock};
 }
 
 int highestDegree(const FieldData& field) {
@@ -101,6 +99,9 @@ struct Resources {
     glEnableVertexArrayAttrib(blocks.name(), 0);
     glVertexArrayAttribFormat(blocks.name(), 0, 3, GL_FLOAT, GL_FALSE, 0);
     glVertexArrayAttribBinding(blocks.name(), 0, 0);
+    glEnableVertexArrayAttrib(blocks.name(), 1);
+    glVertexArrayAttribIFormat(blocks.name(), 1, 2, GL_UNSIGNED_INT, offsetof(Block, chosen));
+    glVertexArrayAttribBinding(blocks.name(), 1, 0);
   }
 
   static void setExactLeaves(const GlProgram& program, const FieldData& data) {
@@ -124,6 +125,7 @@ struct Resources {
   GlProgram slice, march, hit;
   GlVertexArray noVertices, blocks;
   GlQuery anyPixels;
+  std::optional<RenderTarget> state, target;
 };
 
 void setVector(const GlProgram& program, GLint location, const Vector3& v) {
@@ -183,7 +185,7 @@ class GlRenderer final : public Renderer {
 
     ViewBuffers buffers = emptyBuffers(width, height, false);
     const Tile whole{0, 0, width, height};
-    const RenderTarget target(whole, GL_RGBA32UI, GL_RGBA32F);
+    const RenderTarget& target = keptTarget(resources_->target, whole);
     target.bindForDrawing();
     resources_->field.bind();
     glUseProgram(program.name());
@@ -206,7 +208,7 @@ class GlRenderer final : public Renderer {
     return buffers;
   }
 
-  ViewBuffers surface(const SurfaceView& view, int width, int height) override {
+  ViewBuffers surface(const SurfaceView& view, int width, int height, std::span<const std::uint8_t> chosen) override {
     checkOffset(view.offset);
     const RayGeometry rays(space_, view.camera, width, height, view.clip);
     const EglContext::Current current(context_);
@@ -218,24 +220,25 @@ class GlRenderer final : public Renderer {
 
     // Find the blocks of pixels that may see the surface, and upload them.
     ViewBuffers buffers = emptyBuffers(width, height, true);
-    const SurfaceBlocks found = surfaceBlocks(octree_, bounds_, space_, rays, view.offset);
+    SurfaceBlocks found = surfaceBlocks(octree_, bounds_, space_, rays, view.offset);
+    if (!chosen.empty()) keepChosen(chosen, width, height, found.blocks);
     if (found.blocks.empty()) return buffers;
     const GlBuffer blocks;
     glNamedBufferStorage(blocks.name(), GLsizeiptr(found.blocks.size() * sizeof(Block)), found.blocks.data(), 0);
     glVertexArrayVertexBuffer(resources_->blocks.name(), 0, blocks.name(), 0, sizeof(Block));
     glProgramUniform1f(resources_->march.name(), kStartSide, found.side);
 
-    // Draw the blocks, tile after tile.
-    const Tile part = boundingTile(found.blocks, width, height);
-    const RenderTarget state(part, GL_RGBA32UI, GL_RGBA32F), target(part, GL_RGBA32UI, GL_RGBA32F);
+    // Draw the blocks, as many at a time as a render target holds.
+    const Tile most = tileOf(std::min(found.blocks.size(), kMostBlocks));
+    const RenderTarget &state = keptTarget(resources_->state, most), &target = keptTarget(resources_->target, most);
     resources_->field.bind();
     glBindVertexArray(resources_->blocks.name());
     glEnable(GL_PROGRAM_POINT_SIZE);
     state.bindForReading();
-    for (const Tile& tile : tiles(part)) {
-      setTile(tile);
-      drawTile(tile, static_cast<GLsizei>(found.blocks.size()), state, target);
-      forEachPixel(tile, [&](std::size_t from, int x, int y) { setPixel(from, buffers, std::size_t(y) * width + x); });
+    for (std::size_t first = 0; first < found.blocks.size(); first += kMostBlocks) {
+      const Blocks drawn{GLint(first), GLsizei(std::min(found.blocks.size() - first, kMostBlocks))};
+      drawBlocks(drawn, state, target);
+      tbb::parallel_for(0, drawn.count, [&](int i) { setBlock(i, found.blocks[first + std::size_t(i)], buffers); });
     }
     checkGl("trace a surface");
     return buffers;
@@ -244,25 +247,28 @@ class GlRenderer final : public Renderer {
   std::string description() const override { return context_.renderer(); }
 
  private:
-  void setTile(const Tile& tile) const {
-    // Extend the viewport to whole blocks. A block is drawn as a point, and OpenGL omits points with centres outside.
-    const auto wholeBlocks = [](int pixels) { return (pixels + kBlock - 1) / kBlock * kBlock; };
-    glViewport(0, 0, wholeBlocks(tile.width), wholeBlocks(tile.height));
-    for (const GlProgram* program : {&resources_->march, &resources_->hit}) {
-      glProgramUniform2i(program->name(), kFirstPixel, tile.left, tile.top);
-      glProgramUniform2i(program->name(), kViewport, wholeBlocks(tile.width), wholeBlocks(tile.height));
-    }
-  }
+  /// Blocks that are drawn together.
+  struct Blocks {
+    GLint first;
+    GLsizei count;
+  };
 
-  /// Traces the rays of a tile and reads the hits. The first march pass starts all rays. Further march passes continue
+  /// Traces the rays of blocks and reads the hits. The first march pass starts all rays. Further march passes continue
   /// only the rays whose march has not ended.
-  void drawTile(const Tile& tile, GLsizei blocks, const RenderTarget& state, const RenderTarget& target) {
+  void drawBlocks(const Blocks& blocks, const RenderTarget& state, const RenderTarget& target) {
+    const Tile tile = tileOf(std::size_t(blocks.count));
+    glViewport(0, 0, tile.width, tile.height);
+    for (const GlProgram* program : {&resources_->march, &resources_->hit}) {
+      glProgramUniform1i(program->name(), kFirstBlock, blocks.first);
+      glProgramUniform2i(program->name(), kViewport, tile.width, tile.height);
+    }
     state.bindForDrawing();
     march(blocks);
-    target.clear();
+    target.clear(tile);
     hit(target, blocks);
     target.read(tile, integers_);
-    if (std::ranges::any_of(integers_, isUnderWay)) {
+    const std::span all(integers_.data(), std::size_t(tile.width) * tile.height);
+    if (std::ranges::any_of(all, isUnderWay)) {
       state.bindForDrawing();
       continueMarch(blocks);
       hit(target, blocks);
@@ -271,21 +277,21 @@ class GlRenderer final : public Renderer {
     target.read(tile, normals_);
   }
 
-  void march(GLsizei blocks) const {
+  void march(const Blocks& blocks) const {
     glUseProgram(resources_->march.name());
     glProgramUniform1i(resources_->march.name(), kResume, GL_FALSE);
-    glDrawArrays(GL_POINTS, 0, blocks);
+    glDrawArrays(GL_POINTS, blocks.first, blocks.count);
     glTextureBarrier();
   }
 
   /// Repeats the march pass until the march of every pixel has ended or all steps are used up.
-  void continueMarch(GLsizei blocks) const {
+  void continueMarch(const Blocks& blocks) const {
     const GLuint query = resources_->anyPixels.name();
     glUseProgram(resources_->march.name());
     glProgramUniform1i(resources_->march.name(), kResume, GL_TRUE);
     for (int steps = stepsInPass_; steps < kStepsInAll; steps += stepsInPass_) {
       glBeginQuery(GL_ANY_SAMPLES_PASSED, query);
-      glDrawArrays(GL_POINTS, 0, blocks);
+      glDrawArrays(GL_POINTS, blocks.first, blocks.count);
       glEndQuery(GL_ANY_SAMPLES_PASSED);
       // Each march pass reads the texels that the previous pass has written. Each pixel reads only its own texel.
       glTextureBarrier();
@@ -295,16 +301,25 @@ class GlRenderer final : public Renderer {
     }
   }
 
-  void hit(const RenderTarget& target, GLsizei blocks) const {
+  void hit(const RenderTarget& target, const Blocks& blocks) const {
     target.bindForDrawing();
     glUseProgram(resources_->hit.name());
-    glDrawArrays(GL_POINTS, 0, blocks);
+    glDrawArrays(GL_POINTS, blocks.first, blocks.count);
   }
 
   /// Returns true if the march of a pixel has not ended, given the texel that the hit pass wrote for this pixel.
   static bool isUnderWay(const Texel& texel) { return texel[0] == kNoCell && texel[1] != 0; }
 
-  /// Copies the pixel `from` of the last tile to the pixel `to` of the view's buffers.
+  /// Copies block i of those that were drawn last to the view's buffers.
+  void setBlock(int i, const Block& block, ViewBuffers& buffers) const {
+    const int left = static_cast<int>(block.x), top = static_cast<int>(block.y);
+    const std::size_t corner = std::size_t(i / kBlocksInRow) * kBlock * kTile + std::size_t(i % kBlocksInRow) * kBlock;
+    for (int y = 0; y < std::min(kBlock, buffers.height - top); ++y)
+      for (int x = 0; x < std::min(kBlock, buffers.width - left); ++x)
+        setPixel(corner + std::size_t(y) * kTile + x, buffers, std::size_t(top + y) * buffers.width + left + x);
+  }
+
+  /// Copies the pixel `from` of the blocks that were drawn last to the pixel `to` of the view's buffers.
   void setPixel(std::size_t from, ViewBuffers& buffers, std::size_t to) const {
     const Texel& texel = integers_[from];
     buffers.cell[to] = texel[0];
@@ -324,8 +339,8 @@ class GlRenderer final : public Renderer {
   std::optional<double> triangleLevel_;  ///< value of the field on the triangles of exact leaves, if it has such leaves
   int stepsInPass_;                      ///< greatest number of steps of a ray in one pass of the march
   int refinements_;                      ///< greatest number of iterations that refine a root
-  std::vector<Texel> integers_;          ///< integer outputs of the shaders for the last tile
-  std::vector<NormalTexel> normals_;     ///< normals for the last tile
+  std::vector<Texel> integers_;          ///< integer outputs of the shaders for the last tile or blocks
+  std::vector<NormalTexel> normals_;     ///< normals for the last blocks
 };
 
 }  // namespace

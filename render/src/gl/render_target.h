@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -46,10 +47,12 @@ class RenderTarget {
  public:
   /// Makes a target for each tile of `part`. `integers` is the OpenGL format of the integers, `other` is the format of
   /// the floats or depths. Throws `Error` if the device cannot draw into these formats.
-  RenderTarget(const Tile& part, GLenum integers, GLenum other) : hasDepth_(other == GL_DEPTH_COMPONENT32F) {
-    const int width = std::min(part.width, kTile), height = std::min(part.height, kTile);
-    glTextureStorage2D(integers_.name(), 1, integers, width, height);
-    glTextureStorage2D(other_.name(), 1, other, width, height);
+  RenderTarget(const Tile& part, GLenum integers, GLenum other)
+      : hasDepth_(other == GL_DEPTH_COMPONENT32F),
+        width_(std::min(part.width, kTile)),
+        height_(std::min(part.height, kTile)) {
+    glTextureStorage2D(integers_.name(), 1, integers, width_, height_);
+    glTextureStorage2D(other_.name(), 1, other, width_, height_);
     for (const GLuint texture : {integers_.name(), other_.name()}) {
       // Integer textures can only be read with nearest filtering, which is not the default.
       glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -63,15 +66,22 @@ class RenderTarget {
       throw GlError("the OpenGL device cannot render into 32-bit buffers: update its driver");
   }
 
+  int width() const { return width_; }
+  int height() const { return height_; }
+
   void bindForDrawing() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name()); }
 
-  /// Clears the integers to "no cell" or "no body", and the floats or depths to 0. Depth 0 means infinite distance.
-  void clear() const {
+  /// Clears the pixels of a tile: the integers to "no cell" or "no body", and the floats or depths to 0. Depth 0 means
+  /// infinite distance.
+  void clear(const Tile& tile) const {
     static_assert(kNoCell == kNoBody);
     constexpr GLuint kNothing[] = {kNoCell, 0, 0, 0};
     constexpr GLfloat kZero[] = {0, 0, 0, 0};
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(0, 0, tile.width, tile.height);
     glClearNamedFramebufferuiv(framebuffer_.name(), GL_COLOR, 0, kNothing);
     glClearNamedFramebufferfv(framebuffer_.name(), hasDepth_ ? GL_DEPTH : GL_COLOR, hasDepth_ ? 0 : 1, kZero);
+    glDisable(GL_SCISSOR_TEST);
   }
 
   /// Binds the integers and the floats as textures to the texture units 2 and 3.
@@ -80,11 +90,11 @@ class RenderTarget {
     glBindTextureUnit(3, other_.name());
   }
 
-  /// Reads all pixels of a tile to `out`: the integers or the floats, depending on the type of `out`.
+  /// Reads all pixels of a tile to the beginning of `out`: the integers or the floats, depending on the type of `out`.
   template <typename Channel, std::size_t channels>
   void read(const Tile& tile, std::vector<std::array<Channel, channels>>& out) const {
     constexpr bool kIntegers = std::is_integral_v<Channel>;
-    out.resize(std::size_t(tile.width) * tile.height);
+    out.resize(std::max(out.size(), std::size_t(tile.width) * tile.height));
     glNamedFramebufferReadBuffer(framebuffer_.name(), kIntegers ? GL_COLOR_ATTACHMENT0 : GL_COLOR_ATTACHMENT1);
     glReadPixels(0, 0, tile.width, tile.height,
                  !kIntegers      ? GL_RGBA
@@ -95,8 +105,22 @@ class RenderTarget {
 
  private:
   bool hasDepth_;
+  int width_, height_;
   GlTexture2D integers_, other_;
   GlFramebuffer framebuffer_;
 };
+
+/// Returns a render target for each tile of `part`, with floats: the one of an earlier view if it is large enough,
+/// since to allocate a target takes as long as to trace some hundred thousand rays. In place of one that is too small,
+/// the new one is made somewhat larger than needed, because a surface that turns takes a little more room from time to
+/// time.
+inline const RenderTarget& keptTarget(std::optional<RenderTarget>& kept, const Tile& part) {
+  const auto least = [](int pixels) { return std::min(pixels, kTile); };
+  if (kept && kept->width() >= least(part.width) && kept->height() >= least(part.height)) return *kept;
+  const auto grown = [](int pixels, int before) { return std::max(pixels + pixels / 8, before); };
+  const Tile size = kept ? Tile{0, 0, grown(part.width, kept->width()), grown(part.height, kept->height())} : part;
+  kept.reset();
+  return kept.emplace(size, GLenum{GL_RGBA32UI}, GLenum{GL_RGBA32F});
+}
 
 }  // namespace hpsdf::render

@@ -28,6 +28,7 @@
 #include "scene/mesh_lines.h"
 #include "scene/section.h"
 #include "vector/paths.h"
+#include "view/supersampling.h"
 #include "view/view_buffers.h"
 #include "view/view_checks.h"
 
@@ -160,6 +161,17 @@ void addLines(std::vector<float> added, std::vector<float>& lines) {
   lines = std::move(added);
 }
 
+/// Returns the buffers of the surface that a picture shows. Where colours show a quantity, its values belong to the
+/// points of the surface themselves, so that all samples are traced.
+ViewBuffers surfaceOf(Renderer& renderer, const SurfaceView& view, const SurfacePicture& picture, int width,
+                      int height) {
+  const int samples = picture.samples;
+  if (!picture.surface) return emptyBuffers(samples * width, samples * height, true);
+  if (isQuantity(picture.color)) return renderer.surface(view, samples * width, samples * height);
+  const bool showsCells = picture.color != ColorBy::normal || picture.cracks;
+  return supersampledSurface(renderer, view, width, height, samples, showsCells);
+}
+
 /// Renders a view of width × height pixels, with `picture.samples` samples along each side of a pixel. Lines
 /// along cells and along the edges of `mesh` are `lineWidth` pixels wide. Throws `Error` if the camera, the offset or
 /// the clipping plane is out of range.
@@ -172,11 +184,11 @@ Scene renderScene(Renderer& renderer, const Field& field, const SurfacePicture& 
   // Parallel rays start in front of the domain. Move their start back to lie in front of the bodies too.
   if (bodies.renderer) camera = startingBefore(bodies.renderer->bounds(bodies.bodies), camera);
   const SurfaceView view{camera, picture.offset, picture.clip};
+  Scene scene{view, {}};
+  scene.buffers = surfaceOf(renderer, view, picture, width, height);
   width *= picture.samples;
   height *= picture.samples;
   lineWidth *= picture.samples;
-
-  Scene scene{view, picture.surface ? renderer.surface(view, width, height) : emptyBuffers(width, height, true)};
   if (picture.surface) addSection(field, view, scene.buffers);
   if (picture.plane) addPlane(field, view, sectionView(field.domain(), *picture.plane, 1, 1), scene.buffers);
   std::vector<Cell> cells;

@@ -61,7 +61,7 @@ class ScaledRenderer final : public Renderer {
     return inWorldUnits(inner_->slice({view.origin / unit_, view.right / unit_, view.up / unit_}, width, height));
   }
 
-  ViewBuffers surface(const SurfaceView& view, int width, int height) override {
+  ViewBuffers surface(const SurfaceView& view, int width, int height, std::span<const std::uint8_t> chosen) override {
     SurfaceView inner = view;
     inner.camera.eye /= unit_;
     if (view.camera.projection == Projection::orthographic) {
@@ -70,7 +70,7 @@ class ScaledRenderer final : public Renderer {
     }
     inner.offset /= unit_;
     if (inner.clip) inner.clip->offset /= unit_;
-    return inWorldUnits(inner_->surface(inner, width, height));
+    return inWorldUnits(inner_->surface(inner, width, height, chosen));
   }
 
   std::string description() const override { return inner_->description(); }

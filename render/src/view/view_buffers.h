@@ -1,5 +1,7 @@
 #pragma once
 
+#include <tbb/parallel_invoke.h>
+
 #include "hpsdf/render/view.h"
 
 namespace hpsdf::render {
@@ -11,15 +13,22 @@ inline ViewBuffers emptyBuffers(int width, int height, bool surface) {
   ViewBuffers buffers;
   buffers.width = width;
   buffers.height = height;
-  buffers.cell.assign(pixels, kNoCell);
-  buffers.degree.assign(pixels, 0);
-  buffers.depth.assign(pixels, 0);
-  buffers.value.assign(pixels, 0);
-  if (surface) {
-    buffers.normal.assign(pixels, Eigen::Vector3f::Zero());
-    buffers.distance.assign(pixels, 0);
-    buffers.crack.assign(pixels, 0);
-  }
+  // The buffers are filled in several threads, because most of the time is that of getting the memory.
+  tbb::parallel_invoke(
+      [&] {
+        buffers.cell.assign(pixels, kNoCell);
+        buffers.degree.assign(pixels, 0);
+        buffers.depth.assign(pixels, 0);
+        buffers.value.assign(pixels, 0);
+      },
+      [&] {
+        if (surface) buffers.normal.assign(pixels, Eigen::Vector3f::Zero());
+      },
+      [&] {
+        if (!surface) return;
+        buffers.distance.assign(pixels, 0);
+        buffers.crack.assign(pixels, 0);
+      });
   return buffers;
 }
 

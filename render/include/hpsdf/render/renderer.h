@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "hpsdf/error.h"
@@ -41,7 +43,11 @@ class Renderer {
 
   /// Traces the rays of a camera to the surface f = offset. Throws `Error` as `slice` does, and if the offset
   /// is not finite.
-  virtual ViewBuffers surface(const SurfaceView& view, int width, int height) = 0;
+  ViewBuffers surface(const SurfaceView& view, int width, int height) { return surface(view, width, height, {}); }
+
+  /// Traces the rays of those pixels for which `chosen`, in rows from top to bottom, is not 0; of all pixels if it is
+  /// empty. The other pixels show nothing. Throws `Error` as above.
+  virtual ViewBuffers surface(const SurfaceView& view, int width, int height, std::span<const std::uint8_t> chosen) = 0;
 
   /// The name of the device, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)" or "CPU, double precision".
   virtual std::string description() const = 0;
