@@ -4,7 +4,7 @@
 #ifdef HPSDF_WEB
 layout(location = 1) uniform ivec2 firstPixel;
 #else
-flat in ivec2 toView;  // added to a pixel of the render target, gives the pixel of the view
+flat in ivec2 toView;  // the pixel of the view minus that of the render target
 #endif
 layout(location = 2) uniform ivec2 size;
 layout(location = 3) uniform dvec3 eye;      // the camera's eye, grid coordinates

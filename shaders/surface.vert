@@ -1,5 +1,5 @@
 // Draws one point for each block of 8 x 8 pixels whose rays may hit the surface. The page draws blocks where the view has
-// them. Elsewhere they are packed into the render target in rows, so that nothing beside them is read back.
+// them. Elsewhere they are packed into the render target in rows, so that little beside them is read back.
 
 #ifdef HPSDF_WEB
 layout(location = 1) uniform ivec2 firstPixel;

@@ -337,7 +337,9 @@ TEST(Panels, aLevelThatIsPressedShowsItsCellsAndHidesThemAgain) {
     EXPECT_EQ(bench.view().cells.style, render::CellStyle::none) << path;
     EXPECT_THAT(shown(), IsEmpty()) << path;
   }
-  bench.run("cells boxes");
+  bench.run("ui click " + firstLevel(bench, "degrees") + " ; ui click " + firstLevel(bench, "depths"));
+  EXPECT_THAT(bench.view().cells.degrees, IsEmpty()) << "a depth shows its cells of all degrees";
+  bench.run("cells boxes depths=all");
   bench.run("ui click " + firstLevel(bench, "degrees"));
   EXPECT_EQ(bench.view().cells.style, render::CellStyle::boxes) << "boxes stay boxes";
   bench.run("cells none degrees=all ; show slice ; ui click " + firstLevel(bench, "degrees"));

@@ -28,11 +28,14 @@ struct LevelPlaces {
   void draw(int level, double width, double height) const {
     const std::string name = levelName(level), kindName = kind == LevelKind::degree ? "degree" : "depth";
     const std::vector<int>& shown = kind == LevelKind::degree ? view.cells.degrees : view.cells.depths;
-    const bool isShown = !view.slice && view.cells.style != render::CellStyle::none && shown == std::vector<int>{level};
+    const std::vector<int>& others = kind == LevelKind::degree ? view.cells.depths : view.cells.degrees;
+    const bool isShown = !view.slice && view.cells.style != render::CellStyle::none &&
+                         shown == std::vector<int>{level} && others.empty();
     const auto style = view.cells.style == render::CellStyle::boxes ? "boxes" : "lines";
-    const std::string command =
-        isShown ? fmt::format("cells none {}s=all", kindName)
-                : fmt::format("{}cells {} {}s={}", view.slice ? "show surface ; " : "", style, kindName, name);
+    const char* const otherKind = kind == LevelKind::degree ? "depth" : "degree";
+    const std::string command = isShown ? "cells none degrees=all depths=all"
+                                        : fmt::format("{}cells {} {}s={} {}s=all", view.slice ? "show surface ; " : "",
+                                                      style, kindName, name, otherKind);
     controls.describe(command,
                       fmt::format("{} the cells of {} {}.", isShown ? "Hide" : "Show", kindName, name).c_str());
     if (controls.ui.place(panel + "/" + name, width, height, isShown)) controls.commands.push_back(command);

@@ -60,8 +60,8 @@ Image average(const ViewBuffers& buffers, int samples, const ColorOf& colorOf) {
   return average(buffers, samples, colorOf, [](int, int) { return false; });
 }
 
-// Tells which pixels have samples that plain light shows in one colour: those that show nothing, or the surface turned
-// the same way.
+// Tells which pixels have samples that measured light shows in one colour: those that show nothing, or the surface
+// turned the same way.
 class UniformPixels {
  public:
   UniformPixels(const ViewBuffers& buffers, int samples, const FieldLight& light)
@@ -357,7 +357,7 @@ Image colorSurface(const ViewBuffers& buffers, const Camera& camera, const Surfa
     }
     return lines.empty() ? sample : mix(sample, outline, float(kOutlineStrength) * lines[i]);
   };
-  const bool isPlain = !look.color && lines.empty() && buffers.shown.empty();
+  const bool isPlain = !look.color && !look.light.open.empty() && lines.empty() && buffers.shown.empty();
   if (!isPlain) return average(buffers, sampling.samples, colorOf);
   return average(buffers, sampling.samples, colorOf, UniformPixels(buffers, sampling.samples, look.light));
 }

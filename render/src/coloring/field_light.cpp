@@ -29,7 +29,7 @@ constexpr double kLampRadius = 0.13;   // tangent of the angle under which half 
 constexpr double kGroundReach = 1.25;  // the ground is darkened up to this distance from the solid's middle
 constexpr double kFadesFrom = 0.8;     // share of the view's width from which on the shadow on the ground fades
 constexpr int kGroundBlock = 8;        // pixels along each side of a block of ground whose light is interpolated
-constexpr double kSmoothLight = 0.12;  // greatest difference of the light in a block of which it is interpolated
+constexpr double kSmoothLight = 0.12;  // light is interpolated over a block in which it differs by no more
 constexpr float kEvenCosine = 0.9F;    // least cosine between normals of an even piece of a surface
 constexpr int kCrackReach = 4;         // pixels from a crack within which the light of the surface beside it is sought
 constexpr double kEvenDepth = 4;       // greatest difference of the distances of an even piece, in samples
@@ -172,7 +172,7 @@ class LightMeter {
       }
   }
 
-  /// The light on the ground at the corners and in the middle of the blocks of a row, each at the upper left pixel.
+  /// The light on the ground at the corners and in the middle of the blocks of a row.
   struct GroundLight {
     std::vector<std::optional<Light>> above, below;  ///< at the left ends of the blocks' upper and lower sides
     std::vector<std::optional<Light>> middle;
@@ -285,6 +285,7 @@ class LightMeter {
     if (!buffers_.covered(i)) return true;
     const double farthest = depth * pixelSize(view_.camera, buffers_.distance[i], buffers_.height);
     return buffers_.showsBody(i) == buffers_.showsBody(j) &&
+           buffers_.shows(i, Shown::surface) == buffers_.shows(j, Shown::surface) &&
            std::abs(buffers_.distance[i] - buffers_.distance[j]) <= farthest &&
            buffers_.normal[i].dot(buffers_.normal[j]) >= kEvenCosine;
   }
@@ -297,7 +298,7 @@ class LightMeter {
   }
 
   /// Returns true if a pixel takes the mean of the light that is measured at the four pixels beside it: every other
-  /// pixel, as on a chessboard, where all five show an even piece of a surface.
+  /// pixel, as on a chessboard, where its samples show an even piece of a surface that goes on in those beside it.
   bool takesMean(int x, int y) const {
     if ((x + y) % 2 == 0 || x == 0 || y == 0 || x + 1 == columns() || y + 1 == rows()) return false;
     const std::size_t here = sampleOf(x, y);

@@ -210,6 +210,7 @@ class GlRenderer final : public Renderer {
 
   ViewBuffers surface(const SurfaceView& view, int width, int height, std::span<const std::uint8_t> chosen) override {
     checkOffset(view.offset);
+    checkChosen(chosen, width, height);
     const RayGeometry rays(space_, view.camera, width, height, view.clip);
     const EglContext::Current current(context_);
     setRays(resources_->march, rays, view.offset, space_.diagonal);
@@ -221,7 +222,7 @@ class GlRenderer final : public Renderer {
     // Find the blocks of pixels that may see the surface, and upload them.
     ViewBuffers buffers = emptyBuffers(width, height, true);
     SurfaceBlocks found = surfaceBlocks(octree_, bounds_, space_, rays, view.offset);
-    if (!chosen.empty()) keepChosen(chosen, width, height, found.blocks);
+    keepChosen(chosen, width, height, found.blocks);
     if (found.blocks.empty()) return buffers;
     const GlBuffer blocks;
     glNamedBufferStorage(blocks.name(), GLsizeiptr(found.blocks.size() * sizeof(Block)), found.blocks.data(), 0);

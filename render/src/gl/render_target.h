@@ -110,7 +110,7 @@ class RenderTarget {
   GlFramebuffer framebuffer_;
 };
 
-/// Returns a render target for each tile of `part`, with floats: the one of an earlier view if it is large enough,
+/// Returns one render target with floats for all tiles of `part`: that of an earlier view if it is large enough,
 /// since to allocate a target takes as long as to trace some hundred thousand rays. In place of one that is too small,
 /// the new one is made somewhat larger than needed, because a surface that turns takes a little more room from time to
 /// time.

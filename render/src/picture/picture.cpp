@@ -539,7 +539,11 @@ std::optional<Pick> pickAt(const Field& field, const Drawn& drawn, int x, int y)
   const std::size_t i = std::size_t(row) * buffers.width + column;
   if (!buffers.hit(i)) return std::nullopt;
   const Vector3 position = withinCell(field, pointsOf(drawn.view, buffers)(column, row), buffers.cell[i]);
-  return Pick{position, buffers.cell[i], buffers.degree[i], buffers.depth[i], buffers.value[i]};
+  const Cell cell = field.cellAt(position);
+  if (cell.id == buffers.cell[i])
+    return Pick{position, buffers.cell[i], buffers.degree[i], buffers.depth[i], buffers.value[i]};
+  // An interpolated sample has the cell of the middle of its pixel, which may end before it.
+  return Pick{position, cell.id, cell.degree, cell.depth, buffers.value[i]};
 }
 
 bool meetsWalls(const Field& field, double offset) {

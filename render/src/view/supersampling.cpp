@@ -15,6 +15,7 @@ namespace {
 
 constexpr float kNeighboursCosine = 0.9F;  // between the normals of neighbouring pixels of an even piece
 constexpr double kGreatestBend = 1;        // second difference of the distances of an even piece, in pixels
+constexpr double kNarrowCrack = 0.05;      // jump of f at a crack that an even piece may have, in pixels
 
 /// The weights of the values at −1, 0 and 1 in the value at t of the parabola through them.
 std::array<float, 3> parabolaWeights(float t) { return {0.5F * t * (t - 1), 1 - t * t, 0.5F * t * (t + 1)}; }
@@ -34,7 +35,9 @@ class Pixels {
         if (!continues(i, at(column, row))) return false;
     if (!buffers_.hit(i)) return true;
     const double most = kGreatestBend * pixelSize(view_.camera, buffers_.distance[i], buffers_.height);
-    return bend(i, 1) <= most && bend(i, std::size_t(buffers_.width)) <= most;
+    const auto rows = std::size_t(buffers_.width);
+    return bend(i, 1) <= most && bend(i, rows) <= most && bend(i, rows - 1) <= 2 * most &&
+           bend(i, rows + 1) <= 2 * most;
   }
 
   /// Sets sample i of a finer view to what an even pixel shows at (x + right, y + down), where `right` and `down` lie
@@ -64,12 +67,20 @@ class Pixels {
  private:
   std::size_t at(int x, int y) const { return std::size_t(y) * buffers_.width + x; }
 
-  /// Returns true if pixel j shows the surface turned nearly as in pixel i, no crack and, if cells count, the same
-  /// cell.
+  /// Returns true if pixel j shows the surface turned nearly as in pixel i and no wide crack or, if cells count, the
+  /// same cell and no crack at all. Also returns true if both show nothing.
   bool continues(std::size_t i, std::size_t j) const {
     if (buffers_.hit(i) != buffers_.hit(j)) return false;
-    if (showsCells_ && (buffers_.cell[i] != buffers_.cell[j] || buffers_.crack[j] != 0)) return false;
-    return !buffers_.hit(i) || buffers_.normal[i].dot(buffers_.normal[j]) >= kNeighboursCosine;
+    if (!buffers_.hit(i)) return true;
+    if (showsCells_ && buffers_.cell[i] != buffers_.cell[j]) return false;
+    if (buffers_.crack[j] != 0 && (showsCells_ || isWide(j))) return false;
+    return buffers_.normal[i].dot(buffers_.normal[j]) >= kNeighboursCosine;
+  }
+
+  /// Returns true if the crack in pixel j is wide enough to be seen.
+  bool isWide(std::size_t j) const {
+    const double pixel = pixelSize(view_.camera, buffers_.distance[j], buffers_.height);
+    return std::abs(buffers_.value[j] - view_.offset) > kNarrowCrack * pixel;
   }
 
   /// The second difference of the distances in pixel i and the pixels `step` before and behind it.

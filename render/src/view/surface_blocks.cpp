@@ -173,7 +173,7 @@ void keepChosen(std::span<const std::uint8_t> chosen, int width, int height, std
     block.chosen = {0, 0};
     for (int y = 0; y < std::min(kBlock, height - top); ++y)
       for (int x = 0; x < std::min(kBlock, width - left); ++x)
-        if (chosen[std::size_t(top + y) * width + left + x] != 0)
+        if (chosen.empty() || chosen[std::size_t(top + y) * width + left + x] != 0)
           block.chosen[y * kBlock / 32] |= 1U << (y * kBlock + x) % 32;
   }
   std::erase_if(blocks, [](const Block& block) { return block.chosen == std::array{0U, 0U}; });

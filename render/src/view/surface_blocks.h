@@ -35,8 +35,8 @@ struct SurfaceBlocks {
 SurfaceBlocks surfaceBlocks(const FieldData& field, const std::vector<SurfaceBounds>& bounds, const GridSpace& space,
                             const RayGeometry& rays, double offset);
 
-/// Sets `Block::chosen` to the pixels for which `chosen`, in rows of a view of width × height pixels, is not 0. Removes
-/// blocks without such a pixel.
+/// Sets `Block::chosen` to the pixels of a view of width × height pixels for which `chosen`, in rows from top to
+/// bottom, is not 0, or to all pixels of the view if `chosen` is empty. Removes blocks without such a pixel.
 void keepChosen(std::span<const std::uint8_t> chosen, int width, int height, std::vector<Block>& blocks);
 
 }  // namespace hpsdf::render

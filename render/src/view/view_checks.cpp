@@ -30,4 +30,10 @@ void checkOffset(double offset) {
   if (!std::isfinite(offset)) throw Error("the surface's offset is not finite: give a distance in world units");
 }
 
+void checkChosen(std::span<const std::uint8_t> chosen, int width, int height) {
+  if (chosen.empty() || chosen.size() == std::size_t(width) * std::size_t(height)) return;
+  throw Error("the choice of pixels has " + std::to_string(chosen.size()) + " entries for a view of " +
+              std::to_string(width) + "x" + std::to_string(height) + " pixels: give one for each pixel, or none");
+}
+
 }  // namespace hpsdf::render

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 
 #include "hpsdf/render/view.h"
 
@@ -17,5 +19,8 @@ void checkClip(const std::optional<ClipPlane>& clip);
 
 /// Throws `Error` for a surface's offset that is not finite.
 void checkOffset(double offset);
+
+/// Throws `Error` for a choice of pixels that is neither empty nor as large as the view.
+void checkChosen(std::span<const std::uint8_t> chosen, int width, int height);
 
 }  // namespace hpsdf::render

@@ -46,7 +46,7 @@ class Renderer {
   ViewBuffers surface(const SurfaceView& view, int width, int height) { return surface(view, width, height, {}); }
 
   /// Traces the rays of those pixels for which `chosen`, in rows from top to bottom, is not 0; of all pixels if it is
-  /// empty. The other pixels show nothing. Throws `Error` as above.
+  /// empty. The other pixels show nothing. Throws `Error` as above, and if `chosen` has another size than the view.
   virtual ViewBuffers surface(const SurfaceView& view, int width, int height, std::span<const std::uint8_t> chosen) = 0;
 
   /// The name of the device, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)" or "CPU, double precision".
