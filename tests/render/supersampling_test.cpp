@@ -109,10 +109,10 @@ TEST(ChosenPixels, aloneAreTraced) {
 
 /// Shares of the samples in which a supersampled view differs from one of which all samples were traced.
 struct Difference {
-  double cells = 0;      ///< that show another cell, or nothing in place of a cell
-  double hits = 0;       ///< that show the surface in one of the views alone
-  double distances = 0;  ///< whose distances differ by more than a quarter of a pixel
-  double normals = 0;    ///< whose normals differ by more than 8°
+  double cells = 0;      ///< samples with another cell, or with nothing in place of a cell
+  double hits = 0;       ///< samples with the surface in one of the views alone
+  double distances = 0;  ///< samples whose distances differ by more than a quarter of a pixel
+  double normals = 0;    ///< samples whose normals differ by more than 8°
 };
 
 Difference difference(const SurfaceView& view, const ViewBuffers& found, const ViewBuffers& truth) {
