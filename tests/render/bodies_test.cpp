@@ -698,7 +698,7 @@ TEST(BodyPictures, averageSamplesInLinearLight) {
         }
       silhouettes += shown.size() > 1;
       const Color expected = encodeSrgb(sum / (kSamples * kSamples));
-      for (int k = 0; k < 3; ++k) ASSERT_NEAR(averaged.at(x, y)[k], expected[k], 3) << x << "," << y;
+      for (int k = 0; k < 3; ++k) ASSERT_NEAR(averaged.at(x, y)[k], expected[k], 2) << x << "," << y;
     }
   EXPECT_GT(silhouettes, 100);
 }
