@@ -149,6 +149,8 @@ render::Image Interpreter::draw(std::string_view name, std::span<const Option> o
   return drawn(command, state_->session, arguments);
 }
 
+std::string Interpreter::takeOutput() { return state_->takeOutput(); }
+
 std::string Interpreter::takeNotes() { return std::exchange(state_->err, std::ostringstream{}).str(); }
 
 }  // namespace hpsdf::app

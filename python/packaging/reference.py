@@ -41,10 +41,10 @@ def text() -> str:
     for title, names in GROUPS.items():
         parts.append(f"## {title}\n")
         parts += [_entry(f"hpsdf.{name}", getattr(hpsdf, name), declared.get(name)) for name in names]
-    module = importlib.import_module("hpsdf.torch")
-    parts.append("## PyTorch\n")
-    types = _declared("torch.py")
-    parts += [_entry(f"hpsdf.torch.{name}", getattr(module, name), types[name]) for name in reversed(module.__all__)]
+    for title, name in {"Data sets": "dataset", "PyTorch": "torch"}.items():
+        module, types = importlib.import_module(f"hpsdf.{name}"), _declared(f"{name}.py")
+        parts.append(f"## {title}\n")
+        parts += [_entry(f"hpsdf.{name}.{made}", getattr(module, made), types[made]) for made in types if made in module.__all__]
     return "\n".join(parts)
 
 

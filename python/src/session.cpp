@@ -93,6 +93,10 @@ py::array drawn(Session& session, const std::string& command, const Words& optio
                                    image.pixels.data()->data());
 }
 
+std::string output(Session& session) {
+  return session.alone(py::none(), [](app::Interpreter& program, const Progress&) { return program.takeOutput(); });
+}
+
 std::string notes(Session& session) {
   return session.alone(py::none(), [](app::Interpreter& program, const Progress&) { return program.takeNotes(); });
 }
@@ -144,6 +148,7 @@ void addSession(py::module_& module) {
       .def("perform", &performed, "command"_a, "options"_a, "progress"_a)
       .def("run", &ran, "name"_a, "script"_a, "variables"_a, "json"_a, "progress"_a)
       .def("draw", &drawn, "command"_a, "options"_a, "progress"_a)
+      .def("take_output", &output)
       .def("take_notes", &notes);
   module.def("png_of", &pngOf, "pixels"_a);
   module.def("save_png", &savedAsPng, "pixels"_a, "path"_a);

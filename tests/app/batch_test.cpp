@@ -1,9 +1,8 @@
-// Tests batches of meshes, built by one process, by several processes, and by processes that are killed.
-#include <fcntl.h>
+// Tests batches of meshes: their lists, parts, records, scripts and pages, and processes that are killed.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +22,7 @@
 #include "batch/batch_list.h"
 #include "cli_fixture.h"
 #include "files/text_file.h"
+#include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field_file.h"
 #include "language/script.h"
@@ -86,6 +86,27 @@ TEST(BatchLists, namesAreSafeAndDependOnTheLineAlone) {
   EXPECT_THAT(names, SizeIs(9));
 }
 
+TEST(BatchLists, partsHoldEachMeshOnce) {
+  std::string list;
+  for (int n = 0; n < 11; ++n) list += fmt::format("{}.obj\n", n);
+  const std::vector<BatchMesh> meshes = parseBatchList(list);
+  for (const int count : {1, 2, 3, 11, 20}) {
+    std::vector<std::string> names;
+    for (int part = 1; part <= count; ++part) {
+      const std::vector<BatchMesh> chosen = partOf(meshes, fmt::format("{}/{}", part, count));
+      EXPECT_LE(chosen.size(), (meshes.size() + count - 1) / count);
+      for (const BatchMesh& mesh : chosen) names.push_back(mesh.name);
+    }
+    std::vector<std::string> all;
+    for (const BatchMesh& mesh : meshes) all.push_back(mesh.name);
+    EXPECT_THAT(names, testing::UnorderedElementsAreArray(all)) << count;
+  }
+  EXPECT_EQ(partOf(meshes, "2/3")[0].surface, "1.obj");
+  for (const char* wrong :
+       {"", "1", "0/3", "4/3", "1/0", "/", "1/", "/2", "-1/2", "1/2x", " 1/2", "1.5/2", "1/99999999999999999999"})
+    EXPECT_THROW(partOf(meshes, wrong), Error) << wrong;
+}
+
 std::string tetrahedron(double height) {
   return fmt::format("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", height);
 }
@@ -127,10 +148,13 @@ class Batches : public testing::Test {
     return readFile(folder_ / "lone.hpsdf");
   }
 
-  /// Returns the names of the field files, without the folder in which the batch keeps its own records.
+  /// Returns the record of the mesh that a line of the list names.
+  fs::path recordOf(const std::string& surface) const { return fields() / (nameOf(surface) + ".json"); }
+
+  /// Returns the names of all files in the folder of the fields but the records.
   std::set<std::string> fieldNames() const {
     std::set<std::string> names = namesIn(fields());
-    EXPECT_EQ(names.erase(".batch"), 1u);
+    std::erase_if(names, [](const std::string& name) { return name.ends_with(".json"); });
     return names;
   }
 
@@ -234,13 +258,13 @@ TEST_F(Batches, finishedFieldsAreSkipped) {
   ASSERT_EQ(run(call).status, 0);
   std::map<std::string, fs::file_time_type> written;
   for (const auto& entry : fs::recursive_directory_iterator(fields())) written[entry.path()] = entry.last_write_time();
-  EXPECT_THAT(written, SizeIs(8)) << "fields, what they are made of, the folder of that, the claims";
+  EXPECT_THAT(written, SizeIs(6)) << "fields and their records";
   const std::string before = readFile(fieldOf("t.obj"));
   const Outcome again = run(call);
   EXPECT_EQ(again.status, 0);
   EXPECT_THAT(statusesOf(again), ElementsAre("skipped", "skipped", "skipped"));
   EXPECT_EQ(linesOf(again)[0].at("leaves"), statistics(load(fieldOf("t.obj"))).leaves);
-  EXPECT_THAT(again.err, HasSubstr("0 built, 3 skipped, 0 built elsewhere, 0 failed"));
+  EXPECT_THAT(again.err, HasSubstr("0 built, 3 skipped, 0 failed"));
   for (const auto& entry : fs::recursive_directory_iterator(fields()))
     EXPECT_EQ(entry.last_write_time(), written.at(entry.path())) << entry.path();
   EXPECT_TRUE(readFile(fieldOf("t.obj")) == before);
@@ -298,7 +322,7 @@ TEST_F(Batches, damagedFieldsAreBuiltAgain) {
     }
   }
   // A field without the record of its options is built again.
-  fs::remove(fields() / ".batch" / (nameOf("builtin:box") + ".json"));
+  fs::remove(recordOf("builtin:box"));
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "skipped"));
   EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
 }
@@ -381,6 +405,10 @@ TEST_F(Batches, mistakesAreRefusedBeforeWork) {
   expectRefused({{"build", "--batch", at("none"), "-o", at("fields")}}, at("none") + ": no such file");
   expectRefused(batch("# none\n\n"), "list: names no mesh");
   expectRefused(batch(std::string("builtin:box\0builtin:gear", 24)), "list: line 1 holds a zero byte");
+  expectRefused(batch(list, {"--part", "3/2"}), "part: '3/2' is no part of a list: expected K/N");
+  expectRefused(batch(list, {"--then", "none.hps"}), "none.hps: no such file");
+  expectRefused({{"build", "builtin:box", "-o", at("fields"), "--part", "1/2"}},
+                "part belongs to batch: give that too, or leave it out");
   expectRefused(batch(list, {"--near-error", "1e-3"}), "near error and far error belong together");
   expectRefused(batch(list, {"--continuity-weight", "1"}), "continuity-weight belongs to");
   expectRefused(batch(list, {"--sign", "unsigned-shell"}), "thickness");
@@ -408,16 +436,8 @@ TEST_F(Batches, unwritableFieldsAreNotBuilt) {
   };
   fs::create_directories(fieldOf("none.obj"));
   EXPECT_THAT(errorOf("none.obj"), EndsWith(".hpsdf: is a folder; give a file name"));
-  // A folder replaces the file that marks an unfinished construction; it can be neither removed nor overwritten.
-  const fs::path mark = fields() / ".batch" / (nameOf("analytic:box") + ".begun");
-  fs::create_directories(mark / "full");
-  EXPECT_EQ(errorOf("analytic:box"), "fields/.batch/" + mark.filename().string() +
-                                         ": Directory not empty; check that it is there, and its permissions");
-  fs::remove_all(mark);
-  fs::create_symlink("none/mark", mark);
-  EXPECT_EQ(errorOf("analytic:box"), "fields/.batch/" + mark.filename().string() +
-                                         ": cannot be written (No such file or directory); check the folder's "
-                                         "permissions");
+  fs::create_directories(recordOf("analytic:box"));
+  EXPECT_THAT(errorOf("analytic:box"), EndsWith(".json: is a folder; give a file name"));
 }
 
 TEST_F(Batches, aReaderThatHasGoneEndsTheWork) {
@@ -441,107 +461,7 @@ TEST_F(Batches, interruptKeepsFinishedFields) {
               EndsWith("hpsdf: cancelled; 1 of 3 meshes are finished and kept; the same command continues with "
                        "the others\n"));
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf("analytic:sphere") + ".hpsdf"));
-}
-
-/// Returns true if a process holds the file lock of any mesh in this output folder.
-bool isAtWork(const fs::path& fields) {
-  const int file = open((fields / ".batch" / "claims").c_str(), O_RDWR | O_CLOEXEC);
-  if (file < 0) return false;
-  struct flock range = {};
-  range.l_type = F_WRLCK;
-  range.l_whence = SEEK_SET;
-  fcntl(file, F_GETLK, &range);
-  close(file);
-  return range.l_type != F_UNLCK;
-}
-
-/// The first process holds the lock of a mesh and is stopped by a signal; the second process waits for that mesh.
-class TwoProcesses : public Batches {
- protected:
-  /// Options with which the construction takes some tenths of a second.
-  const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
-  const std::string kShape = "builtin:gear";
-
-  void SetUp() override {
-    first_ = std::make_unique<Process>(batch(kShape, kOptions));
-    ASSERT_TRUE(first_->sendWhen([this] { return isAtWork(fields()); }, SIGSTOP));
-    second_ = std::make_unique<Process>(batch(kShape, kOptions));
-    ASSERT_TRUE(second_->waitForError("waiting for 1 of 1 meshes"));
-    ASSERT_FALSE(second_->hasEnded());
-  }
-
-  std::unique_ptr<Process> first_, second_;
-};
-
-TEST_F(TwoProcesses, survivorTakesOverFromAKilledProcess) {
-  first_->send(SIGKILL);
-  const Outcome outcome = second_->finish();
-  EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_THAT(statusesOf(outcome), ElementsAre("built"));
-  EXPECT_EQ(first_->finish().status, -SIGKILL);
-  EXPECT_TRUE(readFile(fieldOf(kShape)) == loneBytes(kShape, kOptions));
-}
-
-TEST_F(TwoProcesses, oneWaitsForTheOther) {
-  first_->send(SIGCONT);
-  const Outcome outcome = second_->finish();
-  EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_THAT(statusesOf(outcome), ElementsAre("elsewhere"));
-  EXPECT_THAT(statusesOf(first_->finish()), ElementsAre("built"));
-  EXPECT_TRUE(fs::exists(fieldOf(kShape)));
-}
-
-/// The first process is stopped by a signal during its construction, and its lock file is deleted.
-class LostLocks : public Batches {
- protected:
-  /// Options with which the construction takes some tenths of a second.
-  const std::vector<std::string> kOptions = {"--target-error", "1e-6"};
-  const std::string kShape = "builtin:gear";
-
-  void SetUp() override {
-    process_ = std::make_unique<Process>(batch(kShape, kOptions));
-    const fs::path mark = fields() / ".batch" / (nameOf(kShape) + ".begun");
-    ASSERT_TRUE(process_->sendWhen([&] { return fs::exists(mark); }, SIGSTOP));
-    fs::remove(fields() / ".batch" / "claims");
-  }
-
-  /// Lets the stopped process continue, and expects that it reports `status` and that the field is complete.
-  void expectGoesOn(const char* status) {
-    process_->send(SIGCONT);
-    const Outcome outcome = process_->finish();
-    EXPECT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_THAT(statusesOf(outcome), ElementsAre(status));
-    EXPECT_TRUE(readFile(fieldOf(kShape)) == loneBytes(kShape, kOptions));
-  }
-
-  std::unique_ptr<Process> process_;
-};
-
-TEST_F(LostLocks, fieldOfTheOtherProcessIsAccepted) {
-  EXPECT_THAT(statusesOf(run(batch(kShape, kOptions))), ElementsAre("built"));
-  const rlimit none = {16, 16};  // limits the size of files to 16 bytes, so that writing a field fails
-  ASSERT_EQ(prlimit(process_->id(), RLIMIT_FSIZE, &none, nullptr), 0);
-  expectGoesOn("elsewhere");
-}
-
-TEST_F(LostLocks, removedFilesAreWrittenAgain) {
-  // Temporary file 0 checks that the folder is writable. The next 100 names are taken, so that the first attempt to
-  // write the field fails.
-  for (int n = 1; n <= 100; ++n)
-    writeFile(fmt::format("{}.part-{}-{}", fieldOf(kShape).string(), process_->id(), n), "");
-  expectGoesOn("built");
-}
-
-TEST_F(TwoProcesses, waitingProcessCanBeInterrupted) {
-  second_->send(SIGINT);
-  const Outcome outcome = second_->finish();
-  EXPECT_EQ(outcome.status, 130);
-  EXPECT_THAT(outcome.err,
-              EndsWith("hpsdf: cancelled; 0 of 1 meshes are finished and kept; the same command continues with "
-                       "the others\n"));
-  EXPECT_THAT(outcome.out, IsEmpty());
-  first_->send(SIGKILL);
-  first_->finish();
+  EXPECT_FALSE(fs::exists(recordOf("builtin:gear"))) << "no process has died";
 }
 
 /// A batch continues the checkpoint of a killed process and removes that process's unfinished files.
@@ -559,8 +479,6 @@ TEST_F(Batches, checkpointIsTakenOver) {
     ASSERT_FALSE(fs::exists(fieldOf(shape)));
   };
   kill();
-  // Process 1 runs here, but these files are from process 1 of another machine: nobody is building the mesh.
-  for (const fs::path& file : {fieldOf(shape), state}) writeFile(file.string() + ".part-1-0", "half a fie");
   const Outcome other = run(batch(shape, options("1e-3")));
   EXPECT_EQ(other.status, 3);
   EXPECT_THAT(other.err, HasSubstr("is a checkpoint of a build with other options; delete it"));
@@ -571,19 +489,44 @@ TEST_F(Batches, checkpointIsTakenOver) {
   EXPECT_THAT(fieldNames(), ElementsAre(nameOf(shape) + ".hpsdf"));
 }
 
+/// Returns the name of the temporary file that a process which has ended leaves behind when it is killed while it
+/// writes `file`.
+std::string leftover(const fs::path& file) {
+  const pid_t child = fork();
+  if (child == 0) {
+    OutputFile half(file);
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  for (const std::string& name : namesIn(file.parent_path()))
+    if (name.starts_with(file.filename().string() + ".part-")) return (file.parent_path() / name).string();
+  return "";
+}
+
 /// The search for files of killed processes is slow in a folder of many fields, so that it must be rare.
 TEST_F(Batches, folderIsSearchedOnlyAfterAProcessDied) {
   const std::string shape = "analytic:box";
-  const fs::path mark = fields() / ".batch" / (nameOf(shape) + ".begun"), half = fieldOf(shape).string() + ".part-1-0";
-  fs::create_directories(mark.parent_path());
-  writeFile(half, "half a fie");
+  fs::create_directories(fields());
+  const std::string half = leftover(fieldOf(shape));
+  ASSERT_TRUE(fs::exists(half));
   EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("built"));
   EXPECT_TRUE(fs::exists(half)) << "nobody has looked";
-  EXPECT_FALSE(fs::exists(mark));
-  writeFile(mark, "");
-  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("skipped"));
+  writeFile(recordOf(shape), R"({"status": "be)");  // it was killed in the middle of this
+  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("built"));
   EXPECT_FALSE(fs::exists(half));
-  EXPECT_FALSE(fs::exists(mark));
+  EXPECT_EQ(Json::parse(readFile(recordOf(shape))).at("status"), "built");
+}
+
+/// A mesh that ends every process, for want of memory for instance, must not keep the others from being built.
+TEST_F(Batches, meshesAtWhichAProcessDiedComeLast) {
+  const std::string list = "builtin:gear\nanalytic:box\nanalytic:sphere\n";
+  Process process(batch(list, {"--target-error", "1e-8"}));
+  ASSERT_TRUE(process.sendWhen([&] { return fs::exists(recordOf("builtin:gear")); }, SIGKILL));
+  EXPECT_EQ(process.finish().status, -SIGKILL);
+  EXPECT_EQ(Json::parse(readFile(recordOf("builtin:gear"))).at("status"), "begun");
+  std::vector<std::string> order;
+  for (const Json& line : linesOf(run(batch(list, kCoarse)))) order.push_back(line.at("file"));
+  EXPECT_THAT(order, ElementsAre("analytic:box", "analytic:sphere", "builtin:gear"));
 }
 
 /// A checkpoint of a killed process neither stays forever nor stops a later construction.
@@ -598,8 +541,9 @@ TEST_F(Batches, checkpointIsRemovedWithTheFieldFinished) {
   }
 }
 
-TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
-  constexpr int kShapes = 40;
+/// Four processes build one part each. One of them is killed at some moment, and its part is built again.
+TEST_F(Batches, partsAndAKilledProcessGiveTheFieldsOfALoop) {
+  constexpr int kShapes = 20, kParts = 4;
   const std::vector<std::string> options = {"--target-error", "1e-4", "--grid", "3", "--threads", "1"};
   std::vector<std::string> shapes;
   for (int i = 0; i < kShapes; ++i)
@@ -607,43 +551,122 @@ TEST_F(Batches, fourProcessesAndOneKilledBuildEachFieldOnce) {
                                 : fmt::format("builtin:gear,teeth={},segments=1", 4 + i / 2));
   std::string list;
   for (const std::string& shape : shapes) list += shape + "\n";
-  const Call call = batch(list, options);
-
+  const auto part = [&](int number) {
+    std::vector<std::string> all = options;
+    all.insert(all.end(), {"--part", fmt::format("{}/{}", number, kParts)});
+    return batch(list, all);
+  };
   std::vector<std::unique_ptr<Process>> processes;
-  processes.push_back(std::make_unique<Process>(call));
-  processes[0]->waitForLines(1);  // the first process has built this field before the other processes start
-  for (int i = 1; i < 4; ++i) processes.push_back(std::make_unique<Process>(call));
-  processes[0]->waitForLines(2);
+  for (int number = 1; number <= kParts; ++number) processes.push_back(std::make_unique<Process>(part(number)));
+  processes[0]->waitForLines(1);
   processes[0]->send(SIGKILL);
-  std::map<std::string, int> timesBuilt;
-  int builtByVictim = 0;
-  for (const auto& process : processes) {
-    const bool killed = process == processes[0];
-    const Outcome outcome = process->finish();
-    EXPECT_EQ(outcome.status, killed ? -SIGKILL : 0) << outcome.err;
-    const std::vector<Json> lines = linesOf(outcome);
-    EXPECT_TRUE(killed ? lines.size() < kShapes : lines.size() == kShapes) << lines.size();
-    for (const Json& line : lines) {
-      EXPECT_NE(line.at("status"), "failed") << line;
-      if (line.at("status") != "built") continue;
-      ++timesBuilt[line.at("file")];
-      if (killed) ++builtByVictim;
-    }
+  EXPECT_EQ(processes[0]->finish().status, -SIGKILL);
+  for (int number = 2; number <= kParts; ++number) {
+    const Outcome outcome = processes[std::size_t(number) - 1]->finish();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(statusesOf(outcome), AllOf(SizeIs(kShapes / kParts), Each("built")));
   }
-  EXPECT_GE(builtByVictim, 1) << "it was in the middle of its work";
-  // One field may be missing in the reports: a process may be killed after writing it and before reporting it.
-  EXPECT_GE(timesBuilt.size(), std::size_t{kShapes - 1});
-  for (const auto& [shape, times] : timesBuilt) EXPECT_EQ(times, 1) << shape;
+  const std::vector<std::string> again = statusesOf(run(part(1)));
+  EXPECT_THAT(again, SizeIs(kShapes / kParts));
+  EXPECT_EQ(again.front(), "skipped") << "it was built before the kill";
   EXPECT_THAT(fieldNames(), SizeIs(kShapes)) << "and nothing half-written";
   for (const std::string& shape : shapes) {
     std::vector<std::string> words = {"build", shape, "-o", at("lone.hpsdf")};
     words.insert(words.end(), options.begin(), options.end());
     ASSERT_EQ(runHere(words).status, 0);
-    EXPECT_NO_THROW(load(fieldOf(shape))) << shape;
     EXPECT_TRUE(readFile(fieldOf(shape)) == readFile(folder_ / "lone.hpsdf")) << shape;
   }
-  const std::vector<std::string> statuses = statusesOf(run(call));
-  EXPECT_THAT(statuses, AllOf(SizeIs(kShapes), Each("skipped")));
+}
+
+TEST_F(Batches, scriptRunsForEachFieldAndWhereItsFilesAreMissing) {
+  const std::string list = "analytic:box\nbuiltin:torus\n";
+  writeFile(folder_ / "then.hps", "contour output=$name.ply\nsave output=$name.copy.hpsdf\nexpect stats.leaves > 1\n");
+  const Call call = batch(list, coarseAnd({"--then", "then.hps"}));
+  const Outcome first = run(call);
+  EXPECT_EQ(first.status, 0) << first.err;
+  EXPECT_THAT(statusesOf(first), ElementsAre("built", "built"));
+  const auto besides = [&](const std::string& surface, const char* ending) {
+    return fields() / (nameOf(surface) + ending);
+  };
+  for (const char* surface : {"analytic:box", "builtin:torus"}) {
+    EXPECT_TRUE(fs::exists(besides(surface, ".ply"))) << surface;
+    EXPECT_TRUE(readFile(besides(surface, ".copy.hpsdf")) == readFile(fieldOf(surface))) << surface;
+  }
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped", "skipped"));
+  // A missing file is written again, and the field is not built for it.
+  const auto built = fs::last_write_time(fieldOf("analytic:box"));
+  fs::remove(besides("analytic:box", ".ply"));
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "skipped"));
+  EXPECT_TRUE(fs::exists(besides("analytic:box", ".ply")));
+  EXPECT_EQ(fs::last_write_time(fieldOf("analytic:box")), built);
+  // So is everything that another script writes.
+  writeFile(folder_ / "then.hps", "contour output=$name.stl\n");
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "built"));
+  EXPECT_TRUE(fs::exists(besides("builtin:torus", ".stl")));
+  EXPECT_EQ(fs::last_write_time(fieldOf("analytic:box")), built);
+}
+
+TEST_F(Batches, scriptThatFailsIsAnErrorOfItsMesh) {
+  writeFile(folder_ / "then.hps", "expect stats.leaves < 3000\ncontour output=$name.ply\n");
+  const Call call = batch("analytic:box\nbuiltin:gear\n", {"--target-error=1e-5", "--then", "then.hps"});
+  const Outcome outcome = run(call);
+  EXPECT_EQ(outcome.status, 3);
+  ASSERT_THAT(statusesOf(outcome), ElementsAre("failed", "built")) << outcome.err;
+  EXPECT_THAT(linesOf(outcome)[0].at("error").get<std::string>(), StartsWith("then.hps:1:1: "));
+  EXPECT_FALSE(fs::exists(fields() / (nameOf("analytic:box") + ".ply")));
+  const auto built = fs::last_write_time(fieldOf("analytic:box"));
+  writeFile(folder_ / "then.hps", "contour output=$name.ply\n");
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built", "built"));
+  EXPECT_EQ(fs::last_write_time(fieldOf("analytic:box")), built) << "the field was good";
+  writeFile(folder_ / "then.hps", "contuor output=$name.ply\n");
+  const Outcome wrong = run(call);
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_THAT(wrong.err, AllOf(StartsWith("hpsdf: error: then.hps:1:1: "), HasSubstr("did you mean 'contour'?")));
+}
+
+TEST_F(Batches, recordsHoldWhatTheLinesHold) {
+  writeFile(folder_ / "bad.obj", "this is no mesh\n");
+  const Outcome outcome = run(batch("analytic:box\nbad.obj\n", kCoarse));
+  for (const Json& line : linesOf(outcome)) {
+    Json record = Json::parse(readFile(recordOf(line.at("file"))));
+    EXPECT_EQ(record.erase("made_from"), 1u);
+    EXPECT_EQ(record.erase("then"), 1u);
+    EXPECT_EQ(record, line);
+  }
+}
+
+TEST_F(Batches, indexListsAllMeshes) {
+  writeFile(folder_ / "<bad>.obj", "this is no mesh\n");
+  writeFile(folder_ / "then.hps", "contour output=$name.ply\n");
+  ASSERT_EQ(run(batch("analytic:box\nbuiltin:torus\n<bad>.obj\n", coarseAnd({"--then", "then.hps"}))).status, 3);
+  writeFile(folder_ / "list", "analytic:box\nbuiltin:torus\n<bad>.obj\nanalytic:sphere\n");
+  const Outcome outcome = run({.words = {"index", "fields", "--batch", "list"}, .folder = folder_.path()});
+  EXPECT_EQ(outcome.status, 3);
+  EXPECT_EQ(outcome.out, "fields/index.html: 4 meshes, 2 built, 1 failed, 1 missing\n");
+  EXPECT_THAT(outcome.err, HasSubstr("fields: 2 of 4 meshes have no field; the page says why"));
+  std::map<std::string, Json> lines;
+  std::istringstream text(readFile(fields() / "index.jsonl"));
+  for (std::string line; std::getline(text, line);) {
+    const Json record = Json::parse(line);
+    lines[record.at("file")] = record;
+  }
+  ASSERT_THAT(lines, SizeIs(4));
+  EXPECT_GT(lines.at("builtin:torus").at("leaves"), 1);
+  EXPECT_EQ(lines.at("analytic:sphere").at("status"), "missing");
+  EXPECT_FALSE(lines.at("analytic:box").contains("made_from"));
+  const std::string page = readFile(fields() / "index.html");
+  EXPECT_THAT(page, AllOf(HasSubstr("\".ply\""), HasSubstr("\"analytic:sphere\""), HasSubstr("<td>2</td>")));
+  EXPECT_THAT(page, AllOf(HasSubstr("\\u003cbad>.obj"), Not(HasSubstr("<bad>")))) << "names end no element";
+}
+
+TEST_F(Batches, indexOfAnotherFolderIsRefused) {
+  writeFile(folder_ / "notes-0123456789abcdef.json", "[1, 2]");
+  writeFile(folder_ / "package.json", R"({"status": "built"})");
+  const Outcome outcome = run({.words = {"index", "."}, .folder = folder_.path()});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr(".: holds no field of a batch; name the folder of 'build --batch'"));
+  EXPECT_THAT(run({.words = {"index", "none"}, .folder = folder_.path()}).err, HasSubstr("none: cannot be read ("));
+  EXPECT_FALSE(fs::exists(folder_ / "index.html"));
 }
 
 }  // namespace batch_test

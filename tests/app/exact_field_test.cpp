@@ -37,6 +37,7 @@ const std::map<std::string, std::string> kExempt = {
     {"accept", "copies pictures"},
     {"mesh", "works on meshes"},
     {"shapes", "lists shapes"},
+    {"index", "lists what batches have built"},
     {"doctor", "describes the machine"},
     {"set", "defines variables"},
     {"include", "is replaced by lines of a script"},

@@ -1,4 +1,5 @@
 // Tests constructions that are interrupted and resumed from a checkpoint.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -6,6 +7,7 @@
 #include <xxhash.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstring>
@@ -419,26 +421,39 @@ pid_t pastProcess() {
   return child;
 }
 
+/// Returns the beginning of the names of temporary files of "out", up to the process id.
+std::string temporaryOfOut(const std::filesystem::path& folder) {
+  const OutputFile file(folder / "out");
+  for (const std::string& name : namesIn(folder))
+    if (name.starts_with("out.part-")) return name.substr(0, name.find('-', std::string("out.part-").size()) + 1);
+  return "";
+}
+
 TEST(OutputFile, leftoversOfKilledProcessesAreRemoved) {
   support::TemporaryDirectory folder;
-  const auto leftover = [&](const std::string& name, pid_t process, const std::string& rest) {
-    const std::string whole = name + ".part-" + std::to_string(process) + rest;
+  const std::string ours = temporaryOfOut(folder.path()), another = "out.part-another-";
+  ASSERT_THAT(ours, testing::MatchesRegex("out\\.part-[0-9a-f]{8}-"));
+  const auto leftover = [&](const std::string& beginning, pid_t process, const std::string& rest) {
+    const std::string whole = beginning + std::to_string(process) + rest;
     writeAll(folder / whole, "half");
     return whole;
   };
   const pid_t past = pastProcess();
-  leftover("out", past, "-0");
-  leftover("out", past, "-17");
-  leftover("out", getpid(), "-999999");  // from an earlier process with our id
-  const std::string running = leftover("out", getppid(), "-0"), other = leftover("out.txt", past, "-0"),
-                    foreign = leftover("out", past, "x");
-  OutputFile ours(folder / "out");
+  leftover(ours, past, "-0");
+  leftover(ours, past, "-17");
+  leftover(ours, getpid(), "-999999");  // from an earlier process with our id
+  const std::string old = leftover(another, getpid(), "-0");
+  std::filesystem::last_write_time(folder / old,
+                                   std::filesystem::file_time_type::clock::now() - std::chrono::hours(25));
+  const std::vector<std::string> stay = {leftover(ours, getppid(), "-0"), leftover(another, past, "-1"),
+                                         leftover("out.txt" + ours.substr(3), past, "-0"), leftover(ours, past, "x")};
+  OutputFile file(folder / "out");
   const std::size_t all = namesIn(folder.path()).size();
   OutputFile::removeAbandoned(folder / "out");
   const std::set<std::string> left = namesIn(folder.path());
-  EXPECT_EQ(left.size(), all - 3);
-  for (const std::string& name : {running, other, foreign}) EXPECT_TRUE(left.contains(name)) << name;
-  ours.commit();
+  EXPECT_EQ(left.size(), all - 4);
+  for (const std::string& name : stay) EXPECT_TRUE(left.contains(name)) << name;
+  file.commit();
   EXPECT_NO_THROW(OutputFile::removeAbandoned(folder / "none" / "out"));
 }
 
@@ -473,13 +488,14 @@ TEST(OutputFile, longNamesHaveShortTemporaryOnes) {
 TEST(OutputFile, aTakenTemporaryNameIsNoObstacle) {
   support::TemporaryDirectory folder;
   unsigned next = 0;
+  std::string beginning;
   {
     const OutputFile output(folder / "out");
     const std::string name = *namesIn(folder.path()).begin();
+    beginning = name.substr(0, name.rfind('-') + 1);
     next = static_cast<unsigned>(std::stoul(name.substr(name.rfind('-') + 1))) + 1;
   }
-  for (unsigned n = next; n < next + 3; ++n)
-    writeAll(folder / ("out.part-" + std::to_string(getpid()) + "-" + std::to_string(n)), "half");
+  for (unsigned n = next; n < next + 3; ++n) writeAll(folder / (beginning + std::to_string(n)), "half");
   OutputFile output(folder / "out");
   output.write("whole");
   output.commit();

@@ -28,6 +28,7 @@ NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 def modules() -> Iterator[types.ModuleType]:
     yield hpsdf
     yield hpsdf._pictures
+    yield importlib.import_module("hpsdf.dataset")
     try:
         yield importlib.import_module("hpsdf.torch")
     except ImportError:

@@ -1,38 +1,32 @@
 #include "batch/batch.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <optional>
-#include <sstream>
-#include <thread>
+#include <ostream>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "batch/batch_list.h"
+#include "batch/mesh_record.h"
 #include "console/console.h"
 #include "console/error_text.h"
 #include "console/interrupt.h"
 #include "console/long_work.h"
-#include "console/version.h"
 #include "construction/build_arguments.h"
 #include "construction/build_field.h"
-#include "construction/surface.h"
 #include "files/output_folder.h"
 #include "files/text_file.h"
 #include "hpsdf/app/failed.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
+#include "language/script.h"
 #include "session/asked_errors.h"
 #include "session/field_summary.h"
 #include "text/json.h"
@@ -43,148 +37,40 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kOwnFolder = ".batch";  // subfolder of the output folder, for locks and build records
-constexpr auto kPollInterval = std::chrono::milliseconds(100);  // wait before locked meshes are tried again
-
 /// The outcome of the work on one mesh of the batch. After every outcome except `failed`, the mesh's field file exists.
 enum class Status : std::uint8_t {
   built,
-  skipped,    ///< the field existed already
-  elsewhere,  ///< another process built the field meanwhile
+  skipped,  ///< the field existed already
   failed,
 };
 
 std::string statusName(Status status) {
-  constexpr std::array kNames = {"built", "skipped", "elsewhere", "failed"};
+  constexpr std::array kNames = {"built", "skipped", "failed"};
   return kNames[std::size_t(status)];
 }
 
-/// Returns a text that identifies the contents of a mesh file: a hash of the file's bytes. For glTF, whose files may
-/// refer to other files, the imported mesh is hashed instead. Returns "" if the file cannot be read.
-std::string contentOf(const Console& console, const std::string& surface) {
-  if (isShape(surface)) return "shape";
-  std::error_code missing;
-  if (!fs::is_regular_file(surface, missing)) return {};
-  const std::string extension = lowerExtension(surface);
-  if (extension == ".gltf" || extension == ".glb")
-    return fmt::format("mesh {:016x}", fingerprint(importSurface(console, surface).mesh));
-  std::ifstream file(surface, std::ios::binary);
-  std::vector<char> piece(std::size_t{1} << 20);
-  std::uint64_t hash = 0;
-  while (file) {
-    file.read(piece.data(), std::streamsize(piece.size()));
-    hash = XXH3_64bits_withSeed(piece.data(), std::size_t(file.gcount()), hash);
-  }
-  return file.eof() ? fmt::format("bytes {:016x}", hash) : std::string();
-}
-
-/// Returns the checksum at the end of a field file without verifying it. Returns "" if the file is too short.
-std::string checksumOf(const fs::path& field) {
-  constexpr int kBytes = 8;
-  std::array<char, kBytes> bytes{};
-  std::ifstream file(field, std::ios::binary);
-  file.seekg(-kBytes, std::ios::end).read(bytes.data(), kBytes);
-  std::string text;
-  for (const char byte : bytes) text += fmt::format("{:02x}", std::uint8_t(byte));
-  return file ? text : std::string();
-}
-
-/// Returns the names of the explicitly given options that affect the field. Options given with their default value are
-/// included, because every explicit option overrides the preset --paper.
-Json givenNames(const Arguments& arguments) {
-  Json names = Json::array();
-  for (const Parameter& parameter : buildParameters())
-    if (decides(parameter) && arguments.given(parameter.name)) names.push_back(parameter.name);
-  return names;
-}
-
-Json linesJson(const std::string& text) {
-  Json list = Json::array();
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) list.push_back(line);
-  return list;
-}
-
-/// Returns the error for a file that cannot be written, with the reason from `errno`. The caller must not
-/// change `errno` before this call.
-Error cannotWrite(const fs::path& file) {
-  return Error(ErrorKind::file, file.string(),
-               fmt::format("cannot be written ({}); check the folder's permissions", std::strerror(errno)));
-}
-
-/// Divides numbered tasks among processes by locks on single bytes of a shared file. A process claims a task by a lock
-/// (fcntl record lock) on the byte whose offset follows from the task's number. The file stays empty, because a locked
-/// byte need not exist. When a process ends, for any reason, the system releases its locks. The lock file must never be
-/// removed: a process that opened a new file of the same name would not see the locks on the old file.
-class FileLocks {
- public:
-  /// Creates the lock file if it does not exist. Throws `Error` if the lock file cannot be written. A process must
-  /// create only one object for each lock file: closing the file releases all locks that the process holds on the file.
-  explicit FileLocks(fs::path file)
-      : file_(std::move(file)), descriptor_(open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
-    if (descriptor_ < 0) throw cannotWrite(file_);
-  }
-  ~FileLocks() { close(descriptor_); }
-  FileLocks(const FileLocks&) = delete;
-  FileLocks& operator=(const FileLocks&) = delete;
-
-  /// Locks the task of this number. Returns false if another process holds the task's lock. Throws `Error` if the file
-  /// system does not support locks.
-  bool take(std::uint64_t number) const {
-    if (change(number, F_WRLCK)) return true;
-    if (errno == EACCES || errno == EAGAIN) return false;
-    throw Error(
-        fmt::format("{}: cannot be locked ({}), so that processes cannot share the work; name a folder on a "
-                    "file system with locks",
-                    file_.string(), std::strerror(errno)));
-  }
-
-  void release(std::uint64_t number) const { change(number, F_UNLCK); }
-
- private:
-  bool change(std::uint64_t number, short type) const {
-    struct flock range = {};
-    range.l_type = type;
-    range.l_whence = SEEK_SET;
-    range.l_start = static_cast<off_t>(number >> 2);  // keeps offsets below 2^62, which all file servers support
-    range.l_len = 1;
-    for (;;) {
-      if (fcntl(descriptor_, F_SETLK, &range) == 0) return true;
-      if (errno != EINTR) return false;
-    }
-  }
-
-  fs::path file_;
-  int descriptor_;
-};
-
-/// An empty file that exists while a process builds a field. If the process dies, the file remains.
-struct BuildMark {
-  /// Creates the empty file. Throws `Error` if the file cannot be written: without the file, a process that
-  /// dies during a construction would leave no trace.
-  explicit BuildMark(fs::path path) : file(std::move(path)) {
-    if (!std::ofstream(file)) throw cannotWrite(file);
-  }
-  ~BuildMark() {
-    std::error_code ignored;
-    fs::remove(file, ignored);
-  }
-  BuildMark(const BuildMark&) = delete;
-  BuildMark& operator=(const BuildMark&) = delete;
-
-  fs::path file;
+/// The script that runs for every field of a batch.
+struct FieldScript {
+  std::string file;  ///< "" for none
+  std::string text = {};
 };
 
 class Batch {
  public:
-  Batch(const Console& console, const Arguments& arguments, const std::vector<BatchMesh>& meshes,
+  Batch(Session& session, const Arguments& arguments, const std::vector<BatchMesh>& meshes, FieldScript script,
         const fs::path& folder)
-      : console_(console),
+      : console_(session.console()),
         arguments_(arguments),
         meshes_(meshes),
+        script_(std::move(script)),
         folder_(folder),
-        ownFolder_(folder / kOwnFolder),
-        locks_(ownFolder_ / "claims") {}
+        silent_(nullptr),
+        scriptSession_(session.registry(), silently(session.console())) {}
+
+  /// Throws `Error` if the script has a mistake, which then concerns all meshes.
+  void checkScript() const {
+    if (!script_.file.empty() && !meshes_.empty()) scriptCalls(meshes_.front());
+  }
 
   void run() {
     const auto start = std::chrono::steady_clock::now();
@@ -194,9 +80,9 @@ class Batch {
       throw CancelledPartway(fmt::format(
           "{} of {} meshes are finished and kept; the same command continues with the others", done_, meshes_.size()));
     }
-    console_.err << fmt::format("{}: {} built, {} skipped, {} built elsewhere, {} failed, {}\n",
-                                printable(folder_.string()), count(Status::built), count(Status::skipped),
-                                count(Status::elsewhere), count(Status::failed), durationText(secondsSince(start)))
+    console_.err << fmt::format("{}: {} built, {} skipped, {} failed, {}\n", printable(folder_.string()),
+                                count(Status::built), count(Status::skipped), count(Status::failed),
+                                durationText(secondsSince(start)))
                  << std::flush;
     if (const std::size_t failed = count(Status::failed); failed > 0)
       throw Failed(fmt::format("{}: {} of {} meshes failed; the lines above say why", arguments_.text("batch"), failed,
@@ -210,73 +96,104 @@ class Batch {
 
  private:
   struct Made {
-    Status status;
+    Status status = Status::failed;
     std::optional<CurrentField> field = {};
+    Json madeFrom = {};
+    Json then = {};
     std::string error = {};
     bool errorNamesMesh = false;
     std::string missed = {};  ///< what the field misses of the errors that were asked for
   };
 
+  fs::path baseOf(const BatchMesh& mesh) const { return folder_ / mesh.name; }
   fs::path outputOf(const BatchMesh& mesh) const { return folder_ / (mesh.name + ".hpsdf"); }
-  fs::path recordOf(const BatchMesh& mesh) const { return ownFolder_ / (mesh.name + ".json"); }
-  fs::path markOf(const BatchMesh& mesh) const { return ownFolder_ / (mesh.name + ".begun"); }
+  fs::path recordOf(const BatchMesh& mesh) const { return folder_ / (mesh.name + ".json"); }
   std::size_t count(Status status) const { return counts_[std::size_t(status)]; }
 
-  /// Builds the fields of the meshes in the order of the list. Meshes that are locked by other processes are tried
-  /// again until all meshes are finished.
-  void workThrough() {
-    std::vector<const BatchMesh*> remaining;
-    for (const BatchMesh& mesh : meshes_) remaining.push_back(&mesh);
-    for (bool again = false; !remaining.empty(); again = true) {
-      const std::size_t finished =
-          std::erase_if(remaining, [&](const BatchMesh* mesh) { return attempt(*mesh, again); });
-      if (!again && !remaining.empty())
-        note(console_, fmt::format("waiting for {} of {} meshes, which other processes are building", remaining.size(),
-                                   meshes_.size()));
-      if (again && finished == 0) std::this_thread::sleep_for(kPollInterval);
-    }
+  /// Returns the console of the script's commands, whose reports nobody reads.
+  Console silently(const Console& console) {
+    Console silent{.in = console.in, .out = silent_, .err = console.err};
+    silent.meshReader = console.meshReader;
+    silent.meshes = console.meshes;
+    silent.listener = console.listener;
+    silent.writesProgress = false;
+    return silent;
   }
 
-  /// Builds the field of a mesh unless it exists already. Returns false if another process is working on the mesh.
-  bool attempt(const BatchMesh& mesh, bool again) {
+  /// Builds the fields of the meshes in the order of the list. A mesh at which an earlier process died comes last, so
+  /// that a mesh which ends every process does not keep the others from being built.
+  void workThrough() {
+    std::vector<const BatchMesh*> last;
+    for (const BatchMesh& mesh : meshes_) {
+      if (statusOf(readRecord(recordOf(mesh))) == kBegun)
+        last.push_back(&mesh);
+      else
+        workOn(mesh);
+    }
+    for (const BatchMesh* mesh : last) workOn(*mesh);
+  }
+
+  void workOn(const BatchMesh& mesh) {
     if (InterruptGuard::interrupted() || (console_.listener != nullptr && console_.listener->wantsCancel()))
       throw Cancelled();
-    if (!locks_.take(mesh.number)) return false;
     console_.work = fmt::format("{} of {}, {}: ", done_ + 1, meshes_.size(), printable(mesh.surface));
     const auto start = std::chrono::steady_clock::now();
-    Made made = make(mesh, again);
+    Made made = make(mesh);
     ++done_;
     ++counts_[std::size_t(made.status)];
     if (made.field) made.missed = missedErrors(arguments_, made.field->field);
     missed_ += made.missed.empty() ? 0 : 1;
-    report(mesh, made, secondsSince(start));
-    locks_.release(mesh.number);
-    return true;
+    finish(mesh, made, secondsSince(start));
   }
 
-  Made make(const BatchMesh& mesh, bool again) {
+  Made make(const BatchMesh& mesh) {
+    Made made;
     try {
-      removeAbandoned(mesh);
-      std::optional<CurrentField> field = finished(mesh);
-      Made made = field ? Made{again ? Status::elsewhere : Status::skipped, std::move(field)} : built(mesh);
-      std::error_code ignored;
-      fs::remove(checkpointOf(outputOf(mesh)), ignored);  // an old checkpoint would stop a build with other options
-      return made;
+      makeFiles(mesh, made);
     } catch (const Cancelled&) {
+      std::error_code ignored;
+      if (statusOf(readRecord(recordOf(mesh))) == kBegun) fs::remove(recordOf(mesh), ignored);  // nothing died here
       throw;
     } catch (const std::exception& error) {
       const auto* known = dynamic_cast<const Error*>(&error);
-      return {Status::failed, {}, printable(errorText(error)), known != nullptr && known->subject() == mesh.surface};
+      made.status = Status::failed;
+      made.field.reset();
+      made.then = nullptr;
+      made.error = printable(errorText(error));
+      made.errorNamesMesh = known != nullptr && known->subject() == mesh.surface;
     }
+    return made;
   }
 
-  /// Returns the mesh's existing field if it is up to date, that is, if the record stored beside it matches the present
-  /// program, mesh and options. Returns std::nullopt otherwise.
-  std::optional<CurrentField> finished(const BatchMesh& mesh) const {
-    const fs::path output = outputOf(mesh), record = recordOf(mesh);
-    if (!fs::exists(output) || !fs::exists(record)) return std::nullopt;
+  /// Makes what is not there yet of the mesh's files: its field, and what the script writes. If it throws, `made` says
+  /// how far it came.
+  void makeFiles(const BatchMesh& mesh, Made& made) {
+    const Json record = readRecord(recordOf(mesh));
+    if (statusOf(record) == kBegun) removeAbandoned(mesh);
+    // The contents are taken before the mesh is read: if the file changes in between, the next run finds other
+    // contents.
     const std::string content = contentOf(console_, mesh.surface);
-    if (content.empty() || readTextFile(record.string()) != recordText(mesh, content)) return std::nullopt;
+    made.field = finished(mesh, record, content);
+    made.status = made.field ? Status::skipped : Status::built;
+    if (!made.field) made.field = built(mesh);
+    std::error_code ignored;
+    fs::remove(checkpointOf(outputOf(mesh)), ignored);  // an old checkpoint would stop a build with other options
+    made.madeFrom = madeFrom(mesh.surface, content, arguments_, outputOf(mesh));
+    if (script_.file.empty()) return;
+    const std::vector<Call> calls = scriptCalls(mesh);
+    made.then = thenJson(calls);
+    if (made.status == Status::skipped && record.value(kThen, Json()) == made.then && allExist(made.then)) return;
+    made.status = Status::built;
+    writeBegun(recordOf(mesh), made.madeFrom);
+    runFor(mesh, *made.field, calls);
+  }
+
+  /// Returns the mesh's existing field if it is up to date, that is, if its record says that it was made of the present
+  /// mesh by the present options and program. Returns std::nullopt otherwise.
+  std::optional<CurrentField> finished(const BatchMesh& mesh, const Json& record, const std::string& content) const {
+    const fs::path output = outputOf(mesh);
+    if (content.empty() || record.is_null() || !fs::exists(output)) return std::nullopt;
+    if (record.value(kMadeFrom, Json()) != madeFrom(mesh.surface, content, arguments_, output)) return std::nullopt;
     try {
       return CurrentField{load(output), output.string(), fs::file_size(output)};
     } catch (const Error& error) {
@@ -285,56 +202,56 @@ class Batch {
     }
   }
 
-  /// Removes the half-written files that a killed process left for this mesh. Searches the folder only if the mesh's
-  /// mark file exists, because a killed process leaves the mark file too. The caller must hold the mesh's lock.
+  /// Removes the half-written files that a killed process left for this mesh.
   void removeAbandoned(const BatchMesh& mesh) const {
-    if (!fs::exists(markOf(mesh))) return;
     const fs::path output = outputOf(mesh);
-    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)})
-      OutputFile::removeAbandoned(file, OutputFile::Writers::others);
-    fs::remove(markOf(mesh));
+    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)}) OutputFile::removeAbandoned(file);
   }
 
-  Made built(const BatchMesh& mesh) const {
+  CurrentField built(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
-    const BuildMark mark(markOf(mesh));  // created first, because `checkWritable` writes a file
+    writeBegun(recordOf(mesh), nullptr);  // first, because `checkWritable` writes a file
     checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
-    // Hash the file before reading the mesh: if the file changes in between, the next run notices that the hash
-    // differs.
-    const std::string content = contentOf(console_, mesh.surface);
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
+    save(field, output, {.compress = arguments_.flag("compress")});
+    return {std::move(field), output.string(), fs::file_size(output)};
+  }
+
+  /// Returns the commands of the script for one mesh.
+  std::vector<Call> scriptCalls(const BatchMesh& mesh) const {
+    return parseScript(scriptSession_.registry(), script_.file, script_.text,
+                       {{"mesh", mesh.surface}, {"field", outputOf(mesh).string()}, {"name", baseOf(mesh).string()}});
+  }
+
+  /// Returns what a record keeps of the script: its contents, and the files that it writes.
+  Json thenJson(const std::vector<Call>& calls) const {
+    Json files = Json::array();
+    for (const Call& call : calls)
+      for (const std::string& file : outputFiles(*call.command, call.arguments)) files.push_back(file);
+    return {{"script", contentOfBytes(script_.text)}, {"files", files}};
+  }
+
+  static bool allExist(const Json& then) {
+    return std::ranges::all_of(then.at("files"), [](const Json& file) { return fs::exists(file.get<std::string>()); });
+  }
+
+  /// Runs the script for a field, which the script finds as its current one.
+  void runFor(const BatchMesh& mesh, const CurrentField& field, const std::vector<Call>& calls) {
+    scriptSession_.forgetSurfaces();
+    scriptSession_.setField({field.field, field.name, field.fileBytes, mesh.surface});
+    runScript(scriptSession_, calls);
+  }
+
+  /// Reports what became of a mesh on the console and in its record. Nothing is written into the record of a mesh that
+  /// was skipped, which stays as it is.
+  void finish(const BatchMesh& mesh, const Made& made, double seconds) const {
+    const Json line = lineOf(mesh, made, seconds);
     try {
-      write(mesh, field, content);
-    } catch (const Error&) {
-      // If the file system lost the locks, another process may have taken this process for dead and removed its
-      // unfinished files. If the other process has finished the field, use that field. Otherwise write the field once
-      // more: the files are not removed a second time.
-      if (std::optional<CurrentField> other = finished(mesh)) return {Status::elsewhere, std::move(other)};
-      write(mesh, field, content);
+      if (made.status != Status::skipped) writeRecord(mesh, line, made);
+    } catch (const Error& error) {
+      warn(console_, error.what());
     }
-    return {Status::built, CurrentField{std::move(field), output.string(), fs::file_size(output)}};
-  }
-
-  /// Saves the field, then the record of the mesh and options from which it was built.
-  void write(const BatchMesh& mesh, const Field& field, const std::string& content) const {
-    save(field, outputOf(mesh), {.compress = arguments_.flag("compress")});
-    if (!content.empty()) writeTextFile(recordOf(mesh), recordText(mesh, content));
-  }
-
-  /// Returns the record of how the mesh's field file was built: program version, mesh, options and checksum of the
-  /// file. A later run reuses the field only if it computes the same record.
-  std::string recordText(const BatchMesh& mesh, const std::string& content) const {
-    return jsonText({{"program", versionText()},
-                     {"mesh", mesh.surface},
-                     {"content", content},
-                     {"options", linesJson(decidingArguments(arguments_))},
-                     {"given", givenNames(arguments_)},
-                     {"compress", arguments_.flag("compress")},
-                     {"field", checksumOf(outputOf(mesh))}});
-  }
-
-  void report(const BatchMesh& mesh, const Made& made, double seconds) const {
     const std::string position = fmt::format("{} of {}", done_, meshes_.size()), name = printable(mesh.surface);
     if (made.status == Status::failed) {
       console_.err << fmt::format("hpsdf: error: {}: {}{}\n", position, made.errorNamesMesh ? "" : name + ": ",
@@ -347,10 +264,16 @@ class Batch {
     }
     console_.err << std::flush;
     // Each line of the output is written in one call, so that the lines of several processes do not mix.
-    console_.out << lineOf(mesh, made, seconds).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"
-                 << std::flush;
+    console_.out << line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n" << std::flush;
     const std::string output = outputOf(mesh).string();
     requireWritten(console_.out, std::span(&output, made.status == Status::failed ? 0 : 1));
+  }
+
+  /// Writes the record of a mesh: the values of `line`, and of what its field was made.
+  void writeRecord(const BatchMesh& mesh, Json line, const Made& made) const {
+    line[kMadeFrom] = made.madeFrom;
+    line[kThen] = made.then;
+    writeTextFile(recordOf(mesh), jsonText(line));
   }
 
   Json lineOf(const BatchMesh& mesh, const Made& made, double seconds) const {
@@ -375,11 +298,12 @@ class Batch {
   Console console_;
   const Arguments& arguments_;
   const std::vector<BatchMesh>& meshes_;
+  FieldScript script_;
   fs::path folder_;
-  fs::path ownFolder_;
-  FileLocks locks_;
+  std::ostream silent_;    // writes nothing
+  Session scriptSession_;  // its renderer is kept from mesh to mesh
   std::size_t done_ = 0;
-  std::array<std::size_t, 4> counts_{};  // number of meshes for each `Status`
+  std::array<std::size_t, 3> counts_{};  // number of meshes for each `Status`
   std::size_t missed_ = 0;               // number of fields that miss the errors that were asked for
 };
 
@@ -397,14 +321,25 @@ std::vector<BatchMesh> readList(const Console& console, const std::string& list)
 
 }  // namespace
 
-void buildBatch(const Console& console, const Arguments& arguments) {
+void checkBatch(const Arguments& arguments) {
+  const bool many = arguments.has("batch");
+  if (many && arguments.has("mesh")) throw Error("batch: the list names the meshes; leave MESH out");
+  if (many && !arguments.has("output")) throw Error("batch: the fields are written to a folder; give output");
+  requireOwner(arguments, "part", "batch", many);
+  requireOwner(arguments, "then", "batch", many);
+  if (arguments.has("part")) checkPart(arguments.text("part"));
+}
+
+void buildBatch(Session& session, const Arguments& arguments) {
   requireConsistent(arguments);
-  const std::vector<BatchMesh> meshes = readList(console, arguments.text("batch"));
+  std::vector<BatchMesh> meshes = readList(session.console(), arguments.text("batch"));
+  if (arguments.has("part")) meshes = partOf(meshes, arguments.text("part"));
+  FieldScript script{.file = arguments.textOr("then", "")};
+  if (!script.file.empty()) script.text = readTextFile(script.file);
   const InterruptGuard guard;  // on Ctrl-C, each file is written completely or not at all
   OutputFolder folder(arguments.text("output"));
-  OutputFolder own(folder.path() / kOwnFolder);
-  Batch batch(console, arguments, meshes, folder.path());
-  own.keep();
+  Batch batch(session, arguments, meshes, std::move(script), folder.path());
+  batch.checkScript();
   folder.keep();
   batch.run();
 }

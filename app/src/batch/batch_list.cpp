@@ -4,6 +4,9 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <optional>
 #include <sstream>
 #include <unordered_set>
 
@@ -25,7 +28,40 @@ std::string readableName(std::string surface) {
   return name;
 }
 
+/// A part of a list: the `number`-th of `count` parts, where 1 is the first.
+struct Part {
+  std::size_t number;
+  std::size_t count;
+};
+
+/// Parses all of `text` as a whole number. Returns std::nullopt if it is anything else.
+std::optional<std::size_t> partNumber(std::string_view text) {
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+Part parsePart(std::string_view text) {
+  const std::size_t slash = text.find('/');
+  if (slash != std::string_view::npos) {
+    const auto number = partNumber(text.substr(0, slash)), count = partNumber(text.substr(slash + 1));
+    if (number && count && *number >= 1 && *number <= *count) return {*number, *count};
+  }
+  throw Error(
+      fmt::format("part: '{}' is no part of a list: expected K/N, such as 1/20 for the first of twenty parts", text));
+}
+
 }  // namespace
+
+void checkPart(std::string_view part) { parsePart(part); }
+
+std::vector<BatchMesh> partOf(const std::vector<BatchMesh>& meshes, std::string_view part) {
+  const auto [number, count] = parsePart(part);
+  std::vector<BatchMesh> chosen;
+  for (std::size_t i = number - 1; i < meshes.size(); i += count) chosen.push_back(meshes[i]);
+  return chosen;
+}
 
 std::vector<BatchMesh> parseBatchList(std::string_view text) {
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -40,7 +76,7 @@ std::vector<BatchMesh> parseBatchList(std::string_view text) {
     const std::string surface(trimmed(line));
     if (surface.empty() || surface.starts_with('#') || !known.insert(surface).second) continue;
     const std::uint64_t hash = XXH3_64bits(surface.data(), surface.size());
-    meshes.push_back({surface, hash, fmt::format("{}-{:016x}", readableName(surface), hash)});
+    meshes.push_back({surface, fmt::format("{}-{:016x}", readableName(surface), hash)});
   }
   return meshes;
 }

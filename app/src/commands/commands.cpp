@@ -1,5 +1,6 @@
 #include "commands/commands.h"
 
+#include "batch/index_command.h"
 #include "check/check_command.h"
 #include "compare/compare_command.h"
 #include "explorer/explorer_commands.h"
@@ -31,6 +32,7 @@ Registry makeRegistry() {
   addWindowCommand(registry);
   addReportCommand(registry);
   addPageCommand(registry);
+  addIndexCommand(registry);
   addStudyCommand(registry);
   addSimulateCommand(registry);
   addCheckCommands(registry);

@@ -46,16 +46,14 @@ void changeCurrent(Session& session, const Arguments& arguments, Field field, co
 }
 
 void checkBuildArguments(const Arguments& arguments) {
-  const bool many = arguments.has("batch");
-  if (many && arguments.has("mesh")) throw Error("batch: the list names the meshes; leave MESH out");
-  if (many && !arguments.has("output")) throw Error("batch: the fields are written to a folder; give output");
-  if (!many && !arguments.has("mesh"))
+  checkBatch(arguments);
+  if (!arguments.has("batch") && !arguments.has("mesh"))
     throw Error("build: mesh is missing: give one, or a list of them as batch; 'hpsdf help build' explains");
   checkCheckpoint(arguments);
 }
 
 void runBuild(Session& session, const Arguments& arguments) {
-  if (arguments.has("batch")) return buildBatch(session.console(), arguments);
+  if (arguments.has("batch")) return buildBatch(session, arguments);
   const std::string surface = arguments.text("mesh");
   buildAndReport(session, arguments, {.name = surface, .surface = surface},
                  [&](const std::filesystem::path& checkpoint) {
@@ -146,6 +144,13 @@ const std::vector<Parameter> kBuildFiles = {
     {"batch", file("LIST").under(kFiles),
      "Builds the fields of many meshes instead of MESH. LIST names one mesh file (relative to the current folder) or "
      "shape a line; empty lines and # comments are ignored, - is standard input."},
+    {"part", text("K/N").under(kFiles),
+     "Builds the K-th of N parts of the list alone, that is, every N-th mesh from the K-th on. Processes that build "
+     "different parts may work at once, on several machines."},
+    {"then", file("SCRIPT").under(kFiles),
+     "Script that runs for every field of the list, with the field as its current one: it writes samples, a contour or "
+     "pictures. Its variables are $mesh, $field (the field's file) and $name (that file without its ending). It runs "
+     "again where a file that it writes is missing, or where the script has changed."},
     compressParameter()};
 
 void addBuildCommand(Registry& registry) {
@@ -181,16 +186,18 @@ reports which inside test was chosen (see --sign). Ctrl-C stops the construction
 --checkpoint the same command continues it later. In a script, the field becomes the current one, and the output may be
 left out.
 
-With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, and one line of JSON on standard output reports its
-result. A mesh that fails does not stop the others; the exit status is 3 then. It is 1 if none fails and a field misses its
-tolerance or an error that was asked for, which its line tells. Fields that exist already, made from the
-same contents with the same options, are skipped. Any number of processes may share one list and one folder: each mesh
-is built by one of them. docs/batch.md shows how, also with GNU parallel and Slurm.)"),
+With --batch, every mesh of a list becomes OUTPUT/name-hash.hpsdf, with a record of its figures beside it in
+name-hash.json, and one line of JSON on standard output reports its result. A mesh that fails does not stop the others; the
+exit status is 3 then. It is 1 if none fails and a field misses its tolerance or an error that was asked for, which its
+line tells. Fields that exist already, made from the same contents with the same options, are skipped. With --part, several
+processes share a list. docs/batch.md shows how, with Slurm, Snakemake, Dask and GNU parallel. 'hpsdf index' makes a page of
+a finished folder.)"),
       .examples = {"hpsdf build part.stl -o part.hpsdf --tolerance 0.02%", "hpsdf build bunny.obj -o bunny.hpsdf",
                    "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
                    "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",
                    "hpsdf build bunny.obj -o fine.hpsdf --target-error 1e-9 --checkpoint",
-                   "hpsdf build --batch list.txt -o fields"},
+                   "hpsdf build --batch list.txt -o fields",
+                   "hpsdf build --batch list.txt -o fields --part 3/20 --then products.hps"},
       .parameters = joined({kBuildFiles, checkpointParameters(), buildParameters()}),
       .action = runBuild,
       .check = checkBuildArguments,

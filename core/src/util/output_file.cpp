@@ -9,7 +9,9 @@
 #include <atomic>
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -24,7 +26,7 @@ namespace {
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-constexpr std::string_view kTemporary = ".part-";  ///< followed in file names by a process id, "-" and a number
+constexpr std::string_view kTemporary = ".part-";  ///< followed in file names by machine, process id and number
 
 /// Returns the common beginning of the names of all temporary files of `file`: the name of `file`, followed by
 /// `kTemporary`. A name that is too long for a suffix is replaced by its first characters (whole UTF-8 characters) and
@@ -42,12 +44,26 @@ std::string beginningOfTemporaries(const std::filesystem::path& file) {
   return name + std::string(kTemporary);
 }
 
-/// Returns a name for a temporary file in the folder of `file`. The name contains the process id and a counter, and is
-/// therefore not in use by a running process.
+/// Returns a hash of this machine's name as hexadecimal digits. Several machines may write to one folder.
+const std::string& thisMachine() {
+  static const std::string machine = [] {
+    std::array<char, 256> name{};
+    gethostname(name.data(), name.size() - 1);
+    std::array<char, 17> digits{};
+    std::snprintf(digits.data(), digits.size(), "%016llx",
+                  static_cast<unsigned long long>(XXH3_64bits(name.data(), std::strlen(name.data()))));
+    return std::string(digits.data(), 8);
+  }();
+  return machine;
+}
+
+/// Returns a name for a temporary file in the folder of `file`. The name contains the machine, the process id and a
+/// counter, and is therefore not in use by a running process.
 std::filesystem::path temporaryBeside(const std::filesystem::path& file) {
   static std::atomic<unsigned> counter = 0;
   std::filesystem::path name = file;
-  name.replace_filename(beginningOfTemporaries(file) + std::to_string(getpid()) + "-" + std::to_string(counter++));
+  name.replace_filename(beginningOfTemporaries(file) + thisMachine() + "-" + std::to_string(getpid()) + "-" +
+                        std::to_string(counter++));
   return name;
 }
 
@@ -92,30 +108,47 @@ bool isOurs(const std::filesystem::path& name) {
   });
 }
 
-/// Returns the id of the process that wrote the temporary file `name`; the id is part of this name. Returns
-/// std::nullopt if `name` is not the name of a temporary file of `file`.
-std::optional<pid_t> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
+/// The process that wrote a temporary file.
+struct Writer {
+  std::string machine;
+  pid_t process = 0;
+};
+
+/// Returns the writer of the temporary file `name`, which is part of this name. Returns std::nullopt if `name` is not
+/// the name of a temporary file of `file`.
+std::optional<Writer> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
   const std::string text = name.filename(), before = beginningOfTemporaries(file);
   if (!text.starts_with(before)) return std::nullopt;
-  pid_t process = 0;
-  const auto [end, error] = std::from_chars(text.data() + before.size(), text.data() + text.size(), process);
-  if (error != std::errc() || process <= 0 || *end != '-') return std::nullopt;
-  return process;
+  const std::size_t dash = text.find('-', before.size());
+  if (dash == std::string::npos) return std::nullopt;
+  Writer writer{.machine = text.substr(before.size(), dash - before.size())};
+  const auto [end, error] = std::from_chars(text.data() + dash + 1, text.data() + text.size(), writer.process);
+  if (error != std::errc() || writer.process <= 0 || *end != '-') return std::nullopt;
+  return writer;
 }
 
 bool isRunning(pid_t process) { return kill(process, 0) == 0 || errno != ESRCH; }
 
+/// Returns true if nobody writes the temporary file any more. Nothing is known of the processes of other machines:
+/// their files count as abandoned after a day without a change.
+bool isAbandoned(const std::filesystem::path& temporary, const Writer& writer) {
+  if (writer.machine == thisMachine()) return writer.process == getpid() || !isRunning(writer.process);
+  std::error_code error;
+  const auto written = std::filesystem::last_write_time(temporary, error);
+  return !error && std::filesystem::file_time_type::clock::now() - written > std::chrono::hours(24);
+}
+
 }  // namespace
 
-void OutputFile::removeAbandoned(const std::filesystem::path& file, Writers writers) {
+void OutputFile::removeAbandoned(const std::filesystem::path& file) {
   const std::filesystem::path target = resolved(file);
   const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
   std::error_code ignored;
   std::vector<std::filesystem::path> abandoned;
   for (std::filesystem::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
-    const std::optional<pid_t> writer = writerOf(entry->path(), target);
+    const std::optional<Writer> writer = writerOf(entry->path(), target);
     if (!writer || isOurs(entry->path().filename())) continue;
-    if (writers == Writers::others || *writer == getpid() || !isRunning(*writer)) abandoned.push_back(entry->path());
+    if (isAbandoned(entry->path(), *writer)) abandoned.push_back(entry->path());
   }
   for (const std::filesystem::path& name : abandoned) std::filesystem::remove(name, ignored);
 }

@@ -70,6 +70,9 @@ class Interpreter {
   /// Draws what a command (`slice`, `render`, `probe` or `shot`) would write as a PNG file.
   render::Image draw(std::string_view command, std::span<const Option> options, const Progress& progress = {});
 
+  /// Returns what the last command or script printed before it threw.
+  std::string takeOutput();
+
   /// Returns the notes and warnings since the last call, one a line.
   std::string takeNotes();
 

@@ -39,15 +39,9 @@ class OutputFile {
   /// end the process may call this function, because it makes async-signal-safe calls only.
   static void removeUnfinished() noexcept;
 
-  /// The processes whose temporary files `removeAbandoned` removes.
-  enum class Writers {
-    killed,  ///< processes of this machine that no longer run
-    others,  ///< all processes but this one; for a caller that holds a lock on the file
-  };
-
-  /// Removes temporary files that earlier writers of `file` left in the folder of `file`. `writers` selects the
-  /// processes whose temporary files are removed.
-  static void removeAbandoned(const std::filesystem::path& file, Writers writers = Writers::killed);
+  /// Removes temporary files that earlier writers of `file` left in the folder of `file`: those of processes of this
+  /// machine that no longer run, and those of other machines that nobody has changed for a day.
+  static void removeAbandoned(const std::filesystem::path& file);
 
  private:
   [[noreturn]] void fail();

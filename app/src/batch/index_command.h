@@ -1,0 +1,10 @@
+#pragma once
+
+#include "language/registry.h"
+
+namespace hpsdf::app {
+
+/// Adds the command `index`.
+void addIndexCommand(Registry& registry);
+
+}  // namespace hpsdf::app

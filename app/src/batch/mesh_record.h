@@ -1,0 +1,45 @@
+#pragma once
+// The record that a batch keeps of each mesh: what became of it, and of what its field was made.
+
+#include <filesystem>
+#include <string>
+
+#include "console/console.h"
+#include "language/registry.h"
+#include "text/json.h"
+
+namespace hpsdf::app {
+
+// Keys of a record besides those of the line that a batch prints for the mesh (docs/batch.md).
+constexpr const char* kMadeFrom = "made_from";  ///< of what the field was made
+constexpr const char* kThen = "then";           ///< the script that was run for the field, and the files it wrote
+
+/// The status of a mesh on which a process is at work. The record of a process that died keeps it.
+constexpr const char* kBegun = "begun";
+
+/// Returns the record in `file`. Returns null if there is none that can be read. A record that is cut off has the
+/// status `kBegun`: a process died while it wrote it.
+Json readRecord(const std::filesystem::path& file);
+
+/// Writes a record with the status `kBegun`. It is written at its place, not under another name first, so that a
+/// process which dies meanwhile leaves nothing that the record does not tell of. Throws `Error` if it cannot be
+/// written.
+void writeBegun(const std::filesystem::path& file, const Json& madeFrom);
+
+/// Returns the text with the key `status` of a record, or "" for null.
+std::string statusOf(const Json& record);
+
+/// Returns a text that identifies the contents of a mesh file: a hash of the file's bytes. For glTF, whose files may
+/// refer to other files, the imported mesh is hashed instead. Returns "" if the file cannot be read.
+std::string contentOf(const Console& console, const std::string& surface);
+
+/// Returns a text that identifies some bytes: their hash.
+std::string contentOfBytes(std::string_view bytes);
+
+/// Returns of what a field is made: the version of the program, the contents of its mesh (from `contentOf`), the
+/// options of the construction, and the checksum of the field's file. Equal values mean that the same field would come
+/// out.
+Json madeFrom(const std::string& surface, const std::string& content, const Arguments& arguments,
+              const std::filesystem::path& field);
+
+}  // namespace hpsdf::app
