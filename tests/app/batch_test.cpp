@@ -606,6 +606,21 @@ TEST_F(Batches, scriptRunsForEachFieldAndWhereItsFilesAreMissing) {
   EXPECT_EQ(fs::last_write_time(fieldOf("analytic:box")), built);
 }
 
+/// The view of the explorer is a part of a session.
+TEST_F(Batches, scriptDoesTheSameForAMeshAloneAndAfterAnother) {
+  writeFile(folder_ / "then.hps",
+            "run inner.hps name=$name\ncamera 40,20,1\nsettings\ncopy-view output=$name.second.txt\n");
+  writeFile(folder_ / "inner.hps", "copy-view output=$name.first.txt\n");
+  const std::vector<std::string> options = coarseAnd({"--then", "then.hps"});
+  const auto viewOf = [&] { return readFile(fields() / (nameOf("builtin:torus") + ".first.txt")); };
+  const Outcome after = run(batch("analytic:box\nbuiltin:torus\n", options));
+  ASSERT_EQ(after.status, 0) << after.err;
+  const std::string view = viewOf();
+  fs::remove_all(fields());
+  ASSERT_EQ(run(batch("builtin:torus\n", options)).status, 0);
+  EXPECT_EQ(viewOf(), view);
+}
+
 TEST_F(Batches, scriptThatFailsIsAnErrorOfItsMesh) {
   writeFile(folder_ / "then.hps", "expect stats.leaves < 3000\ncontour output=$name.ply\n");
   const Call call = batch("analytic:box\nbuiltin:gear\n", {"--target-error=1e-5", "--then", "then.hps"});
@@ -622,6 +637,52 @@ TEST_F(Batches, scriptThatFailsIsAnErrorOfItsMesh) {
   const Outcome wrong = run(call);
   EXPECT_EQ(wrong.status, 2);
   EXPECT_THAT(wrong.err, AllOf(StartsWith("hpsdf: error: then.hps:1:1: "), HasSubstr("did you mean 'contour'?")));
+}
+
+TEST_F(Batches, scriptsThatWriteTheFilesOfABatchAreRefused) {
+  const auto refused = [&](const char* script, const std::string& message) {
+    writeFile(folder_ / "then.hps", script);
+    expectRefused(batch("analytic:box\nbuiltin:torus\n", coarseAnd({"--then", "then.hps"})), message);
+  };
+  refused("contour output=all.ply\n", "then.hps: all.ply would be written for every mesh; begin its name with $name");
+  refused("save output=$field\n", ".hpsdf belongs to the batch; give another name");
+  refused("query 0,0,0 output=$name.json\n", ".json belongs to the batch; give another name");
+}
+
+/// The mesh's name begins as an option does, and its folder is called in two ways.
+TEST_F(Batches, namesOfMeshesAndFoldersDoNotMatterToScripts) {
+  writeFile(folder_ / "-t.obj", tetrahedron(1));
+  writeFile(folder_ / "then.hps", "mesh $mesh\ncontour output=$name.ply\n");
+  Call call = batch("-t.obj\n", coarseAnd({"--then", "then.hps"}));
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
+  call.words[4] = "./fields/../fields";
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped"));
+}
+
+/// A script that is left out leaves nothing to be done for a mesh for which it has failed, or at which a process died.
+TEST_F(Batches, recordsOfWholeFieldsSayBuilt) {
+  const std::string shape = "analytic:box";
+  writeFile(folder_ / "then.hps", "expect stats.leaves < 1\n");
+  EXPECT_THAT(statusesOf(run(batch(shape, coarseAnd({"--then", "then.hps"})))), ElementsAre("failed"));
+  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("skipped"));
+  EXPECT_EQ(Json::parse(readFile(recordOf(shape))).at("status"), "built");
+  std::string record = readFile(recordOf(shape));
+  const std::string built = R"("status": "built")";
+  ASSERT_THAT(record, HasSubstr(built));
+  writeFile(recordOf(shape), record.replace(record.find(built), built.size(), R"("status": "begun")"));
+  EXPECT_THAT(statusesOf(run(batch(shape, kCoarse))), ElementsAre("skipped"));
+  EXPECT_EQ(Json::parse(readFile(recordOf(shape))).at("status"), "built");
+}
+
+/// The mesh is away for a moment.
+TEST_F(Batches, failedMeshesKeepTheirFields) {
+  writeFile(folder_ / "t.obj", tetrahedron(1));
+  const Call call = batch("t.obj\n", kCoarse);
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("built"));
+  fs::rename(folder_ / "t.obj", folder_ / "away.obj");
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("failed"));
+  fs::rename(folder_ / "away.obj", folder_ / "t.obj");
+  EXPECT_THAT(statusesOf(run(call)), ElementsAre("skipped"));
 }
 
 TEST_F(Batches, recordsHoldWhatTheLinesHold) {
@@ -643,7 +704,7 @@ TEST_F(Batches, indexListsAllMeshes) {
   const Outcome outcome = run({.words = {"index", "fields", "--batch", "list"}, .folder = folder_.path()});
   EXPECT_EQ(outcome.status, 3);
   EXPECT_EQ(outcome.out, "fields/index.html: 4 meshes, 2 built, 1 failed, 1 missing\n");
-  EXPECT_THAT(outcome.err, HasSubstr("fields: 2 of 4 meshes have no field; the page says why"));
+  EXPECT_THAT(outcome.err, HasSubstr("fields: 2 of 4 meshes are not built; the page lists them"));
   std::map<std::string, Json> lines;
   std::istringstream text(readFile(fields() / "index.jsonl"));
   for (std::string line; std::getline(text, line);) {
@@ -657,6 +718,21 @@ TEST_F(Batches, indexListsAllMeshes) {
   const std::string page = readFile(fields() / "index.html");
   EXPECT_THAT(page, AllOf(HasSubstr("\".ply\""), HasSubstr("\"analytic:sphere\""), HasSubstr("<td>2</td>")));
   EXPECT_THAT(page, AllOf(HasSubstr("\\u003cbad>.obj"), Not(HasSubstr("<bad>")))) << "names end no element";
+}
+
+/// The name of the first mesh holds the hash of another, and the field of the second has gone.
+TEST_F(Batches, indexFindsTheFilesOfEachMesh) {
+  writeFile(folder_ / "scan-0123456789abcdef.v2.obj", tetrahedron(1));
+  const std::string scan = "scan-0123456789abcdef.v2.obj", gone = "analytic:box";
+  ASSERT_EQ(run(batch(scan + "\n" + gone + "\n", kCoarse)).status, 0);
+  writeFile(fields() / (nameOf(scan) + ".a-b.png"), "");
+  const std::string half = leftover(fieldOf(scan));
+  fs::remove(fieldOf(gone));
+  const Outcome outcome = run({.words = {"index", "fields"}, .folder = folder_.path()});
+  EXPECT_EQ(outcome.out, "fields/index.html: 2 meshes, 1 built, 1 missing\n");
+  EXPECT_EQ(outcome.status, 3);
+  EXPECT_THAT(readFile(fields() / "index.html"), HasSubstr(R"([".a-b.png",".hpsdf",".json"])"));
+  EXPECT_FALSE(fs::exists(half)) << "what a killed process has left";
 }
 
 TEST_F(Batches, indexOfAnotherFolderIsRefused) {

@@ -52,6 +52,15 @@ def workers_below(process: int) -> list[int]:
     return found
 
 
+def kill_one(process: int) -> bool:
+    """Kills one of the processes of the program among the children of a process. Returns false if there is none just now."""
+    for worker in workers_below(process):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(worker, signal.SIGKILL)
+            return True
+    return False
+
+
 def kill_tree(process: int) -> None:
     """Kills a process and all that it has started, none of which may end in order."""
     for victim in [process, *children_of(process)]:

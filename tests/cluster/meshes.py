@@ -34,7 +34,8 @@ def write_list(folder: pathlib.Path, count: int = COUNT) -> list[str]:
         else:
             lines.append(f"builtin:gear,teeth={4 + number // 4},segments={1 + number % 2}")
     assert len(set(lines)) == count
-    (folder / "list.txt").write_text("# the meshes of a test\n" + "\n".join(lines) + "\n")
+    # a byte order mark, comments, blanks and repetitions are passed over
+    (folder / "list.txt").write_text("\ufeff# the meshes of a test\n" + "\n\n".join([lines[0], *lines]) + "\r\n# their end\n")
     return lines
 
 

@@ -19,7 +19,7 @@ def test_a_killed_worker_loses_nothing(folder: pathlib.Path, plain: Plain, monke
     monkeypatch.chdir(folder)
     with engines.dask(folder) as cluster, distributed.Client(cluster.address) as client:
         client.wait_for_workers(2, timeout=60)
-        futures = client.map(dataset.build, plain[1], folder="fields", target_error=1e-4, grid=3, threads=1, pure=False)
+        futures = client.map(dataset.build, dataset.meshes("list.txt"), folder=str(folder / "fields"), target_error=1e-4, grid=3, threads=1, pure=False)
         engines.wait_until(lambda: engines.count_built(folder) > 20, "some fields are there")
         engines.kill_tree(cluster.workers[0].pid)
         records = client.gather(futures)

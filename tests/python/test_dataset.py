@@ -44,9 +44,11 @@ def test_what_concerns_all_meshes_is_raised(tmp_path: pathlib.Path) -> None:
         dataset.build("builtin:box", tmp_path / "fields", near_error=1e-3)
     with pytest.raises(hpsdf.Error, match="none.hps: no such file"):
         dataset.build("builtin:box", tmp_path / "fields", then=tmp_path / "none.hps")
-    for wrong in ("", " ", "a.obj\nb.obj"):
+    for wrong in ("", " ", " a.obj", "a.obj\r", "\ufeffa.obj", "#a.obj", "a.obj\nb.obj", "a\0b"):
         with pytest.raises(ValueError, match="mesh: "):
             dataset.build(wrong, tmp_path / "fields")
+    with pytest.raises(TypeError, match="output, part: not an option"):
+        dataset.build("builtin:box", tmp_path / "fields", output="other", part="1/2")
     assert not (tmp_path / "fields").exists()
 
 
@@ -69,12 +71,21 @@ def test_processes_build_at_once(tmp_path: pathlib.Path) -> None:
     assert len(dataset.records(tmp_path)) == 8
 
 
+def test_lists_are_read_as_the_program_reads_them(tmp_path: pathlib.Path) -> None:
+    (tmp_path / "list.txt").write_bytes(b"\xef\xbb\xbf# a list\n\n a.obj\t\r\nb c.obj\na.obj\n\xff.obj\n./#d.obj")
+    assert dataset.meshes(tmp_path / "list.txt") == ["a.obj", "b c.obj", os.fsdecode(b"\xff.obj"), "./#d.obj"]
+
+
 def test_tables_are_read_by_numpy(tmp_path: pathlib.Path) -> None:
     (tmp_path / "bad.obj").write_text("this is no mesh\n")
     for mesh in ("builtin:torus", "analytic:sphere", tmp_path / "bad.obj"):
         dataset.build(mesh, tmp_path / "fields", **OPTIONS)
-    (tmp_path / "fields" / "notes.json").write_text("[1]")
-    (tmp_path / "fields" / "half.json").write_text('{"status": ')
+    (tmp_path / "fields" / "notes.json").write_text('{"status": "built"}')
+    (tmp_path / "fields" / "notes-0123456789abcdef.json").write_text("[1]")
+    half = tmp_path / "fields" / "half-0123456789abcdef.json"
+    half.write_text('{"status": ')
+    assert {record["status"]: record["output"] for record in dataset.records(tmp_path / "fields")}["begun"] == str(half)[:-5] + ".hpsdf"
+    half.unlink()
     table = dataset.table(dataset.records(tmp_path / "fields"))
     numpy.save(tmp_path / "table.npy", table)
     again = numpy.load(tmp_path / "table.npy")

@@ -7,8 +7,11 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <ostream>
+#include <streambuf>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -55,21 +58,42 @@ struct FieldScript {
   std::string text = {};
 };
 
+/// Discards what is written to it.
+class Nowhere : public std::streambuf {
+ protected:
+  int_type overflow(int_type c) override { return traits_type::not_eof(c); }
+  std::streamsize xsputn(const char* /*text*/, std::streamsize count) override { return count; }
+};
+
+/// Returns the text with `name` in place of every occurrence of `value`.
+std::string replaced(std::string text, const std::string& value, std::string_view name) {
+  for (std::size_t at = text.find(value); at != std::string::npos; at = text.find(value, at + name.size()))
+    text.replace(at, value.size(), name);
+  return text;
+}
+
 class Batch {
  public:
   Batch(Session& session, const Arguments& arguments, const std::vector<BatchMesh>& meshes, FieldScript script,
         const fs::path& folder)
       : console_(session.console()),
+        registry_(session.registry()),
         arguments_(arguments),
         meshes_(meshes),
         script_(std::move(script)),
         folder_(folder),
-        silent_(nullptr),
-        scriptSession_(session.registry(), silently(session.console())) {}
+        silent_(&nowhere_) {}
 
-  /// Throws `Error` if the script has a mistake, which then concerns all meshes.
-  void checkScript() const {
-    if (!script_.file.empty() && !meshes_.empty()) scriptCalls(meshes_.front());
+  /// Throws `Error` if the script has a mistake, which then concerns all meshes, or writes the same file for each of
+  /// them. `list` is not empty.
+  void checkScript(const std::vector<BatchMesh>& list) const {
+    if (script_.file.empty()) return;
+    const std::vector<std::string> files = writtenBy(scriptCalls(list.front()));
+    if (list.size() == 1) return;
+    for (const std::string& file : writtenBy(scriptCalls(list[1])))
+      if (std::ranges::find(files, file) != files.end())
+        throw Error(ErrorKind::general, script_.file,
+                    file + " would be written for every mesh; begin its name with $name");
   }
 
   void run() {
@@ -100,6 +124,7 @@ class Batch {
     std::optional<CurrentField> field = {};
     Json madeFrom = {};
     Json then = {};
+    bool isRecorded = false;  ///< the record says already that all is built
     std::string error = {};
     bool errorNamesMesh = false;
     std::string missed = {};  ///< what the field misses of the errors that were asked for
@@ -111,11 +136,11 @@ class Batch {
   std::size_t count(Status status) const { return counts_[std::size_t(status)]; }
 
   /// Returns the console of the script's commands, whose reports nobody reads.
-  Console silently(const Console& console) {
-    Console silent{.in = console.in, .out = silent_, .err = console.err};
-    silent.meshReader = console.meshReader;
-    silent.meshes = console.meshes;
-    silent.listener = console.listener;
+  Console silently() {
+    Console silent{.in = console_.in, .out = silent_, .err = console_.err};
+    silent.meshReader = console_.meshReader;
+    silent.meshes = console_.meshes;
+    silent.listener = console_.listener;
     silent.writesProgress = false;
     return silent;
   }
@@ -151,8 +176,7 @@ class Batch {
     try {
       makeFiles(mesh, made);
     } catch (const Cancelled&) {
-      std::error_code ignored;
-      if (statusOf(readRecord(recordOf(mesh))) == kBegun) fs::remove(recordOf(mesh), ignored);  // nothing died here
+      forgetBegun(mesh, made);
       throw;
     } catch (const std::exception& error) {
       const auto* known = dynamic_cast<const Error*>(&error);
@@ -165,27 +189,42 @@ class Batch {
     return made;
   }
 
+  /// Undoes that the record says "begun" when the work is cancelled: no process has died. A field that is finished is
+  /// kept.
+  void forgetBegun(const BatchMesh& mesh, const Made& made) const {
+    if (statusOf(readRecord(recordOf(mesh))) != kBegun) return;
+    std::error_code ignored;
+    if (made.field)
+      writeRecord(mesh, lineOf(mesh, made, 0), made);
+    else
+      fs::remove(recordOf(mesh), ignored);
+  }
+
   /// Makes what is not there yet of the mesh's files: its field, and what the script writes. If it throws, `made` says
   /// how far it came.
   void makeFiles(const BatchMesh& mesh, Made& made) {
     const Json record = readRecord(recordOf(mesh));
     if (statusOf(record) == kBegun) removeAbandoned(mesh);
+    if (record.is_object()) made.madeFrom = record.value(kMadeFrom, Json());
     // The contents are taken before the mesh is read: if the file changes in between, the next run finds other
     // contents.
     const std::string content = contentOf(console_, mesh.surface);
     made.field = finished(mesh, record, content);
     made.status = made.field ? Status::skipped : Status::built;
-    if (!made.field) made.field = built(mesh);
+    if (!made.field) made.field = built(mesh, made.madeFrom);
     std::error_code ignored;
     fs::remove(checkpointOf(outputOf(mesh)), ignored);  // an old checkpoint would stop a build with other options
     made.madeFrom = madeFrom(mesh.surface, content, arguments_, outputOf(mesh));
+    made.isRecorded = made.status == Status::skipped && statusOf(record) == statusName(Status::built);
     if (script_.file.empty()) return;
     const std::vector<Call> calls = scriptCalls(mesh);
-    made.then = thenJson(calls);
-    if (made.status == Status::skipped && record.value(kThen, Json()) == made.then && allExist(made.then)) return;
+    const Json then = thenJson(mesh, calls);
+    if (made.isRecorded && record.value(kThen, Json()) == then && allExist(writtenBy(calls))) return;
+    made.isRecorded = false;
     made.status = Status::built;
-    writeBegun(recordOf(mesh), made.madeFrom);
+    writeBegun(recordOf(mesh), mesh.surface, outputOf(mesh), made.madeFrom);
     runFor(mesh, *made.field, calls);
+    made.then = then;
   }
 
   /// Returns the mesh's existing field if it is up to date, that is, if its record says that it was made of the present
@@ -205,12 +244,14 @@ class Batch {
   /// Removes the half-written files that a killed process left for this mesh.
   void removeAbandoned(const BatchMesh& mesh) const {
     const fs::path output = outputOf(mesh);
-    for (const fs::path& file : {output, recordOf(mesh), checkpointOf(output)}) OutputFile::removeAbandoned(file);
+    std::vector<std::string> files = {output, recordOf(mesh), checkpointOf(output)};
+    if (!script_.file.empty()) std::ranges::copy(writtenBy(scriptCalls(mesh)), std::back_inserter(files));
+    for (const std::string& file : files) OutputFile::removeAbandoned(file);
   }
 
-  CurrentField built(const BatchMesh& mesh) const {
+  CurrentField built(const BatchMesh& mesh, const Json& madeFromBefore) const {
     const fs::path output = outputOf(mesh);
-    writeBegun(recordOf(mesh), nullptr);  // first, because `checkWritable` writes a file
+    writeBegun(recordOf(mesh), mesh.surface, output, madeFromBefore);  // first, because `checkWritable` writes a file
     checkWritable(output);
     const fs::path checkpoint = arguments_.flag("checkpoint") ? checkpointOf(output) : fs::path();
     Field field = buildField(console_, mesh.surface, arguments_, checkpoint).field;
@@ -218,37 +259,62 @@ class Batch {
     return {std::move(field), output.string(), fs::file_size(output)};
   }
 
-  /// Returns the commands of the script for one mesh.
+  /// Returns the commands of the script for one mesh. Throws `Error` if they write the field or its record.
   std::vector<Call> scriptCalls(const BatchMesh& mesh) const {
-    return parseScript(scriptSession_.registry(), script_.file, script_.text,
-                       {{"mesh", mesh.surface}, {"field", outputOf(mesh).string()}, {"name", baseOf(mesh).string()}});
-  }
-
-  /// Returns what a record keeps of the script: its contents, and the files that it writes.
-  Json thenJson(const std::vector<Call>& calls) const {
-    Json files = Json::array();
+    const std::string output = outputOf(mesh).string();
+    const std::string surface = mesh.surface.starts_with('-') ? "./" + mesh.surface : mesh.surface;  // is no option
+    std::vector<Call> calls = parseScript(registry_, script_.file, script_.text,
+                                          {{"mesh", surface},
+                                           {"field", output},
+                                           {"name", baseOf(mesh).string()},
+                                           {"threads", std::to_string(arguments_.whole("threads"))}});
     for (const Call& call : calls)
-      for (const std::string& file : outputFiles(*call.command, call.arguments)) files.push_back(file);
-    return {{"script", contentOfBytes(script_.text)}, {"files", files}};
+      for (const std::string& file : outputFiles(*call.command, call.arguments))
+        for (const fs::path& own : {fs::path(output), recordOf(mesh), checkpointOf(output)})
+          if (fs::path(file).lexically_normal() == own.lexically_normal())
+            throw Error(ErrorKind::general, call.where, file + " belongs to the batch; give another name");
+    return calls;
   }
 
-  static bool allExist(const Json& then) {
-    return std::ranges::all_of(then.at("files"), [](const Json& file) { return fs::exists(file.get<std::string>()); });
+  static std::vector<std::string> writtenBy(const std::vector<Call>& calls) {
+    std::vector<std::string> files;
+    for (const Call& call : calls)
+      std::ranges::copy(outputFiles(*call.command, call.arguments), std::back_inserter(files));
+    return files;
   }
 
-  /// Runs the script for a field, which the script finds as its current one.
+  /// Returns what a record keeps of the script: its commands with all values. The names of the mesh's own files are
+  /// replaced, so that it does not matter how the folder is called.
+  Json thenJson(const BatchMesh& mesh, const std::vector<Call>& calls) const {
+    Json list = Json::array();
+    for (const Call& call : calls) {
+      Json values = Json::object();
+      for (const Parameter& parameter : call.command->parameters)
+        if (parameter.name != "threads" && call.arguments.given(parameter.name))
+          for (const std::string& value : call.arguments.texts(parameter.name))
+            values[parameter.name].push_back(replaced(value, baseOf(mesh).string(), "$name"));
+      list.push_back({{call.command->name, values}});
+    }
+    return Json::parse(jsonText(list));  // as a record of it is read: bytes that are not UTF-8 are replaced
+  }
+
+  static bool allExist(const std::vector<std::string>& files) {
+    return std::ranges::all_of(files, [](const std::string& file) { return fs::exists(file); });
+  }
+
+  /// Runs the script for a field, in a session of its own: what a script does for one mesh must not change what it does
+  /// for the next.
   void runFor(const BatchMesh& mesh, const CurrentField& field, const std::vector<Call>& calls) {
-    scriptSession_.forgetSurfaces();
-    scriptSession_.setField({field.field, field.name, field.fileBytes, mesh.surface});
-    runScript(scriptSession_, calls);
+    Session session(registry_, silently());
+    session.setField({field.field, field.name, field.fileBytes, mesh.surface});
+    runScript(session, calls);
   }
 
-  /// Reports what became of a mesh on the console and in its record. Nothing is written into the record of a mesh that
-  /// was skipped, which stays as it is.
+  /// Reports what became of a mesh on the console and in its record, unless that says so already.
   void finish(const BatchMesh& mesh, const Made& made, double seconds) const {
     const Json line = lineOf(mesh, made, seconds);
     try {
-      if (made.status != Status::skipped) writeRecord(mesh, line, made);
+      if (!made.isRecorded) writeRecord(mesh, line, made);
     } catch (const Error& error) {
       warn(console_, error.what());
     }
@@ -271,6 +337,7 @@ class Batch {
 
   /// Writes the record of a mesh: the values of `line`, and of what its field was made.
   void writeRecord(const BatchMesh& mesh, Json line, const Made& made) const {
+    if (made.field) line["status"] = statusName(Status::built);  // whichever process built it
     line[kMadeFrom] = made.madeFrom;
     line[kThen] = made.then;
     writeTextFile(recordOf(mesh), jsonText(line));
@@ -296,18 +363,21 @@ class Batch {
   }
 
   Console console_;
+  const Registry& registry_;
   const Arguments& arguments_;
   const std::vector<BatchMesh>& meshes_;
   FieldScript script_;
   fs::path folder_;
-  std::ostream silent_;    // writes nothing
-  Session scriptSession_;  // its renderer is kept from mesh to mesh
+  Nowhere nowhere_;
+  std::ostream silent_;  // discards what is written to it
   std::size_t done_ = 0;
   std::array<std::size_t, 3> counts_{};  // number of meshes for each `Status`
   std::size_t missed_ = 0;               // number of fields that miss the errors that were asked for
 };
 
-std::vector<BatchMesh> readList(const Console& console, const std::string& list) {
+}  // namespace
+
+std::vector<BatchMesh> readBatchList(const Console& console, const std::string& list) {
   const bool isStandardInput = list == "-";
   const std::string text = isStandardInput ? readText(console.in, "standard input") : readTextFile(list);
   try {
@@ -318,8 +388,6 @@ std::vector<BatchMesh> readList(const Console& console, const std::string& list)
     throw Error(fmt::format("{}: {}", isStandardInput ? "standard input" : list, error.what()));
   }
 }
-
-}  // namespace
 
 void checkBatch(const Arguments& arguments) {
   const bool many = arguments.has("batch");
@@ -332,14 +400,15 @@ void checkBatch(const Arguments& arguments) {
 
 void buildBatch(Session& session, const Arguments& arguments) {
   requireConsistent(arguments);
-  std::vector<BatchMesh> meshes = readList(session.console(), arguments.text("batch"));
-  if (arguments.has("part")) meshes = partOf(meshes, arguments.text("part"));
+  const std::vector<BatchMesh> list = readBatchList(session.console(), arguments.text("batch"));
+  const std::vector<BatchMesh> meshes = arguments.has("part") ? partOf(list, arguments.text("part")) : list;
   FieldScript script{.file = arguments.textOr("then", "")};
   if (!script.file.empty()) script.text = readTextFile(script.file);
   const InterruptGuard guard;  // on Ctrl-C, each file is written completely or not at all
   OutputFolder folder(arguments.text("output"));
   Batch batch(session, arguments, meshes, std::move(script), folder.path());
-  batch.checkScript();
+  batch.checkScript(list);
+  checkWritable(folder.path() / ".writable");  // a name that nobody uses; no file of that name appears
   folder.keep();
   batch.run();
 }

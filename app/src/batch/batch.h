@@ -1,9 +1,17 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
+#include "batch/batch_list.h"
 #include "language/registry.h"
 #include "session/session.h"
 
 namespace hpsdf::app {
+
+/// Reads a list of meshes from a file or, for "-", from the console's input. Throws `Error` that names the list if it
+/// cannot be read, has a zero byte or names no mesh.
+std::vector<BatchMesh> readBatchList(const Console& console, const std::string& list);
 
 /// Throws `Error` if the arguments of `build --batch` contradict each other.
 void checkBatch(const Arguments& arguments);

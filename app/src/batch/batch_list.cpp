@@ -48,8 +48,9 @@ Part parsePart(std::string_view text) {
     const auto number = partNumber(text.substr(0, slash)), count = partNumber(text.substr(slash + 1));
     if (number && count && *number >= 1 && *number <= *count) return {*number, *count};
   }
-  throw Error(
-      fmt::format("part: '{}' is no part of a list: expected K/N, such as 1/20 for the first of twenty parts", text));
+  throw Error(fmt::format(
+      "part: '{}' is no part of a list: expected K/N with K from 1 to N, such as 1/20 for the first of twenty parts",
+      text));
 }
 
 }  // namespace

@@ -5,17 +5,17 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <set>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "batch/batch.h"
 #include "batch/batch_list.h"
 #include "batch/mesh_record.h"
 #include "batch/set_page.h"
 #include "files/output_folder.h"
-#include "files/text_file.h"
 #include "hpsdf/app/failed.h"
+#include "hpsdf/detail/output_file.h"
 #include "session/session.h"
 #include "text/text.h"
 
@@ -27,54 +27,65 @@ namespace fs = std::filesystem;
 constexpr const char* kPage = "index.html";
 constexpr const char* kLines = "index.jsonl";
 constexpr std::string_view kRecordEnding = ".json";
+constexpr const char* kMissing = "missing";  ///< status of a mesh without a record, or without a field
 
-/// Returns the length of the name of a mesh's files (`BatchMesh::name`) with which the name of a file begins: up to the
-/// first dot behind a dash and the sixteen digits of a hash. Returns 0 for other files.
-std::size_t lengthOfName(std::string_view file) {
+/// Returns true if a file is called as the record of a mesh is: a dash, the sixteen digits of a hash, and .json at the
+/// end (`BatchMesh::name`).
+bool isNameOfRecord(std::string_view file) {
   constexpr std::size_t kDigits = 16;
-  for (std::size_t dash = file.find('-'); dash != std::string_view::npos; dash = file.find('-', dash + 1)) {
-    const std::size_t end = dash + 1 + kDigits;
-    const std::string_view digits = file.substr(dash + 1, kDigits);
-    if (end < file.size() && file[end] == '.' && digits.find_first_not_of("0123456789abcdef") == std::string_view::npos)
-      return end;
-  }
-  return 0;
+  if (!file.ends_with(kRecordEnding)) return false;
+  file.remove_suffix(kRecordEnding.size());
+  if (file.size() <= kDigits || file[file.size() - kDigits - 1] != '-') return false;
+  return file.substr(file.size() - kDigits).find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
-/// Returns the endings of the files in a folder, by the names before the endings.
-std::map<std::string, std::vector<std::string>> endingsIn(const fs::path& folder) {
-  std::map<std::string, std::vector<std::string>> endings;
+/// Returns the names of the regular files in a folder.
+std::vector<std::string> filesIn(const fs::path& folder) {
+  std::vector<std::string> files;
   try {
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      const std::string file = entry.path().filename();
-      const std::size_t length = lengthOfName(file);
-      if (length > 0 && entry.is_regular_file()) endings[file.substr(0, length)].push_back(file.substr(length));
-    }
+    for (const auto& entry : fs::directory_iterator(folder))
+      if (entry.is_regular_file()) files.push_back(entry.path().filename());
   } catch (const fs::filesystem_error& error) {
     throw Error(ErrorKind::file, folder.string(),
                 fmt::format("cannot be read ({}); name the folder of a batch", error.code().message()));
   }
-  for (auto& [name, list] : endings) std::ranges::sort(list);
-  return endings;
+  std::ranges::sort(files);
+  return files;
 }
 
-/// Returns the meshes of which the folder holds a record, in the order of their names.
-std::vector<SetMesh> meshesIn(const fs::path& folder) {
-  std::vector<SetMesh> meshes;
-  for (auto& [name, endings] : endingsIn(folder)) {
-    if (std::ranges::find(endings, kRecordEnding) == endings.end()) continue;
-    Json record = readRecord(folder / (name + std::string(kRecordEnding)));
-    if (!statusOf(record).empty()) meshes.push_back({std::move(record), name, std::move(endings)});
+/// Returns the meshes of which the folder holds a record, by their names. A mesh whose field has gone is missing.
+std::map<std::string, SetMesh> meshesIn(const fs::path& folder) {
+  const std::vector<std::string> files = filesIn(folder);
+  std::map<std::string, SetMesh> meshes;
+  for (const std::string& file : files) {
+    if (!isNameOfRecord(file)) continue;
+    const std::string name = file.substr(0, file.size() - kRecordEnding.size());
+    Json record = readRecord(folder / file);
+    if (!statusOf(record).empty()) meshes[name] = {std::move(record), name, {}};
   }
+  for (const std::string& file : files)
+    for (std::size_t dot = file.rfind('.'); dot != std::string::npos && dot > 0; dot = file.rfind('.', dot - 1))
+      if (const auto mesh = meshes.find(file.substr(0, dot)); mesh != meshes.end()) {
+        // Files with .part- in their names are being written, or a killed process has left them (output_file.h).
+        if (file.find(".part-", dot) == std::string::npos) mesh->second.endings.push_back(file.substr(dot));
+        break;  // the longest name that fits
+      }
+  for (auto& [name, mesh] : meshes)
+    if (statusOf(mesh.record) == "built" && std::ranges::find(mesh.endings, ".hpsdf") == mesh.endings.end())
+      mesh.record["status"] = kMissing;
   return meshes;
 }
 
-/// Adds the meshes of the list that have no record, with the status "missing".
-void addMissing(std::vector<SetMesh>& meshes, const std::string& list) {
-  std::set<std::string> known;
-  for (const SetMesh& mesh : meshes) known.insert(mesh.name);
-  for (const BatchMesh& mesh : parseBatchList(readTextFile(list)))
-    if (!known.contains(mesh.name)) meshes.push_back({{{"file", mesh.surface}, {"status", "missing"}}, mesh.name, {}});
+/// Returns the meshes of the list, those without a record with the status kMissing.
+std::vector<SetMesh> meshesOfList(std::map<std::string, SetMesh> known, const std::vector<BatchMesh>& list) {
+  std::vector<SetMesh> meshes;
+  for (const BatchMesh& mesh : list) {
+    if (const auto found = known.find(mesh.name); found != known.end())
+      meshes.push_back(std::move(found->second));
+    else
+      meshes.push_back({{{"file", mesh.surface}, {"status", kMissing}}, mesh.name, {}});
+  }
+  return meshes;
 }
 
 std::string linesOf(const std::vector<SetMesh>& meshes) {
@@ -90,9 +101,14 @@ std::string linesOf(const std::vector<SetMesh>& meshes) {
 
 void runIndex(Session& session, const Arguments& arguments) {
   const fs::path folder = arguments.text("folder");
-  std::vector<SetMesh> meshes = meshesIn(folder);
-  if (arguments.has("batch")) addMissing(meshes, arguments.text("batch"));
+  std::map<std::string, SetMesh> known = meshesIn(folder);
+  std::vector<SetMesh> meshes;
+  if (arguments.has("batch"))
+    meshes = meshesOfList(std::move(known), readBatchList(session.console(), arguments.text("batch")));
+  else
+    for (auto& [name, mesh] : known) meshes.push_back(std::move(mesh));
   if (meshes.empty()) throw Error(folder.string() + ": holds no field of a batch; name the folder of 'build --batch'");
+  OutputFile::removeAllAbandoned(folder);
   std::map<std::string, std::size_t> counts;
   for (const SetMesh& mesh : meshes) ++counts[statusOf(mesh.record)];
 
@@ -110,9 +126,9 @@ void runIndex(Session& session, const Arguments& arguments) {
     session.console().out << text << "\n";
   }
   if (const std::size_t unfinished = meshes.size() - counts["built"]; unfinished > 0)
-    throw Failed(
-        fmt::format("{}: {} of {} meshes have no field; the page says why", folder.string(), unfinished, meshes.size()),
-        kExitPartlyFailed);
+    throw Failed(fmt::format("{}: {} of {} meshes are not built; the page lists them", folder.string(), unfinished,
+                             meshes.size()),
+                 kExitPartlyFailed);
 }
 
 }  // namespace
@@ -126,11 +142,12 @@ FOLDER is the folder of fields that 'build --batch' has built. Two files are wri
 meshes with their pictures, if the script of --then has drawn some, with figures, errors, a search and links to the files;
 it needs no network. index.jsonl holds the same figures, one line of JSON for each mesh.
 
-With --batch, meshes of the list for which the folder has no record are listed as missing. The exit status is 3 if a mesh
-is missing, has failed, or ended the process that was at work on it (begun), and 0 otherwise.)"),
+With --batch, the page holds the meshes of the list, and those for which the folder has no field are listed as missing. The
+exit status is 3 if a mesh is missing, has failed, or is begun, that is, a process is at work on it or has died at it; it is
+0 otherwise. Half-written files that killed processes have left in the folder are removed.)"),
       .examples = {"hpsdf index fields", "hpsdf index fields --batch list.txt"},
       .parameters = {{"folder", text("FOLDER").positional().required(), "Folder of the fields."},
-                     {"batch", file("LIST"), "List of meshes, as of 'build --batch', of which none may be missing."}},
+                     {"batch", file("LIST"), "List of meshes, as of 'build --batch'; - is standard input."}},
       .action = runIndex,
   });
 }

@@ -63,9 +63,9 @@ Json readRecord(const fs::path& file) {
   }
 }
 
-void writeBegun(const fs::path& file, const Json& madeFrom) {
+void writeBegun(const fs::path& file, const std::string& surface, const fs::path& output, const Json& madeFrom) {
   if (fs::is_directory(file)) throw Error(ErrorKind::file, file.string(), "is a folder; give a file name");
-  const Json record = {{"status", kBegun}, {kMadeFrom, madeFrom}};
+  const Json record = {{"file", surface}, {"output", output.string()}, {"status", kBegun}, {kMadeFrom, madeFrom}};
   if (!(std::ofstream(file) << jsonText(record) << std::flush))
     throw Error(ErrorKind::file, file.string(), "cannot be written; check the folder's permissions and the disk");
 }
@@ -91,10 +91,6 @@ std::string contentOf(const Console& console, const std::string& surface) {
     hash = XXH3_64bits_withSeed(piece.data(), std::size_t(file.gcount()), hash);
   }
   return file.eof() ? fmt::format("bytes {:016x}", hash) : std::string();
-}
-
-std::string contentOfBytes(std::string_view bytes) {
-  return fmt::format("bytes {:016x}", XXH3_64bits(bytes.data(), bytes.size()));
 }
 
 Json madeFrom(const std::string& surface, const std::string& content, const Arguments& arguments,

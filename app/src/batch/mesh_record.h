@@ -12,7 +12,7 @@ namespace hpsdf::app {
 
 // Keys of a record besides those of the line that a batch prints for the mesh (docs/batch.md).
 constexpr const char* kMadeFrom = "made_from";  ///< of what the field was made
-constexpr const char* kThen = "then";           ///< the script that was run for the field, and the files it wrote
+constexpr const char* kThen = "then";           ///< the commands of the script that was run for the field
 
 /// The status of a mesh on which a process is at work. The record of a process that died keeps it.
 constexpr const char* kBegun = "begun";
@@ -21,10 +21,11 @@ constexpr const char* kBegun = "begun";
 /// status `kBegun`: a process died while it wrote it.
 Json readRecord(const std::filesystem::path& file);
 
-/// Writes a record with the status `kBegun`. It is written at its place, not under another name first, so that a
-/// process which dies meanwhile leaves nothing that the record does not tell of. Throws `Error` if it cannot be
-/// written.
-void writeBegun(const std::filesystem::path& file, const Json& madeFrom);
+/// Writes a record with the status `kBegun` for a mesh and its field's file. The record is written at its place, not
+/// under another name first, so that a process which dies meanwhile leaves nothing that the record does not tell of.
+/// Throws `Error` if it cannot be written.
+void writeBegun(const std::filesystem::path& file, const std::string& surface, const std::filesystem::path& output,
+                const Json& madeFrom);
 
 /// Returns the text with the key `status` of a record, or "" for null.
 std::string statusOf(const Json& record);
@@ -32,9 +33,6 @@ std::string statusOf(const Json& record);
 /// Returns a text that identifies the contents of a mesh file: a hash of the file's bytes. For glTF, whose files may
 /// refer to other files, the imported mesh is hashed instead. Returns "" if the file cannot be read.
 std::string contentOf(const Console& console, const std::string& surface);
-
-/// Returns a text that identifies some bytes: their hash.
-std::string contentOfBytes(std::string_view bytes);
 
 /// Returns of what a field is made: the version of the program, the contents of its mesh (from `contentOf`), the
 /// options of the construction, and the checksum of the field's file. Equal values mean that the same field would come

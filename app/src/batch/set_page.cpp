@@ -27,7 +27,8 @@ body { max-width: none; }
 #meshes th button { all: unset; cursor: pointer; }
 #meshes th button:focus-visible { outline: 2px solid var(--bar); }
 #meshes img { display: block; height: 5.5rem; border-radius: 4px; }
-#meshes .files a { margin-right: .5rem; }
+#meshes .files a { display: inline-block; margin-right: .5rem; }
+#meshes td.file { min-width: 16rem; }
 #meshes td.told { font-weight: 600; }
 #meshes small { display: block; color: var(--quiet); overflow-wrap: anywhere; }
 )";
@@ -67,6 +68,7 @@ function row(mesh) {
     const value = of(mesh);
     return element('td', value === null ? '–' : number ? number(value) : value, number ? 'number' : '');
   });
+  cells[0].className = 'file';
   cells[0].append(element('small', mesh.name));
   if (mesh.told !== null) {
     cells[1].className = 'told';
@@ -200,7 +202,7 @@ std::string setPage(const std::string& title, const std::vector<SetMesh>& meshes
     choices += fmt::format("<option value=\"{0}\">{0}</option>", render::escapedMarkup(status));
   }
   html += htmlFact("fields, all files", bytesText(sumOf(meshes, "file_bytes")));
-  html += htmlFact("work", durationText(sumOf(meshes, "seconds")));
+  html += htmlFact("time of all processes", durationText(sumOf(meshes, "seconds")));
   html += htmlFact("RMS error near the surface", errorsText(meshes));
   html += fmt::format(
       "</table>\n<noscript>The table of meshes needs JavaScript.</noscript>\n<div class=\"choices\">"

@@ -149,8 +149,8 @@ const std::vector<Parameter> kBuildFiles = {
      "different parts may work at once, on several machines."},
     {"then", file("SCRIPT").under(kFiles),
      "Script that runs for every field of the list, with the field as its current one: it writes samples, a contour or "
-     "pictures. Its variables are $mesh, $field (the field's file) and $name (that file without its ending). It runs "
-     "again where a file that it writes is missing, or where the script has changed."},
+     "pictures. Its variables are $mesh, $field (the field's file), $name (that file without its ending) and $threads. "
+     "It runs again where a file that it writes is missing, or where the script has changed."},
     compressParameter()};
 
 void addBuildCommand(Registry& registry) {

@@ -44,17 +44,21 @@ std::string beginningOfTemporaries(const std::filesystem::path& file) {
   return name + std::string(kTemporary);
 }
 
-/// Returns a hash of this machine's name as hexadecimal digits. Several machines may write to one folder.
+/// Returns a hash of this machine's name, and of the container in which process ids are counted, as hexadecimal digits.
+/// Several machines may write to one folder.
 const std::string& thisMachine() {
-  static const std::string machine = [] {
+  static const std::string hash = [] {
     std::array<char, 256> name{};
     gethostname(name.data(), name.size() - 1);
+    std::error_code ignored;
+    const std::string machine =
+        std::string(name.data()) + std::filesystem::read_symlink("/proc/self/ns/pid", ignored).string();
     std::array<char, 17> digits{};
     std::snprintf(digits.data(), digits.size(), "%016llx",
-                  static_cast<unsigned long long>(XXH3_64bits(name.data(), std::strlen(name.data()))));
+                  static_cast<unsigned long long>(XXH3_64bits(machine.data(), machine.size())));
     return std::string(digits.data(), 8);
   }();
-  return machine;
+  return hash;
 }
 
 /// Returns a name for a temporary file in the folder of `file`. The name contains the machine, the process id and a
@@ -114,15 +118,14 @@ struct Writer {
   pid_t process = 0;
 };
 
-/// Returns the writer of the temporary file `name`, which is part of this name. Returns std::nullopt if `name` is not
-/// the name of a temporary file of `file`.
-std::optional<Writer> writerOf(const std::filesystem::path& name, const std::filesystem::path& file) {
-  const std::string text = name.filename(), before = beginningOfTemporaries(file);
-  if (!text.starts_with(before)) return std::nullopt;
-  const std::size_t dash = text.find('-', before.size());
+/// Returns the writer of the temporary file `name`, whose name begins with `beginning`. Returns std::nullopt if it is
+/// not the name of such a file.
+std::optional<Writer> writerOf(const std::string& name, std::string_view beginning) {
+  if (!name.starts_with(beginning)) return std::nullopt;
+  const std::size_t dash = name.find('-', beginning.size());
   if (dash == std::string::npos) return std::nullopt;
-  Writer writer{.machine = text.substr(before.size(), dash - before.size())};
-  const auto [end, error] = std::from_chars(text.data() + dash + 1, text.data() + text.size(), writer.process);
+  Writer writer{.machine = name.substr(beginning.size(), dash - beginning.size())};
+  const auto [end, error] = std::from_chars(name.data() + dash + 1, name.data() + name.size(), writer.process);
   if (error != std::errc() || writer.process <= 0 || *end != '-') return std::nullopt;
   return writer;
 }
@@ -140,17 +143,36 @@ bool isAbandoned(const std::filesystem::path& temporary, const Writer& writer) {
 
 }  // namespace
 
-void OutputFile::removeAbandoned(const std::filesystem::path& file) {
-  const std::filesystem::path target = resolved(file);
-  const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
+namespace {
+
+/// Removes the abandoned temporary files of a folder. `beginningOf(name)` returns how the name of a temporary file
+/// begins, up to and with `kTemporary`, or "" for a file that is to stay.
+template <typename BeginningOf>
+void removeAbandonedIn(const std::filesystem::path& folder, const BeginningOf& beginningOf) {
   std::error_code ignored;
   std::vector<std::filesystem::path> abandoned;
   for (std::filesystem::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
-    const std::optional<Writer> writer = writerOf(entry->path(), target);
-    if (!writer || isOurs(entry->path().filename())) continue;
-    if (isAbandoned(entry->path(), *writer)) abandoned.push_back(entry->path());
+    const std::string name = entry->path().filename(), beginning = beginningOf(name);
+    const std::optional<Writer> writer = beginning.empty() ? std::nullopt : writerOf(name, beginning);
+    if (writer && !isOurs(name) && isAbandoned(entry->path(), *writer)) abandoned.push_back(entry->path());
   }
   for (const std::filesystem::path& name : abandoned) std::filesystem::remove(name, ignored);
+}
+
+}  // namespace
+
+void OutputFile::removeAbandoned(const std::filesystem::path& file) {
+  const std::filesystem::path target = resolved(file);
+  const std::string beginning = beginningOfTemporaries(target);
+  removeAbandonedIn(target.has_parent_path() ? target.parent_path() : ".",
+                    [&](const std::string& /*name*/) { return beginning; });
+}
+
+void OutputFile::removeAllAbandoned(const std::filesystem::path& folder) {
+  removeAbandonedIn(folder, [](const std::string& name) {
+    const std::size_t at = name.rfind(kTemporary);
+    return at == std::string::npos ? std::string() : name.substr(0, at + kTemporary.size());
+  });
 }
 
 void OutputFile::removeUnfinished() noexcept {

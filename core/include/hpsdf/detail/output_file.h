@@ -42,6 +42,8 @@ class OutputFile {
   /// Removes temporary files that earlier writers of `file` left in the folder of `file`: those of processes of this
   /// machine that no longer run, and those of other machines that nobody has changed for a day.
   static void removeAbandoned(const std::filesystem::path& file);
+  /// Removes such temporary files of any file of a folder.
+  static void removeAllAbandoned(const std::filesystem::path& folder);
 
  private:
   [[noreturn]] void fail();
