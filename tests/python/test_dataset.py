@@ -6,6 +6,7 @@ import os
 import pathlib
 import pickle
 from collections.abc import Callable
+from typing import Any
 
 import numpy
 import pytest
@@ -13,7 +14,7 @@ import pytest
 import hpsdf
 import hpsdf.dataset as dataset
 
-OPTIONS = {"target_error": 1e-3, "grid": 2}
+OPTIONS: dict[str, Any] = {"target_error": 1e-3, "grid": 2}
 
 
 def test_the_files_are_those_of_the_program(tmp_path: pathlib.Path, program: Callable[..., str]) -> None:
@@ -78,7 +79,7 @@ def test_lists_are_read_as_the_program_reads_them(tmp_path: pathlib.Path) -> Non
 
 def test_tables_are_read_by_numpy(tmp_path: pathlib.Path) -> None:
     (tmp_path / "bad.obj").write_text("this is no mesh\n")
-    for mesh in ("builtin:torus", "analytic:sphere", tmp_path / "bad.obj"):
+    for mesh in ("builtin:torus", "analytic:sphere", str(tmp_path / "bad.obj")):
         dataset.build(mesh, tmp_path / "fields", **OPTIONS)
     (tmp_path / "fields" / "notes.json").write_text('{"status": "built"}')
     (tmp_path / "fields" / "notes-0123456789abcdef.json").write_text("[1]")

@@ -132,6 +132,7 @@ def test_notebooks(notebook: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> N
     if "torch" in notebook.read_text(encoding="utf-8"):
         package("torch")
     monkeypatch.delenv("PYTEST_CURRENT_TEST", raising=False)
+    monkeypatch.setenv("PYTHONWARNINGS", "ignore:IProgress not found")  # PyTorch's, where tqdm is there without widgets
     book = nbformat.read(notebook, as_version=4)
     assert all(not cell.get("outputs") for cell in book.cells), "notebooks are kept without their outputs"
     words = [len(cell.source.split()) for cell in book.cells if cell.cell_type == "markdown"]
