@@ -521,9 +521,11 @@ TEST_F(Batches, folderIsSearchedOnlyAfterAProcessDied) {
 TEST_F(Batches, meshesAtWhichAProcessDiedComeLast) {
   const std::string list = "builtin:gear\nanalytic:box\nanalytic:sphere\n";
   Process process(batch(list, {"--target-error", "1e-8"}));
-  ASSERT_TRUE(process.sendWhen([&] { return fs::exists(recordOf("builtin:gear")); }, SIGKILL));
+  const fs::path record = recordOf("builtin:gear");
+  const auto isWritten = [&] { return fs::exists(record) && Json::accept(readFile(record)); };
+  ASSERT_TRUE(process.sendWhen(isWritten, SIGKILL));
   EXPECT_EQ(process.finish().status, -SIGKILL);
-  EXPECT_EQ(Json::parse(readFile(recordOf("builtin:gear"))).at("status"), "begun");
+  EXPECT_EQ(Json::parse(readFile(record)).at("status"), "begun");
   std::vector<std::string> order;
   for (const Json& line : linesOf(run(batch(list, kCoarse)))) order.push_back(line.at("file"));
   EXPECT_THAT(order, ElementsAre("analytic:box", "analytic:sphere", "builtin:gear"));
