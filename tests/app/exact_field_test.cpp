@@ -116,7 +116,10 @@ const std::multimap<std::string, std::string> kTrials = {
     {"redo", "color degree; undo; redo; shot output=$out/shot.png"},
     {"copy-view", "cells lines degrees=exact; copy-view output=$out/view.hps"},
     {"settings", "settings strategy=hpx target-error=1e-2; rebuild; save output=$out/f.hpsdf"},
-    {"rebuild", "rebuild max-steps=10; save output=$out/f.hpsdf"},
+    {"apply", "apply max-steps=10; save output=$out/f.hpsdf"},
+    {"rebuild",
+     "rebuild before=builtin:gear,teeth=3,segments=1 after=builtin:gear,teeth=3,segments=1,hole=0.28 "
+     "output=$out/f.hpsdf; expect stats.exact_leaves.leaves > 0"},
     {"shot", "show slice; shot output=$out/shot.png; pick 60,50"},
     {"ui", "show slice size=480x360; panel all=true; ui hover canvas; ui wheel canvas 1; shot output=$out/shot.png"},
     {"report", "report samples=1 cpu=$cpu output=$out/report"},

@@ -321,7 +321,7 @@ TEST(ExplorerFiles, aRebuiltFieldIsComparedWithTheOneBeforeIt) {
   ASSERT_TRUE(bench.explorer().pictureBeside());
   bench.run("color difference other=kept ; beside none");
   EXPECT_NO_THROW(bench.explorer().frame());
-  bench.run("rebuild");
+  bench.run("apply");
   EXPECT_EQ(error(bench.session.other("kept").field), 1e-2) << "it is kept until another one is";
 }
 

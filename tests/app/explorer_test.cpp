@@ -476,20 +476,20 @@ TEST(Explorer, aRebuildUnchangedIsTheSameField) {
   Bench bench;
   bench.run("build builtin:gear strategy=hp target-error=1e-3 margin=0.2 grid=3,4,5 nearness=2 max-depth=4");
   const FieldData before = bench.session.current().field.data();
-  bench.run("rebuild");
+  bench.run("apply");
   EXPECT_EQ(bench.session.current().field.data().nodes, before.nodes);
   EXPECT_EQ(bench.session.current().field.data().coefficients, before.coefficients);
-  bench.run("rebuild max-steps=3");
+  bench.run("apply max-steps=3");
   EXPECT_EQ(bench.session.current().field.metadata().steps, 3u);
   EXPECT_EQ(bench.explorer().allSteps(), before.metadata.steps) << "the slider keeps its length";
-  bench.run("rebuild");
+  bench.run("apply");
   EXPECT_EQ(bench.session.current().field.data().nodes, before.nodes);
   bench.run("settings mesh=builtin:torus ; rebuild");
   EXPECT_EQ(bench.session.current().field.metadata().source.name, "builtin:torus");
-  bench.run("settings max-steps=9 ; rebuild max-steps=2");
-  EXPECT_EQ(bench.session.current().field.metadata().steps, 2u) << "what rebuild is given wins";
+  bench.run("settings max-steps=9 ; apply max-steps=2");
+  EXPECT_EQ(bench.session.current().field.metadata().steps, 2u) << "what apply is given wins";
   bench.run("build analytic:sphere target-error=1e-2 coefficients=double ; settings max-steps=9 mesh=analytic:sphere");
-  bench.run("rebuild");
+  bench.run("apply");
   EXPECT_FALSE(bench.session.current().field.singlePrecision());
 }
 
@@ -497,7 +497,7 @@ TEST(Explorer, aRebuildKeepsContinuity) {
   Bench bench;
   bench.run("build analytic:torus target-error=1e-3 enrich=true continuity=weak continuity-weight=0.5");
   const FieldData before = bench.session.current().field.data();
-  bench.run("rebuild");
+  bench.run("apply");
   const Field& again = bench.session.current().field;
   EXPECT_EQ(again.data().coefficients, before.coefficients);
   EXPECT_TRUE(again.metadata().settings.enrich);

@@ -385,7 +385,7 @@ TEST(LiveWork, showsTheFieldBeforeDuringARebuild) {
   };
   LiveWork work(explorer, refresh, {.seconds = 0, .share = 1});
   desk.run("settings target-error=1e-30");
-  EXPECT_THROW(explorer.run("rebuild"), Cancelled);
+  EXPECT_THROW(explorer.run("apply"), Cancelled);
 }
 
 TEST(LiveWork, aConstructionThatFailsLeavesNoMesh) {
@@ -425,11 +425,11 @@ TEST(LiveWork, escapeCancelsWhileThePanelIsClosed) {
   LiveWork work(desk.explorer(), [&] {
     if (cancels) desk.key(Key::escape);
   });
-  EXPECT_THROW(desk.explorer().run("rebuild"), Cancelled);
+  EXPECT_THROW(desk.explorer().run("apply"), Cancelled);
   // After the cancelled construction, the next one runs to its end.
   cancels = false;
   desk.run("settings target-error=1e-3");
-  EXPECT_NO_THROW(desk.explorer().run("rebuild"));
+  EXPECT_NO_THROW(desk.explorer().run("apply"));
 }
 
 TEST(LiveWork, measurementsForAFrameCannotBeCancelled) {

@@ -262,7 +262,7 @@ TEST(Panels, tellThatSettingsAreNotThoseOfTheField) {
   EXPECT_EQ(below(), without) << "the field has these settings already";
   bench.run("settings target-error=1e-4");
   EXPECT_GT(below(), without + 5) << "a line stands above the slider";
-  bench.run("rebuild");
+  bench.run("apply");
   EXPECT_EQ(below(), without);
 }
 

@@ -361,7 +361,7 @@ TEST_F(WindowTest, aConstructionIsCancelledAndMistakesLeaveItOpen) {
   EXPECT_THAT(window_->err(), HasSubstr("many"));
   const std::string script = contents(file("session.hps"));
   EXPECT_THAT(script, HasSubstr("settings target-error=1e-30\n"));
-  EXPECT_THAT(script, Not(HasSubstr("rebuild")));
+  EXPECT_THAT(script, Not(HasSubstr("apply")));
   EXPECT_THAT(script, Not(HasSubstr("many")));
   ASSERT_EQ(program({"run", "-e", "include session.hps", "-e", "shot output=replay.png"}), 0) << said_;
   EXPECT_TRUE(contents(file("replay.png")) == contents(file("last.png")));

@@ -48,7 +48,7 @@ enum class Status : std::uint8_t {
 };
 
 std::string statusName(Status status) {
-  constexpr std::array kNames = {"built", "skipped", "failed"};
+  constexpr std::array kNames = {kBuilt, kSkipped, kFailed};
   return kNames[std::size_t(status)];
 }
 
@@ -215,7 +215,7 @@ class Batch {
     std::error_code ignored;
     fs::remove(checkpointOf(outputOf(mesh)), ignored);  // an old checkpoint would stop a build with other options
     made.madeFrom = madeFrom(mesh.surface, content, arguments_, outputOf(mesh));
-    made.isRecorded = made.status == Status::skipped && statusOf(record) == statusName(Status::built);
+    made.isRecorded = made.status == Status::skipped && statusOf(record) == kBuilt;
     if (script_.file.empty()) return;
     const std::vector<Call> calls = scriptCalls(mesh);
     const Json then = thenJson(mesh, calls);
@@ -330,14 +330,14 @@ class Batch {
     }
     console_.err << std::flush;
     // Each line of the output is written in one call, so that the lines of several processes do not mix.
-    console_.out << line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n" << std::flush;
+    console_.out << jsonLine(line) << std::flush;
     const std::string output = outputOf(mesh).string();
     requireWritten(console_.out, std::span(&output, made.status == Status::failed ? 0 : 1));
   }
 
   /// Writes the record of a mesh: the values of `line`, and of what its field was made.
   void writeRecord(const BatchMesh& mesh, Json line, const Made& made) const {
-    if (made.field) line["status"] = statusName(Status::built);  // whichever process built it
+    if (made.field) line["status"] = kBuilt;  // whichever process built it
     line[kMadeFrom] = made.madeFrom;
     line[kThen] = made.then;
     writeTextFile(recordOf(mesh), jsonText(line));

@@ -27,7 +27,6 @@ namespace fs = std::filesystem;
 constexpr const char* kPage = "index.html";
 constexpr const char* kLines = "index.jsonl";
 constexpr std::string_view kRecordEnding = ".json";
-constexpr const char* kMissing = "missing";  ///< status of a mesh without a record, or without a field
 
 /// Returns true if a file is called as the record of a mesh is: a dash, the sixteen digits of a hash, and .json at the
 /// end (`BatchMesh::name`).
@@ -71,7 +70,7 @@ std::map<std::string, SetMesh> meshesIn(const fs::path& folder) {
         break;  // the longest name that fits
       }
   for (auto& [name, mesh] : meshes)
-    if (statusOf(mesh.record) == "built" && std::ranges::find(mesh.endings, ".hpsdf") == mesh.endings.end())
+    if (statusOf(mesh.record) == kBuilt && std::ranges::find(mesh.endings, ".hpsdf") == mesh.endings.end())
       mesh.record["status"] = kMissing;
   return meshes;
 }
@@ -94,7 +93,7 @@ std::string linesOf(const std::vector<SetMesh>& meshes) {
     Json line = mesh.record;
     line.erase(kMadeFrom);
     line.erase(kThen);
-    lines += line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    lines += jsonLine(line);
   }
   return lines;
 }
@@ -125,7 +124,7 @@ void runIndex(Session& session, const Arguments& arguments) {
     for (const auto& [status, count] : counts) text += fmt::format(", {} {}", grouped(count), status);
     session.console().out << text << "\n";
   }
-  if (const std::size_t unfinished = meshes.size() - counts["built"]; unfinished > 0)
+  if (const std::size_t unfinished = meshes.size() - counts[kBuilt]; unfinished > 0)
     throw Failed(fmt::format("{}: {} of {} meshes are not built; the page lists them", folder.string(), unfinished,
                              meshes.size()),
                  kExitPartlyFailed);

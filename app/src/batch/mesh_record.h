@@ -14,8 +14,13 @@ namespace hpsdf::app {
 constexpr const char* kMadeFrom = "made_from";  ///< of what the field was made
 constexpr const char* kThen = "then";           ///< the commands of the script that was run for the field
 
-/// The status of a mesh on which a process is at work. The record of a process that died keeps it.
-constexpr const char* kBegun = "begun";
+// The words for the status of a mesh. A record has one of the first three; the line that a batch prints has kBuilt,
+// kSkipped or kFailed; the index of a folder has all of those of records, and kMissing.
+constexpr const char* kBegun = "begun";      ///< a process is at work on the mesh, or has died at it
+constexpr const char* kBuilt = "built";      ///< the field and what the script writes are there
+constexpr const char* kFailed = "failed";    ///< an error that the record tells
+constexpr const char* kSkipped = "skipped";  ///< all was there already
+constexpr const char* kMissing = "missing";  ///< there is no record, or no field
 
 /// Returns the record in `file`. Returns null if there is none that can be read. A record that is cut off has the
 /// status `kBegun`: a process died while it wrote it.

@@ -181,8 +181,8 @@ Json shownJson(const SetMesh& mesh) {
 
 /// Returns JSON that may stand in a <script> element: nothing in it ends the element.
 std::string scriptJson(const Json& json) {
-  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace), safe;
-  for (const char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
+  std::string safe;
+  for (const char c : jsonLine(json)) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
   return safe;
 }
 

@@ -176,8 +176,7 @@ std::string xmlText(const std::string& text) {
   std::string printable = text;
   for (char& c : printable)
     if (static_cast<unsigned char>(c) < 0x20) c = ' ';
-  const std::string valid = Json(printable).dump(-1, ' ', false, Json::error_handler_t::replace);
-  return render::escapedMarkup(Json::parse(valid).get<std::string>());
+  return render::escapedMarkup(Json::parse(jsonLine(printable)).get<std::string>());
 }
 
 std::string junitCase(const CheckedItem& item) {

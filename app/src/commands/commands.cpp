@@ -15,6 +15,7 @@ namespace hpsdf::app {
 Registry makeRegistry() {
   Registry registry;
   addFieldCommands(registry);
+  addRebuildCommand(registry);
   addCombineCommand(registry);
   addJumpsCommand(registry);
   addVerifyCommand(registry);

@@ -14,6 +14,7 @@ void addFieldCommands(Registry& registry);  ///< build, smooth, blend, bounds, i
 void addJumpsCommand(Registry& registry);
 void addProbeCommand(Registry& registry);
 void addQueryCommand(Registry& registry);
+void addRebuildCommand(Registry& registry);
 void addSampleCommand(Registry& registry);
 void addToolCommands(Registry& registry);  ///< run, shapes, doctor, set, include, help and docs
 void addVerifyCommand(Registry& registry);

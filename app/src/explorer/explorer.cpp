@@ -31,8 +31,7 @@ constexpr double kClick = 3;  // distance that the pointer may move during a cli
 constexpr double kDegreesPerPoint = 0.4;
 
 // Names of the scripts that the explorer makes, with which messages of their errors begin.
-constexpr const char *kPanelScript = "panel", *kOpenScript = "open", *kPresetScript = "preset",
-                     *kRebuildScript = "rebuild";
+constexpr const char *kPanelScript = "panel", *kOpenScript = "open", *kPresetScript = "preset", *kApplyScript = "apply";
 
 double rounded(double value, double step) { return std::round(value / step) * step; }
 
@@ -144,7 +143,7 @@ Layout layoutInPoints(const ViewState& view) {
 }
 
 std::string withoutPosition(std::string message) {
-  constexpr std::array kScripts = {kPanelScript, kOpenScript, kPresetScript, kRebuildScript};
+  constexpr std::array kScripts = {kPanelScript, kOpenScript, kPresetScript, kApplyScript};
   const auto isBefore = [&](const char* script) { return message.starts_with(fmt::format("{}:1:", script)); };
   while (std::ranges::any_of(kScripts, isBefore)) message.erase(0, message.find(": ") + 2);
   return message;
@@ -284,7 +283,7 @@ void Explorer::rebuild(std::optional<int> maxSteps, bool keeps) {
   if (keeps) before = session_.current().field;
   rebuilding_ = maxSteps ? Rebuilding::steps : Rebuilding::whole;
   try {
-    runScript(session_, parseScript(session_.registry(), kRebuildScript, line, {}));
+    runScript(session_, parseScript(session_.registry(), kApplyScript, line, {}));
   } catch (...) {
     rebuilding_ = Rebuilding::no;
     throw;

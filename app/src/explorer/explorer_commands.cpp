@@ -340,9 +340,9 @@ void addFieldAndShotCommands(Registry& registry) {
   });
   registry.addForScripts({
       .name = "settings",
-      .summary = "Set how 'rebuild' builds; what is not set is as it was.",
+      .summary = "Set how 'apply' builds the field anew; what is not set is as it was.",
       .help = "The options are those of 'build'. Nothing is built yet; 'load' and 'build' forget them.",
-      .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; rebuild"},
+      .examples = {"settings mesh=bunny.obj target-error=1e-5", "settings nearness=0 ; apply"},
       .parameters = joined(
           {{{"mesh", text("MESH"),
              "Mesh file, grid file, builtin:SHAPE or analytic:SHAPE; at first what the current field was made from."}},
@@ -350,10 +350,10 @@ void addFieldAndShotCommands(Registry& registry) {
       .action = runSettings,
   });
   registry.addForScripts({
-      .name = "rebuild",
+      .name = "apply",
       .summary = "Build the field anew, with the settings that were changed.",
       .help = "What 'settings' has not changed is as it was for the current field.",
-      .examples = {"rebuild", "rebuild max-steps=100", "settings target-error=1e-3 ; rebuild keep=true"},
+      .examples = {"apply", "apply max-steps=100", "settings target-error=1e-3 ; apply keep=true"},
       .parameters = {{"max-steps", settingKind("max-steps").under(setting_group::kAsked).advanced(),
                       "End after so many steps of the refinement: an earlier state of the field."},
                      {"keep", flag(),

@@ -296,18 +296,18 @@ void drawBuildPanel(const Controls& controls, Explorer& explorer) {
   const bool bounds = build.value("bounds", field.data().bounds.empty() ? "false" : "true") == "true";
   controls.checkbox("build/bounds", "bounds", bounds, "settings bounds=");
   const bool canBuild = !build.value("mesh", current.madeFrom()).empty();
-  controls.button("build/rebuild", "rebuild", "rebuild", canBuild);
+  controls.button("build/rebuild", "rebuild", "apply", canBuild);
   ImGui::SameLine();
-  controls.button("build/compare", "rebuild and compare", "rebuild keep=true", canBuild,
+  controls.button("build/compare", "rebuild and compare", "apply keep=true", canBuild,
                   "Build the field anew, and show the one before it beside it.", widthLeft());
   // The progress is below the buttons, so that a second click on one of them does not cancel what the first has begun.
   if (explorer.work) return drawProgress(controls.ui, explorer);
   if (build.areChanged) controls.ui.text("changed: the field is built with other settings", true);
   if (const auto all = explorer.allSteps()) {
     const auto steps = double(field.metadata().steps.value_or(*all));
-    controls.describe("rebuild max-steps=");
+    controls.describe("apply max-steps=");
     if (const auto v = controls.ui.slider("build/steps", "steps", steps, 0, double(*all), "%.0f", When::released))
-      controls.commands.push_back(fmt::format("rebuild max-steps={:.0f}", *v));
+      controls.commands.push_back(fmt::format("apply max-steps={:.0f}", *v));
   }
 }
 

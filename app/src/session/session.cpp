@@ -158,7 +158,7 @@ void Session::keep(Field field) { kept_ = std::make_unique<Other>(Other{kKept, s
 
 Session::Other& Session::other(const std::string& file) {
   if (file == kKept) {
-    if (!kept_) throw Error("no field is kept; 'rebuild keep=true' keeps the field before it");
+    if (!kept_) throw Error("no field is kept; 'apply keep=true' keeps the field before it");
     return *kept_;
   }
   const auto found = std::ranges::find(others_, file, &Other::file);

@@ -8,6 +8,8 @@ Json vectorJson(const Vector3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 Json boxJson(const Box& box) { return Json::array({vectorJson(box.min()), vectorJson(box.max())}); }
 
+std::string jsonLine(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
 std::string jsonText(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 void printJson(std::ostream& out, const Json& json) { out << jsonText(json); }

@@ -14,6 +14,8 @@ using Json = nlohmann::ordered_json;
 /// Returns indented JSON that ends with a newline. Bytes that are not UTF-8, which file names may contain, are
 /// replaced.
 std::string jsonText(const Json& json);
+/// Returns JSON in one line that ends with a newline, with the same replacements.
+std::string jsonLine(const Json& json);
 void printJson(std::ostream& out, const Json& json);
 
 /// Returns the number in `object` with the key `name`.

@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "hpsdf/build_options.h"
 #include "hpsdf/distance_function.h"
 #include "hpsdf/error.h"
 #include "hpsdf/field.h"
+#include "hpsdf/triangle_mesh.h"
 
 namespace hpsdf {
 
@@ -53,5 +55,42 @@ void buildStages(const DistanceFunction& distance, const Box& domain, const Buil
 /// differ). Two Φ count as the same if their sources and their values at 4096 points agree.
 Field buildResumably(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                      const Checkpoint& checkpoint, const Progress& progress = {});
+
+struct RebuildOptions {
+  std::optional<std::uint64_t> memoryLimit = {};  ///< as `BuildOptions::memoryLimit`
+  int threads = 0;  ///< greatest number of threads, up to 1024; 0: all of the machine. It does not affect the result.
+};
+
+/// A field of a changed mesh, and how much of the earlier field it contains.
+struct RebuiltField {
+  Field field;
+  std::uint64_t changedTriangles = 0;  ///< triangles that only one of the two meshes has
+  std::uint64_t leaves = 0;            ///< number of leaves of the earlier field
+  std::uint64_t kept = 0;              ///< number of its leaves that are leaves of the new field, too
+  double keptVolume = 0;               ///< their share of the domain's volume
+  /// True if no leaf was kept because edges of holes have moved: signs by winding number then change everywhere.
+  bool holesMoved = false;
+};
+
+/// Builds the field of a mesh that differs from the mesh of an earlier field in some triangles. Leaves of the earlier
+/// field which no changed triangle can reach keep their polynomials or lists of triangles, to the bit. The other parts
+/// of the octree are built anew, with the settings of the earlier field. Their part of the
+/// target error is their share in the earlier field's error, so that the whole field keeps to the target error, as a
+/// whole construction does. Triangles are the same if their corners are, whatever their indices; moving, adding and
+/// removing triangles are alike.
+///
+/// `before` is the mesh of the earlier field, and `after` the mesh to which `distance` measures, for instance an
+/// `ExactDistance`. Both are in the units of the field. The metadata of the new field has the number of evaluations of
+/// `distance`, but no number of steps and no measured errors.
+///
+/// If the inside test of either mesh is not `InsideTest::pseudonormal`, the signs at the centres of leaves, and at the
+/// corners of those through which the surface may pass, are compared before and after the change.
+///
+/// Throws `Error` if `before` is not the mesh of the earlier field, if `after` leaves its domain, for outer hulls, and
+/// for a field that was built within a tolerance, within a limit of bytes, or with weak continuity, because its cells
+/// depend on each other. Throws as `build` does.
+RebuiltField rebuild(const Field& field, const TriangleMesh& before, const TriangleMesh& after,
+                     const DistanceFunction& distance, const RebuildOptions& options = {},
+                     const Progress& progress = {});
 
 }  // namespace hpsdf

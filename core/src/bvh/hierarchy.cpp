@@ -17,12 +17,10 @@ namespace {
 
 using Corners = std::array<std::uint32_t, 3>;
 
-/// The branches (inner nodes) and the triangle blocks of a tree, both in depth-first order. `nodes[i]` is the branch
-/// that becomes node i; `blocks[i]` becomes block i.
+/// The branches (inner nodes) of a tree in depth-first order. `nodes[i]` is the branch that becomes node i.
 struct Numbered {
   std::vector<const Branch*> nodes;
   std::vector<std::array<std::uint32_t, kWidth>> children;  ///< `Node::child` of each node
-  std::vector<const Branch::Child*> blocks;
 
   std::uint32_t add(const Branch& branch) {
     const auto self = static_cast<std::uint32_t>(nodes.size());
@@ -30,16 +28,10 @@ struct Numbered {
     children.emplace_back().fill(kEmpty);
     for (int i = 0; i < branch.count; ++i) {
       const Branch::Child& child = branch.children[i];
-      const std::uint32_t index = child.branch ? add(*child.branch) : addBlock(child);
+      const std::uint32_t index = child.branch ? add(*child.branch) : kBlockBit | child.begin / kWidth;
       children[self][i] = index;  // index `children` only now, because `add` may reallocate it
     }
     return self;
-  }
-
- private:
-  std::uint32_t addBlock(const Branch::Child& child) {
-    blocks.push_back(&child);
-    return kBlockBit | static_cast<std::uint32_t>(blocks.size() - 1);
   }
 };
 
@@ -176,19 +168,10 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
   const double half = (box.max() / 2 - box.min() / 2).maxCoeff();
   scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;
 
-  const TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
-  frames_ = Array<TriangleFrame>(mesh.triangles.size());
+  TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
+  numbers_ = std::move(tree.order);
   Numbered numbered;
-  tbb::parallel_invoke(
-      [&] {
-        sortSurface(mesh, tree.order);
-        numbered.add(*tree.root);
-      },
-      [&] {
-        tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t slot) {
-          frames_[slot] = makeFrame(cornersOf(mesh, mesh.triangles[tree.order[slot]]), tree.order[slot]);
-        });
-      });
+  tbb::parallel_invoke([&] { sortSurface(mesh); }, [&] { numbered.add(*tree.root); });
 
   const std::vector<Eigen::Array4f> points = localPoints(*this, vertices_);
   const BoxFitter fitter(triangles_, points);
@@ -197,17 +180,16 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
     fitter.fit(nodes_[n], *numbered.nodes[n]);
     std::copy(numbered.children[n].begin(), numbered.children[n].end(), nodes_[n].child);
   });
-  blocks_ = Array<Block>(numbered.blocks.size());
-  tbb::parallel_for(std::size_t{0}, blocks_.size(),
-                    [&](std::size_t b) { fill(blocks_[b], numbered.blocks[b]->begin, numbered.blocks[b]->end); });
+  blocks_ = Array<Block>((triangles_.size() + kWidth - 1) / kWidth);
+  tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { fill(blocks_[b], b); });
 }
 
-void Hierarchy::sortSurface(const TriangleMesh& mesh, const std::vector<std::uint32_t>& order) {
+void Hierarchy::sortSurface(const TriangleMesh& mesh) {
   constexpr std::uint32_t kUnused = ~std::uint32_t{0};
   std::vector<std::uint32_t> numbers(mesh.vertices.size(), kUnused);
   vertices_.reserve(mesh.vertices.size());
-  triangles_.reserve(order.size());
-  for (const std::uint32_t triangle : order) {
+  triangles_.reserve(numbers_.size());
+  for (const std::uint32_t triangle : numbers_) {
     Corners corners = mesh.triangles[triangle];
     for (std::uint32_t& corner : corners) {
       std::uint32_t& number = numbers[corner];
@@ -221,11 +203,9 @@ void Hierarchy::sortSurface(const TriangleMesh& mesh, const std::vector<std::uin
   }
 }
 
-void Hierarchy::fill(Block& block, std::uint32_t begin, std::uint32_t end) const {
-  block.first = begin;
-  block.count = end - begin;
-  for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-    const TriangleFrame& frame = frames_[std::min(begin + lane, end - 1)];
+void Hierarchy::fill(Block& block, std::size_t index) const {
+  for (std::size_t lane = 0; lane < kWidth; ++lane) {
+    const TriangleFrame frame = this->frame(std::uint32_t(std::min(index * kWidth + lane, triangles_.size() - 1)));
     const Vector3 origin = local(frame.origin);
     const auto set = [&](int field, double value) { block.field[field][lane] = static_cast<float>(value); };
     for (int i = 0; i < 3; ++i) {
@@ -243,7 +223,7 @@ void Hierarchy::fill(Block& block, std::uint32_t begin, std::uint32_t end) const
 
 std::size_t Hierarchy::bytes() const {
   const auto sizeOf = [](const auto& values) { return values.size() * sizeof(values[0]); };
-  return sizeOf(frames_) + sizeOf(nodes_) + sizeOf(blocks_) + sizeOf(triangles_) + sizeOf(vertices_);
+  return sizeOf(nodes_) + sizeOf(blocks_) + sizeOf(numbers_) + sizeOf(triangles_) + sizeOf(vertices_);
 }
 
 }  // namespace hpsdf::bvh

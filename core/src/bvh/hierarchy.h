@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <ranges>
 #include <span>
 #include <vector>
 
@@ -20,8 +22,11 @@ void requireSurface(const TriangleMesh& mesh);
 
 /// The triangle of a mesh that is nearest to a query point.
 struct Nearest {
-  std::uint32_t triangleRef = 0;  ///< refers to the triangle, see `Hierarchy::frameAt`
-  FramePoint point;               ///< the query point's position relative to the triangle
+  std::uint32_t slot = 0;     ///< position of the triangle in the order of the hierarchy
+  FramePoint point;           ///< the query point's position relative to the triangle
+  Vector3 normal;             ///< `TriangleFrame::normal` of the triangle
+  double length;              ///< `TriangleFrame::length` of the triangle
+  std::uint32_t firstCorner;  ///< `TriangleFrame::firstCorner` of the triangle
 };
 
 constexpr int kPacket = 16;      ///< greatest number of query points that search the hierarchy together, in SIMD lanes
@@ -43,8 +48,9 @@ constexpr std::uint32_t kEmpty = 0x7fffffff;
 /// this limit; the squared distances to the boxes of unused children are above it.
 constexpr float kOutOfReach = 1e33f;
 
-/// Up to four triangles in single precision and local coordinates, with the fields of `TriangleFrame` except the
-/// normal. Unused places repeat the last triangle.
+/// Four triangles in single precision and local coordinates, with the fields of `TriangleFrame` except the normal,
+/// 224 bytes. Block b holds the triangles with the slots from kWidth·b on. Unused places of the last block repeat the
+/// last triangle.
 struct alignas(32) Block {
   enum Field {
     origin = 0,
@@ -58,8 +64,6 @@ struct alignas(32) Block {
     fields
   };
   float field[fields][kWidth];
-  std::uint32_t first;  ///< position of the first triangle in the order of the tree; the others follow it
-  std::uint32_t count;
 };
 
 /// An array with uninitialised elements. The threads that fill it are the first to touch its memory pages. The
@@ -81,6 +85,12 @@ class Array {
 };
 
 /// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children per node.
+/// For a mesh without holes it takes about 109 bytes a triangle: 24 for triangles and vertices, 4 for the triangle's
+/// index in the mesh, 56 for the block and 25 for nodes. The frames of triangles, which take 144 bytes, are computed
+/// from the corners wherever one is needed.
+///
+/// A triangle's slot is its position in the order of the hierarchy, in which neighbouring triangles on the surface are
+/// usually close in memory.
 ///
 /// The boxes and triangles in nodes and blocks are in single precision. A search uses them only to skip triangles. Its
 /// bounds allow for rounding: it never skips a triangle that may be the nearest. It computes the squared distances of
@@ -96,24 +106,25 @@ class Hierarchy {
 
   static constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 
-  /// Returns the triangle that `triangleRef` refers to: triangle `triangleRef % kWidth` of block `triangleRef /
-  /// kWidth`.
-  const TriangleFrame& frameAt(std::uint32_t triangleRef) const { return frames_[slotAt(triangleRef)]; }
-
   std::span<const Node> nodes() const { return nodes_; }
   std::span<const Block> blocks() const { return blocks_; }
 
-  /// Returns the slot of a triangle: its position in the order of the hierarchy. The triangles of a block have
-  /// successive slots.
-  std::uint32_t slotAt(std::uint32_t triangleRef) const {
-    return blocks_[triangleRef / kWidth].first + triangleRef % kWidth;
+  std::span<const Triangle> triangles() const { return triangles_; }  ///< by slot: three indices into `vertices()` each
+  std::span<const std::uint32_t> numbers() const { return numbers_; }  ///< by slot: the triangle's index in the mesh
+  std::span<const Vector3> vertices() const { return vertices_; }      ///< vertices in use, in the order of first use
+
+  /// Returns the slots of a block's triangles.
+  auto slotsOf(std::uint32_t block) const {
+    const std::uint32_t begin = block * kWidth;
+    return std::views::iota(begin, std::min(begin + std::uint32_t{kWidth}, std::uint32_t(triangles_.size())));
   }
 
-  // Frames and triangles are sorted in the order of the hierarchy. Therefore, neighbouring triangles on the surface are
-  // usually close in memory.
-  std::span<const TriangleFrame> frames() const { return frames_; }
-  std::span<const Triangle> triangles() const { return triangles_; }  ///< three indices into `vertices()` each
-  std::span<const Vector3> vertices() const { return vertices_; }     ///< vertices in use, in the order of first use
+  std::array<Vector3, 3> corners(std::uint32_t slot) const {
+    const auto& [a, b, c] = triangles_[slot];
+    return {vertices_[a], vertices_[b], vertices_[c]};
+  }
+  /// Computes the frame of the triangle in a slot.
+  TriangleFrame frame(std::uint32_t slot) const { return makeFrame(corners(slot), numbers_[slot]); }
 
   std::size_t bytes() const;
 
@@ -122,14 +133,13 @@ class Hierarchy {
   double scale() const { return scale_; }
 
  private:
-  /// Fills the members triangles_ and vertices_ from the mesh, in the order of the tree.
-  void sortSurface(const TriangleMesh& mesh, const std::vector<std::uint32_t>& order);
-  /// Fills a block with the triangles at the positions `begin` to `end` - 1 in the order of the hierarchy.
-  void fill(Block& block, std::uint32_t begin, std::uint32_t end) const;
+  /// Fills the members triangles_ and vertices_ from the mesh, in the order of `numbers_`.
+  void sortSurface(const TriangleMesh& mesh);
+  void fill(Block& block, std::size_t index) const;
 
-  Array<TriangleFrame> frames_;
   Array<Node> nodes_;
   Array<Block> blocks_;
+  std::vector<std::uint32_t> numbers_;
   std::vector<Triangle> triangles_;
   std::vector<Vector3> vertices_;
   Vector3 center_;    ///< local coordinates = (x - center_)·scale_

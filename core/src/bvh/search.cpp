@@ -94,29 +94,165 @@ HWY_INLINE hn::Vec<D> limitFrom(D d, hn::Vec<D> upper, float delta) {
   return distance * distance * hn::Set(d, 1.000001f);
 }
 
+/// Frames of up to four triangles, with the fields of `TriangleFrame`.
+struct Frames {
+  enum Field {
+    origin = 0,
+    along = 3,
+    across = 6,
+    normal = 9,
+    length = 12,
+    apexAlong,
+    apexAcross,
+    inverseLeft,
+    inverseRight,
+    firstCorner,
+    fields
+  };
+  HWY_ALIGN double field[fields][kWidth];
+};
+
+template <class V>
+HWY_INLINE V dot(const Point<V>& a, const Point<V>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+template <class V>
+HWY_INLINE Point<V> cross(const Point<V>& a, const Point<V>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+template <class V>
+HWY_INLINE Point<V> minus(const Point<V>& a, const Point<V>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+template <class V>
+HWY_INLINE Point<V> divided(const Point<V>& a, V by) {
+  return {a.x / by, a.y / by, a.z / by};
+}
+
+/// Makes the frames of the triangles with these corners, as `makeFrame` in triangle_frame.cpp does and with the same
+/// bits: `corner[k][axis][i]` belongs to triangle i. Returns false if a triangle has no area, or so small a
+/// one that its frame has to be made by `makeFrame`.
+HWY_INLINE bool makeFrames(const double corner[3][3][kWidth], Frames& frames) {
+  const hn::CappedTag<double, kWidth> d;
+  using V = hn::Vec<decltype(d)>;
+  const auto zero = hn::Zero(d);
+  bool areRegular = true;
+  for (std::size_t at = 0; at < kWidth; at += hn::MaxLanes(d)) {
+    const auto load = [&](int k) HWY_ATTR {
+      return Point<V>{hn::Load(d, corner[k][0] + at), hn::Load(d, corner[k][1] + at), hn::Load(d, corner[k][2] + at)};
+    };
+    const Point<V> p = load(0), q = load(1), r = load(2);
+    const Point<V> pq = minus(q, p), qr = minus(r, q), rp = minus(p, r);
+    const V first = dot(pq, pq), second = dot(qr, qr), third = dot(rp, rp);
+    const auto isSecond = second > first;
+    const auto isThird = third > hn::Max(first, second);
+    const auto choose = [&](const Point<V>& byFirst, const Point<V>& bySecond, const Point<V>& byThird) HWY_ATTR {
+      const auto one = [&](V v1, V v2, V v3)
+                           HWY_ATTR { return hn::IfThenElse(isThird, v3, hn::IfThenElse(isSecond, v2, v1)); };
+      return Point<V>{one(byFirst.x, bySecond.x, byThird.x), one(byFirst.y, bySecond.y, byThird.y),
+                      one(byFirst.z, bySecond.z, byThird.z)};
+    };
+    const Point<V> a = choose(p, q, r), c = choose(r, p, q), base = choose(pq, qr, rp), apex = minus(c, a);
+    const V length = hn::Sqrt(hn::Max(first, hn::Max(second, third)));
+    const Point<V> along = divided(base, length);
+    const auto withoutBase = [&](const Point<V>& v) HWY_ATTR {
+      const V part = dot(along, v);
+      return Point<V>{v.x - along.x * part, v.y - along.y * part, v.z - along.z * part};
+    };
+    const Point<V> across0 = withoutBase(cross(along, apex));
+    const V height = hn::Sqrt(dot(across0, across0));
+    const auto largestOf = [&](const Point<V>& v)
+                               HWY_ATTR { return hn::Max(hn::Abs(v.x), hn::Max(hn::Abs(v.y), hn::Abs(v.z))); };
+    const V size = hn::Max(largestOf(p), hn::Max(largestOf(q), largestOf(r)));
+    const Point<V> tilted = withoutBase(divided(across0, height));
+    const Point<V> normal = divided(tilted, hn::Sqrt(dot(tilted, tilted)));
+    const Point<V> across = cross(normal, along);
+    const V apexAlong = hn::Min(hn::Max(dot(along, apex), zero), length), apexAcross = dot(across, apex);
+    const V rest = apexAlong - length;
+    const V left = apexAlong * apexAlong + apexAcross * apexAcross, right = rest * rest + apexAcross * apexAcross;
+    const V one = hn::Set(d, 1.0), least = hn::Set(d, std::numeric_limits<double>::min());
+    areRegular =
+        areRegular && hn::AllTrue(d, hn::And(height > hn::Set(d, kFlat) * size, hn::Min(left, right) >= least));
+    const auto store = [&](int field, V value) HWY_ATTR { hn::Store(value, d, frames.field[field] + at); };
+    const auto storePoint = [&](int field, const Point<V>& v) HWY_ATTR {
+      store(field, v.x);
+      store(field + 1, v.y);
+      store(field + 2, v.z);
+    };
+    storePoint(Frames::origin, a);
+    storePoint(Frames::along, along);
+    storePoint(Frames::across, across);
+    storePoint(Frames::normal, normal);
+    store(Frames::length, length);
+    store(Frames::apexAlong, apexAlong);
+    store(Frames::apexAcross, apexAcross);
+    store(Frames::inverseLeft, one / left);
+    store(Frames::inverseRight, one / right);
+    store(Frames::firstCorner, hn::IfThenElse(isThird, hn::Set(d, 2.0), hn::IfThenElseZero(isSecond, one)));
+  }
+  return areRegular;
+}
+
+/// Sets lane i of `frames` to a frame.
+inline void setFrame(Frames& frames, int i, const TriangleFrame& frame) {
+  const auto set = [&](int field, double value) { frames.field[field][i] = value; };
+  for (int axis = 0; axis < 3; ++axis) {
+    set(Frames::origin + axis, frame.origin[axis]);
+    set(Frames::along + axis, frame.along[axis]);
+    set(Frames::across + axis, frame.across[axis]);
+    set(Frames::normal + axis, frame.normal[axis]);
+  }
+  set(Frames::length, frame.length);
+  set(Frames::apexAlong, frame.apexAlong);
+  set(Frames::apexAcross, frame.apexAcross);
+  set(Frames::inverseLeft, frame.inverseSquaredLeft);
+  set(Frames::inverseRight, frame.inverseSquaredRight);
+  set(Frames::firstCorner, frame.firstCorner);
+}
+
+/// Makes the frames of the triangles in up to four slots. Unused lanes repeat the last one.
+HWY_INLINE void framesOf(const Hierarchy& hierarchy, const std::uint32_t* slots, int count, Frames& frames) {
+  HWY_ALIGN double corner[3][3][kWidth];
+  const Triangle* const triangles = hierarchy.triangles().data();
+  const Vector3* const vertices = hierarchy.vertices().data();
+  for (int i = 0; i < kWidth; ++i) {
+    const Triangle& triangle = triangles[slots[std::min(i, count - 1)]];
+    for (int k = 0; k < 3; ++k)
+      for (int axis = 0; axis < 3; ++axis) corner[k][axis][i] = vertices[triangle[k]][axis];
+  }
+  if (makeFrames(corner, frames)) return;
+  for (int i = 0; i < count; ++i) setFrame(frames, i, hierarchy.frame(slots[i]));
+}
+
 /// The result of `locateLanes` for each lane: the squared distance to a triangle, and the members of `FramePoint`.
 template <class D>
 struct Located {
   hn::Vec<D> squared, height, side[3], inside;
 };
 
-/// Locates one point per lane relative to a triangle, as `locate` in triangle_frame.h does. Both functions perform the
-/// same operations in the same order, without fused multiply-add, so that every instruction set yields the same bits.
+/// Locates one point per lane relative to a triangle, whose frame is lane i of `frames`, as `locate` in
+/// triangle_frame.h does. Both functions perform the same operations in the same order, without fused multiply-add, so
+/// that every instruction set yields the same bits.
 template <class D>
-HWY_INLINE Located<D> locateLanes(D d, const TriangleFrame& f, const Point<hn::Vec<D>>& point) {
-  const auto number = [&](double value) HWY_ATTR { return hn::Set(d, value); };
-  const auto zero = hn::Zero(d), one = number(1.0);
+HWY_INLINE Located<D> locateLanes(D d, const Frames& frames, int i, const Point<hn::Vec<D>>& point) {
+  const auto field = [&](int f) HWY_ATTR { return hn::Set(d, frames.field[f][i]); };
+  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0);
   const auto unit = [&](auto t) HWY_ATTR { return hn::Min(hn::Max(t, zero), one); };
-  const auto wx = point.x - number(f.origin[0]), wy = point.y - number(f.origin[1]), wz = point.z - number(f.origin[2]);
-  const auto dot = [&](const Vector3& v) HWY_ATTR { return wx * number(v[0]) + wy * number(v[1]) + wz * number(v[2]); };
-  const auto p = dot(f.along), q = dot(f.across), height = dot(f.normal);
-  const auto length = number(f.length), apexAlong = number(f.apexAlong), apexAcross = number(f.apexAcross);
+  const auto wx = point.x - field(Frames::origin), wy = point.y - field(Frames::origin + 1),
+             wz = point.z - field(Frames::origin + 2);
+  const auto along = [&](int f) HWY_ATTR { return wx * field(f) + wy * field(f + 1) + wz * field(f + 2); };
+  const auto p = along(Frames::along), q = along(Frames::across), height = along(Frames::normal);
+  const auto length = field(Frames::length), apexAlong = field(Frames::apexAlong),
+             apexAcross = field(Frames::apexAcross);
 
   const auto base = p - hn::Min(hn::Max(p, zero), length);
-  const auto left = unit((p * apexAlong + q * apexAcross) * number(f.inverseSquaredLeft));
+  const auto left = unit((p * apexAlong + q * apexAcross) * field(Frames::inverseLeft));
   const auto leftP = p - left * apexAlong, leftQ = q - left * apexAcross;
   const auto fromB = p - length, rightAlong = apexAlong - length;
-  const auto right = unit((fromB * rightAlong + q * apexAcross) * number(f.inverseSquaredRight));
+  const auto right = unit((fromB * rightAlong + q * apexAcross) * field(Frames::inverseRight));
   const auto rightP = fromB - right * rightAlong, rightQ = q - right * apexAcross;
   const auto inside = hn::And(q > zero, hn::And(p * apexAcross > q * apexAlong, q * rightAlong > fromB * apexAcross));
   Located<D> at{zero,
@@ -138,37 +274,55 @@ HWY_INLINE bool anyInReach(const float* lower, const float* limit) {
   return !hn::AllFalse(d, within);
 }
 
+/// Computes the distances from the points to the triangle in `slot` in double precision, and keeps it for the points to
+/// which it is the nearest so far. Its frame is lane i of `frames`; `lower` holds lower bounds of the squared
+/// distances.
+template <int Lanes>
+HWY_INLINE void tryTriangle(Search<Lanes>& s, const Frames& frames, int i, std::uint32_t slot, const float* lower) {
+  const hn::CappedTag<double, Lanes> d;
+  constexpr std::size_t kStep = hn::MaxLanes(d);
+  const auto triangle = hn::Set(d, static_cast<double>(s.hierarchy.numbers()[slot]));
+  for (std::size_t at = 0; at < Lanes; at += kStep) {
+    if (!anyInReach<kStep>(lower + at, s.limit + at)) continue;
+    const auto found =
+        locateLanes(d, frames, i,
+                    Point<hn::Vec<decltype(d)>>{hn::Load(d, s.exact[0] + at), hn::Load(d, s.exact[1] + at),
+                                                hn::Load(d, s.exact[2] + at)});
+    const auto best = hn::Load(d, s.squared + at);
+    const auto better =
+        hn::Or(found.squared < best, hn::And(found.squared == best, triangle < hn::Load(d, s.triangle + at)));
+    if (hn::AllFalse(d, better)) continue;
+    const auto keep = [&](double* kept, auto value)
+                          HWY_ATTR { hn::Store(hn::IfThenElse(better, value, hn::Load(d, kept + at)), d, kept + at); };
+    const auto keepField = [&](double* kept, int f) HWY_ATTR { keep(kept, hn::Set(d, frames.field[f][i])); };
+    keep(s.squared, found.squared);
+    keep(s.triangle, triangle);
+    keep(s.slot, hn::Set(d, static_cast<double>(slot)));
+    keep(s.height, found.height);
+    for (int side = 0; side < 3; ++side) keep(s.side[side], found.side[side]);
+    keep(s.inside, found.inside);
+    for (int axis = 0; axis < 3; ++axis) keepField(s.normal[axis], Frames::normal + axis);
+    keepField(s.length, Frames::length);
+    keepField(s.firstCorner, Frames::firstCorner);
+  }
+}
+
 /// Computes the distances from the points to the candidate triangles in double precision, keeps the nearest
 /// triangle of each point, and empties the list of candidates.
 template <int Lanes>
 HWY_INLINE void settle(Search<Lanes>& s) {
-  const hn::CappedTag<double, Lanes> d;
-  constexpr std::size_t kStep = hn::MaxLanes(d);
+  std::uint32_t slots[kWidth];
+  const float* lower[kWidth];
+  int count = 0;
   for (int c = 0; c < s.count; ++c) {
-    if (!anyInReach<Lanes>(s.lower[c], s.limit)) continue;
-    const TriangleFrame& frame = s.hierarchy.frameAt(s.candidates[c]);
-    const auto triangle = hn::Set(d, static_cast<double>(frame.triangle));
-    const auto triangleRef = hn::Set(d, static_cast<double>(s.candidates[c]));
-    for (std::size_t at = 0; at < Lanes; at += kStep) {
-      if (!anyInReach<kStep>(s.lower[c] + at, s.limit + at)) continue;
-      const auto found =
-          locateLanes(d, frame,
-                      Point<hn::Vec<decltype(d)>>{hn::Load(d, s.exact[0] + at), hn::Load(d, s.exact[1] + at),
-                                                  hn::Load(d, s.exact[2] + at)});
-      const auto best = hn::Load(d, s.squared + at);
-      const auto better =
-          hn::Or(found.squared < best, hn::And(found.squared == best, triangle < hn::Load(d, s.triangle + at)));
-      if (hn::AllFalse(d, better)) continue;
-      const auto keep = [&](double* kept, auto value) HWY_ATTR {
-        hn::Store(hn::IfThenElse(better, value, hn::Load(d, kept + at)), d, kept + at);
-      };
-      keep(s.squared, found.squared);
-      keep(s.triangle, triangle);
-      keep(s.triangleRef, triangleRef);
-      keep(s.height, found.height);
-      for (int side = 0; side < 3; ++side) keep(s.side[side], found.side[side]);
-      keep(s.inside, found.inside);
-    }
+    slots[count] = s.candidates[c];
+    lower[count] = s.lower[c];
+    count += anyInReach<Lanes>(s.lower[c], s.limit);
+    if (count == 0 || (count < kWidth && c + 1 < s.count)) continue;
+    Frames frames;
+    framesOf(s.hierarchy, slots, count, frames);
+    for (int i = 0; i < count; ++i) tryTriangle(s, frames, i, slots[i], lower[i]);
+    count = 0;
   }
   s.count = 0;
 }
@@ -177,13 +331,10 @@ HWY_INLINE void settle(Search<Lanes>& s) {
 /// triangles in double precision.
 template <int Lanes>
 void tryAll(Search<Lanes>& s) {
-  const auto& blocks = s.hierarchy.blocks();
-  for (std::uint32_t b = 0; b < blocks.size(); ++b) {
-    if (s.count + kWidth > s.kCapacity) settle(s);
-    for (std::uint32_t i = 0; i < blocks[b].count; ++i) {
-      std::fill_n(s.lower[s.count], Lanes, 0.0f);
-      s.candidates[s.count++] = b * kWidth + i;
-    }
+  for (std::uint32_t slot = 0; slot < s.hierarchy.triangles().size(); ++slot) {
+    if (s.count == s.kCapacity) settle(s);
+    std::fill_n(s.lower[s.count], Lanes, 0.0f);
+    s.candidates[s.count++] = slot;
   }
   settle(s);
 }
@@ -195,15 +346,13 @@ HWY_INLINE bool isSeed(const Search<Lanes>& s, std::uint32_t block) {
   return false;
 }
 
-/// Prefetches an object that is probably needed next into the cache.
-template <class T>
-HWY_INLINE void prefetch(const T* object) {
-  for (std::size_t line = 0; line < sizeof(T); line += 64) hwy::Prefetch(reinterpret_cast<const char*>(object) + line);
-}
-
+/// Prefetches a node or block that is probably needed next into the cache.
 HWY_INLINE void prefetchChild(const Node* nodes, const Block* blocks, std::uint32_t child) {
-  static_assert(sizeof(Node) == sizeof(Block));
-  prefetch(child & kBlockBit ? reinterpret_cast<const Node*>(blocks + (child & ~kBlockBit)) : nodes + child);
+  constexpr std::size_t kLine = 64;
+  static_assert(sizeof(Node) == 4 * kLine && sizeof(Block) % alignof(Block) == 0 && sizeof(Block) > 3 * kLine);
+  const char* const begin = child & kBlockBit ? reinterpret_cast<const char*>(blocks + (child & ~kBlockBit))
+                                              : reinterpret_cast<const char*>(nodes + child);
+  for (std::size_t line = 0; line < 4; ++line) hwy::Prefetch(begin + line * kLine);
 }
 
 /// The stack of nodes and blocks that the traversal still has to visit. The children of a node are pushed
@@ -267,6 +416,7 @@ void runOne(Search<1>& s) {
   const hn::CappedTag<float, kWidth> d;
   constexpr std::size_t kStep = hn::MaxLanes(d);
   const Block* blocks = s.hierarchy.blocks().data();
+  const auto triangles = static_cast<std::uint32_t>(s.hierarchy.triangles().size());
   const Point<hn::Vec<decltype(d)>> point{hn::Set(d, s.point[0][0]), hn::Set(d, s.point[1][0]),
                                           hn::Set(d, s.point[2][0])};
   Stack<Pending> stack;
@@ -280,11 +430,12 @@ void runOne(Search<1>& s) {
       hn::Store(limitFrom(d, bounds.upper, s.delta), d, limit + at);
     }
     if (s.count + kWidth > s.kCapacity) settle(s);
-    for (std::uint32_t i = 0; i < block.count; ++i) {
+    const std::uint32_t first = blockIndex * kWidth, used = std::min<std::uint32_t>(kWidth, triangles - first);
+    for (std::uint32_t i = 0; i < used; ++i) {
       if (!(lower[i] <= s.limit[0])) continue;
       s.limit[0] = std::min(s.limit[0], limit[i]);
       s.lower[s.count][0] = lower[i];
-      s.candidates[s.count++] = blockIndex * kWidth + i;
+      s.candidates[s.count++] = first + i;
     }
   };
   const auto visitNode = [&](const Node& node) HWY_ATTR {
@@ -370,11 +521,11 @@ HWY_INLINE void leastLanes(D d, const hn::Vec<D>* least, float* key) {
 /// Pointers to the arrays of a hierarchy. As local copies they stay in registers during the search.
 struct Arrays {
   explicit Arrays(const Hierarchy& hierarchy)
-      : nodes(hierarchy.nodes().data()), blocks(hierarchy.blocks().data()), frames(hierarchy.frames().data()) {}
+      : nodes(hierarchy.nodes().data()), blocks(hierarchy.blocks().data()), triangles(hierarchy.triangles()) {}
 
   const Node* nodes;
   const Block* blocks;
-  const TriangleFrame* frames;
+  std::span<const Triangle> triangles;
 };
 
 template <int Lanes>
@@ -402,12 +553,12 @@ HWY_INLINE void visitBlockOfPacket(Search<Lanes>& s, const Arrays& arrays, std::
     hn::Store(hn::Min(hn::Load(d, s.limit + at), limitFrom(d, upper, s.delta)), d, s.limit + at);
   }
   if (s.count + kWidth > s.kCapacity) settle(s);
+  const std::uint32_t first = blockIndex * kWidth;
+  hwy::Prefetch(arrays.triangles.data() + first);
   for (std::uint32_t i = 0; i < kWidth; ++i) {
     std::copy_n(lower[i], Lanes, s.lower[s.count]);
-    s.candidates[s.count] = blockIndex * kWidth + i;
-    const bool kept = anyInReach<Lanes>(lower[i], s.limit) & (i < block.count);
-    s.count += kept;
-    prefetch(arrays.frames + block.first + (kept ? i : 0));
+    s.candidates[s.count] = first + i;
+    s.count += anyInReach<Lanes>(lower[i], s.limit) & (first + i < arrays.triangles.size());
   }
 }
 
@@ -479,7 +630,7 @@ Nearest nearestTriangle(const Hierarchy& hierarchy, const Vector3& x) {
 }
 
 double distanceTo(const Hierarchy& hierarchy, const Vector3& x) {
-  return std::sqrt(squaredDistance(hierarchy.frameAt(nearestTriangle(hierarchy, x).triangleRef), x));
+  return std::sqrt(squaredDistance(hierarchy.frame(nearestTriangle(hierarchy, x).slot), x));
 }
 
 namespace {
@@ -487,7 +638,7 @@ namespace {
 template <int Lanes>
 void findNearest(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest) {
   Search<Lanes> search(hierarchy, points);
-  for (const Nearest& start : nearest) search.addSeed(start.triangleRef);
+  for (const Nearest& start : nearest) search.addSeed(start.slot);
   run(search);
   for (std::size_t lane = 0; lane < points.size(); ++lane) nearest[lane] = search.result(int(lane));
 }
@@ -533,19 +684,26 @@ Search<Lanes>::Search(const Hierarchy& tree, std::span<const Vector3> points) : 
 }
 
 template <int Lanes>
-void Search<Lanes>::addSeed(std::uint32_t seedRef) {
-  const std::uint32_t block = seedRef / kWidth;
+void Search<Lanes>::addSeed(std::uint32_t triangleSlot) {
+  const std::uint32_t block = triangleSlot / kWidth;
   if (std::find(seed.begin(), seed.begin() + seeds, block) == seed.begin() + seeds) seed[seeds++] = block;
 }
 
 template <int Lanes>
 Nearest Search<Lanes>::result(int lane) const {
   if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {  // The query point is not finite.
-    const TriangleFrame& frame = hierarchy.frameAt(0);
-    return {0, locate(frame, Vector3(exact[0][lane], exact[1][lane], exact[2][lane]))};
+    const TriangleFrame frame = hierarchy.frame(0);
+    return {.slot = 0,
+            .point = locate(frame, Vector3(exact[0][lane], exact[1][lane], exact[2][lane])),
+            .normal = frame.normal,
+            .length = frame.length,
+            .firstCorner = frame.firstCorner};
   }
-  return {static_cast<std::uint32_t>(triangleRef[lane]),
-          {height[lane], {side[0][lane], side[1][lane], side[2][lane]}, inside[lane] != 0}};
+  return {.slot = static_cast<std::uint32_t>(slot[lane]),
+          .point = {height[lane], {side[0][lane], side[1][lane], side[2][lane]}, inside[lane] != 0},
+          .normal = {normal[0][lane], normal[1][lane], normal[2][lane]},
+          .length = length[lane],
+          .firstCorner = static_cast<std::uint32_t>(firstCorner[lane])};
 }
 
 template struct Search<1>;

@@ -21,9 +21,9 @@ struct Search {
   /// Begins the search for 1 to `Lanes` points. Lanes beyond them repeat the last point.
   Search(const Hierarchy& hierarchy, std::span<const Vector3> points);
 
-  /// Makes the search visit the block of this triangle first. If the triangle is close to the query points, the
-  /// search has a tight distance bound from the start.
-  void addSeed(std::uint32_t triangleRef);
+  /// Makes the search visit the block of the triangle in this slot first. If the triangle is close to the query points,
+  /// the search has a tight distance bound from the start.
+  void addSeed(std::uint32_t triangleSlot);
 
   /// Returns the triangle nearest to the point in this lane. `run` must have finished.
   Nearest result(int lane) const;
@@ -38,17 +38,20 @@ struct Search {
   std::array<std::uint32_t, Lanes> seed;  ///< blocks of triangles to visit first, without repetition
 
   int count = 0;                                    ///< number of candidates
-  std::array<std::uint32_t, kCapacity> candidates;  ///< triangles, encoded as in `Hierarchy::frameAt`
+  std::array<std::uint32_t, kCapacity> candidates;  ///< slots of triangles
   alignas(64) float lower[kCapacity][Lanes];        ///< lower bounds of the candidates' squared distances
 
   // The query points, and for each point the nearest triangle found so far, in double precision and mesh units.
   alignas(64) double exact[3][Lanes];
   alignas(64) double squared[Lanes];
   alignas(64) double triangle[Lanes];  ///< index of the triangle in the mesh
-  alignas(64) double triangleRef[Lanes];
+  alignas(64) double slot[Lanes];
   alignas(64) double height[Lanes];
   alignas(64) double side[3][Lanes];
   alignas(64) double inside[Lanes];  ///< 1 if the point projects into the triangle, else 0
+  alignas(64) double normal[3][Lanes];
+  alignas(64) double length[Lanes];
+  alignas(64) double firstCorner[Lanes];
 };
 
 extern template struct Search<1>;

@@ -19,39 +19,61 @@ int longestSide(const std::array<Vector3, 3>& corners) {
   return longest;
 }
 
-}  // namespace
+/// The longest side of a triangle and the triangle's plane.
+struct BaseAndPlane {
+  int first;  ///< number of the corner A among the corners of the triangle
+  double length;
+  Vector3 along, apex;  ///< `apex` leads from A to C
+  Vector3 normal;
+  bool isFlat;  ///< the triangle has no area, and the normal is any that is perpendicular to the side
+};
 
-TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t triangle) {
-  const int first = longestSide(corners);
-  const Vector3& a = corners[first];
-  const Vector3& b = corners[(first + 1) % 3];
-  const Vector3& c = corners[(first + 2) % 3];
+BaseAndPlane baseOf(const std::array<Vector3, 3>& corners) {
+  BaseAndPlane of;
+  of.first = longestSide(corners);
+  const Vector3& a = corners[of.first];
+  const Vector3& b = corners[(of.first + 1) % 3];
+  const Vector3& c = corners[(of.first + 2) % 3];
   const Vector3 base = b - a;
-  const Vector3 apex = c - a;
-
-  TriangleFrame frame;
-  frame.triangle = triangle;
-  frame.firstCorner = static_cast<std::uint32_t>(first);
-  frame.origin = a;
-  frame.length = base.norm();
-  frame.along = frame.length > 0 ? Vector3(base / frame.length) : Vector3::UnitX();
+  of.apex = c - a;
+  of.length = base.norm();
+  of.along = of.length > 0 ? Vector3(base / of.length) : Vector3::UnitX();
   // For a sliver, rounding may tilt the computed normal noticeably towards the base. `withoutBase` removes the
   // component of the normal along the base, before and after scaling to unit length. The remaining error is a
   // rotation about the base, which moves no point of the triangle by more than a rounding error. For triangles
   // parallel to a coordinate plane the normal is exact.
-  const auto withoutBase = [&](const Vector3& v) -> Vector3 { return v - frame.along * frame.along.dot(v); };
-  const Vector3 normal = withoutBase(frame.along.cross(apex));
+  const auto withoutBase = [&](const Vector3& v) -> Vector3 { return v - of.along * of.along.dot(v); };
+  const Vector3 normal = withoutBase(of.along.cross(of.apex));
   const double height = normal.norm();
   const double size = std::max({a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff(), c.cwiseAbs().maxCoeff()});
-  const bool flat = height <= kFlat * size;
-  frame.normal = flat ? frame.along.unitOrthogonal() : withoutBase(normal / height).normalized();
+  of.isFlat = height <= kFlat * size;
+  of.normal = of.isFlat ? of.along.unitOrthogonal() : withoutBase(normal / height).normalized();
+  return of;
+}
+
+}  // namespace
+
+TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t triangle) {
+  const BaseAndPlane of = baseOf(corners);
+  TriangleFrame frame;
+  frame.triangle = triangle;
+  frame.firstCorner = static_cast<std::uint32_t>(of.first);
+  frame.origin = corners[of.first];
+  frame.length = of.length;
+  frame.along = of.along;
+  frame.normal = of.normal;
   frame.across = frame.normal.cross(frame.along);
-  frame.apexAlong = std::clamp(frame.along.dot(apex), 0.0, frame.length);
-  frame.apexAcross = flat ? 0 : frame.across.dot(apex);
+  frame.apexAlong = std::clamp(frame.along.dot(of.apex), 0.0, frame.length);
+  frame.apexAcross = of.isFlat ? 0 : frame.across.dot(of.apex);
   frame.inverseSquaredLeft = inverseSquare(frame.apexAlong * frame.apexAlong + frame.apexAcross * frame.apexAcross);
   const double rest = frame.apexAlong - frame.length;
   frame.inverseSquaredRight = inverseSquare(rest * rest + frame.apexAcross * frame.apexAcross);
   return frame;
+}
+
+Vector3 unitNormalOf(const std::array<Vector3, 3>& corners) {
+  const BaseAndPlane of = baseOf(corners);
+  return of.isFlat ? Vector3(Vector3::Zero()) : of.normal;
 }
 
 }  // namespace hpsdf::bvh

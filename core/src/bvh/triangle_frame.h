@@ -36,7 +36,11 @@ inline bool hasArea(const TriangleFrame& frame) { return frame.apexAcross > 0; }
 /// If a triangle's height is below kFlat times its largest coordinate, its computed normal is only rounding noise.
 constexpr double kFlat = 4 * std::numeric_limits<double>::epsilon();
 
+/// Makes the frame of a triangle. search.cpp repeats these operations in SIMD, and tests compare both versions.
 TriangleFrame makeFrame(const std::array<Vector3, 3>& corners, std::uint32_t triangle);
+
+/// Returns the normal of a triangle's frame, or zero if the triangle has no area.
+Vector3 unitNormalOf(const std::array<Vector3, 3>& corners);
 
 /// The position of a point relative to a triangle.
 struct FramePoint {

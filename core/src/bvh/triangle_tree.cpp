@@ -3,18 +3,23 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <limits>
+#include <numeric>
+#include <span>
 #include <utility>
 
 namespace hpsdf::bvh {
 namespace {
 
-constexpr std::uint32_t kLeafSize = kWidth;
+constexpr std::uint32_t kBlockSize = kWidth;
+constexpr std::uint32_t kFew = 32;  ///< number of triangles up to which all divisions into blocks are compared
 constexpr int kBins = 16;
 constexpr float kNarrowest = 1e-30f;  ///< least extent of the triangle centers along an axis for a division into bins
 
-/// From this level of the tree on, a range of triangles is split into two halves of equal count. As a range has
-/// at most 2^32 triangles, no input makes the tree deeper than kMaxLevel + 32 levels.
+/// From this level of the tree on, a range of more than kFew triangles is split into two halves of about equal count.
+/// As a range has at most 2^32 triangles, no input makes the tree deeper than kMaxLevel + 32 levels.
 constexpr int kMaxLevel = 32;
 
 constexpr std::uint32_t kSamples = 1024;                              ///< upper limit of triangles sampled per split
@@ -27,6 +32,8 @@ struct Item {
   std::uint32_t triangle;
 
   Eigen::Array4f doubledCenter() const { return box.lower + box.upper; }
+  /// Returns the sort key along an axis. It differs from those of all other triangles.
+  std::pair<float, std::uint32_t> key(int axis) const { return {box.lower[axis] + box.upper[axis], triangle}; }
 };
 
 /// A range of triangles with two boxes: the bounding box of the triangles, and the bounding box of the doubled centers
@@ -43,6 +50,8 @@ struct Range {
   }
 };
 
+std::uint32_t blocksOf(std::uint32_t triangles) { return (triangles + kBlockSize - 1) / kBlockSize; }
+
 /// Maps the centers of a range of triangles to bin coordinates from 0 to `count` along each axis.
 struct Bins {
   explicit Bins(const Range& range)
@@ -58,7 +67,8 @@ struct Bins {
 };
 
 /// Builds a tree top-down. The triangles of a node are split in two where the surface-area heuristic has its
-/// least cost. Then the part with the largest surface area is split again, until there are four parts.
+/// least cost. Then parts are split again until there are four, mostly the one with the largest surface area. The lower
+/// part of every split fills its blocks.
 class Builder {
  public:
   explicit Builder(std::vector<Item>& items) : items_(items) {}
@@ -81,7 +91,7 @@ class Builder {
       Branch::Child& child = branch->children[i];
       child.begin = ranges[i].begin;
       child.end = ranges[i].end;
-      if (ranges[i].size() > kLeafSize) child.branch = build(ranges[i], level + 1);
+      if (ranges[i].size() > kBlockSize) child.branch = build(ranges[i], level + 1);
     };
     if (whole.size() > kParallel)
       tbb::parallel_for(0, branch->count, buildPart);
@@ -90,25 +100,33 @@ class Builder {
     return branch;
   }
 
+  /// Returns the key by which the next part to be split is chosen, the greatest first: a part of two blocks, which then
+  /// needs no node of its own; then others by their surface area; last of all a part of four blocks, which fills a
+  /// node.
+  static std::pair<int, float> precedenceOf(const Range& part) {
+    const std::uint32_t blocks = blocksOf(part.size());
+    return {blocks == 2 ? 1 : blocks == kWidth ? -1 : 0, part.box.area()};
+  }
+
   /// Divides `parts[0]` into up to kWidth parts and returns their number.
   int divide(std::array<Range, kWidth>& parts, int level) {
     int count = 1;
     while (count < kWidth) {
-      int largest = -1;
+      int next = -1;
       for (int i = 0; i < count; ++i)
-        if (parts[i].size() > kLeafSize && (largest < 0 || parts[i].box.area() > parts[largest].box.area()))
-          largest = i;
-      if (largest < 0) break;
-      const auto [below, above] = split(parts[largest], level);
-      std::move_backward(parts.begin() + largest + 1, parts.begin() + count, parts.begin() + count + 1);
-      parts[largest] = below;
-      parts[largest + 1] = above;
+        if (parts[i].size() > kBlockSize && (next < 0 || precedenceOf(parts[i]) > precedenceOf(parts[next]))) next = i;
+      if (next < 0) break;
+      const auto [below, above] = split(parts[next], level);
+      std::move_backward(parts.begin() + next + 1, parts.begin() + count, parts.begin() + count + 1);
+      parts[next] = below;
+      parts[next + 1] = above;
       ++count;
     }
     return count;
   }
 
   std::pair<Range, Range> split(const Range& range, int level) {
+    if (range.size() <= kFew) return splitFew(range);
     const Eigen::Array4f extent = range.centers.upper - range.centers.lower;
     int widest = 0;
     extent.head<3>().maxCoeff(&widest);
@@ -116,8 +134,76 @@ class Builder {
     const Bins bins(range);
     const auto [axis, cut] = bestCut(range, bins);
     if (cut == 0) return splitByCount(range, widest);
-    return partition(range,
-                     [&, a = axis, c = static_cast<float>(cut)](const Item& item) { return bins.at(item)[a] < c; });
+    auto [below, above] =
+        partition(range, [&, a = axis, c = static_cast<float>(cut)](const Item& item) { return bins.at(item)[a] < c; });
+    fillBlocks(below, above, axis);
+    return {below, above};
+  }
+
+  /// Moves up to three triangles between the parts of a split along an axis, so that the lower part fills its blocks.
+  /// A box from which triangles are moved is not made smaller: the boxes serve only to find good splits.
+  void fillBlocks(Range& below, Range& above, int axis) {
+    const std::uint32_t over = below.size() % kBlockSize, missing = kBlockSize - over;
+    if (over == 0) return;
+    const auto lower = [&](const Item& a, const Item& b) { return a.key(axis) < b.key(axis); };
+    const auto at = [&](std::uint32_t place) { return items_.begin() + place; };
+    if (below.size() < kBlockSize || (missing < over && missing < above.size())) {
+      for (std::uint32_t i = 0; i < missing; ++i) {
+        std::iter_swap(std::min_element(at(above.begin), at(above.end), lower), at(above.begin));
+        below.extend(items_[above.begin]);
+        below.end = ++above.begin;
+      }
+    } else {
+      for (std::uint32_t i = 0; i < over; ++i) {
+        std::iter_swap(std::max_element(at(below.begin), at(below.end), lower), at(below.end - 1));
+        above.extend(items_[below.end - 1]);
+        above.begin = --below.end;
+      }
+    }
+  }
+
+  /// Splits at most kFew triangles, sorted by their centers along one of the axes, between two blocks: of all such
+  /// splits, at the one with the least cost.
+  std::pair<Range, Range> splitFew(const Range& range) {
+    using Places = std::array<std::uint8_t, kFew>;
+    const std::span<Item> items(items_.data() + range.begin, range.size());
+    Places best{};
+    std::uint32_t bestCut = kBlockSize;
+    float bestCost = std::numeric_limits<float>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      Places places{};
+      const auto end = places.begin() + std::ptrdiff_t(items.size());
+      std::iota(places.begin(), end, std::uint8_t{0});
+      std::sort(places.begin(), end,
+                [&](std::uint8_t a, std::uint8_t b) { return items[a].key(axis) < items[b].key(axis); });
+      std::array<float, kFew + 1> above;  // for each number of triangles in the lower part, the cost of the upper part
+      FloatBox box;
+      for (auto i = std::uint32_t(items.size()); i-- > kBlockSize;) {
+        box.extend(items[places[i]].box);
+        above[i] = costOf(box, std::uint32_t(items.size()) - i);
+      }
+      box = FloatBox();
+      for (std::uint32_t i = 0; i + 1 < items.size(); ++i) {
+        box.extend(items[places[i]].box);
+        const std::uint32_t cut = i + 1;
+        if (cut % kBlockSize != 0) continue;
+        const float cost = costOf(box, cut) + above[cut];
+        if (cost < bestCost || bestCost == std::numeric_limits<float>::infinity())
+          bestCost = cost, best = places, bestCut = cut;
+      }
+    }
+    std::array<Item, kFew> sorted;
+    for (std::size_t i = 0; i < items.size(); ++i) sorted[i] = items[best[i]];
+    std::copy_n(sorted.begin(), items.size(), items.begin());
+    const std::uint32_t middle = range.begin + bestCut;
+    return {makeRange(range.begin, middle), makeRange(middle, range.end)};
+  }
+
+  /// Returns the cost of visiting a part: its surface area times the number of its blocks and of the nodes that they
+  /// need at least. A node counts twice, which leaves few nodes unfilled.
+  static float costOf(const FloatBox& box, std::uint32_t count) {
+    const std::uint32_t blocks = blocksOf(count), nodes = (blocks + 1) / (kWidth - 1);
+    return box.area() * static_cast<float>(blocks + 2 * nodes);
   }
 
   template <typename IsBelow>
@@ -181,10 +267,9 @@ class Builder {
   }
 
   std::pair<Range, Range> splitByCount(const Range& range, int axis) {
-    const std::uint32_t middle = range.begin + range.size() / 2;
-    const auto key = [axis](const Item& item) { return std::pair(item.doubledCenter()[axis], item.triangle); };
+    const std::uint32_t middle = range.begin + blocksOf(range.size()) / 2 * kBlockSize;
     std::nth_element(items_.begin() + range.begin, items_.begin() + middle, items_.begin() + range.end,
-                     [&](const Item& a, const Item& b) { return key(a) < key(b); });
+                     [&](const Item& a, const Item& b) { return a.key(axis) < b.key(axis); });
     return {makeRange(range.begin, middle), makeRange(middle, range.end)};
   }
 

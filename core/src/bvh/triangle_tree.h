@@ -38,8 +38,8 @@ struct FloatBox {
 /// of triangles.
 struct Branch {
   struct Child {
-    std::uint32_t begin = 0, end = 0;
-    std::unique_ptr<Branch> branch;  ///< null for a block of at most kWidth triangles
+    std::uint32_t begin = 0, end = 0;  ///< `begin` is a multiple of kWidth
+    std::unique_ptr<Branch> branch;    ///< null for a block
   };
   std::array<Child, kWidth> children;
   int count = 0;  ///< number of children in use; the range of each begins where the previous one ends
@@ -51,8 +51,9 @@ struct TriangleTree {
 };
 
 /// Builds the tree of triangles with the vertices `points`. The coordinates of the vertices have magnitudes of
-/// about 1; the fourth component is 0. No input makes the tree deeper than 64 levels. The result does not depend
-/// on the number of threads.
+/// about 1; the fourth component is 0. All blocks but the last one have kWidth triangles, so that block b begins at the
+/// position kWidth·b of the order. No input makes the tree deeper than 64 levels. The result does not depend on the
+/// number of threads.
 TriangleTree makeTriangleTree(const std::vector<Eigen::Array4f>& points, const std::vector<Triangle>& triangles);
 
 }  // namespace hpsdf::bvh

@@ -56,7 +56,7 @@ class Collector {
         if (child == bvh::kEmpty || squaredDistanceToBox(node, lane) > squaredReach_) continue;
         if ((child & bvh::kBlockBit) == 0)
           stack.push_back(child);
-        else if (!addBlock(hierarchy_.blocks()[child & ~bvh::kBlockBit]))
+        else if (!addBlock(child & ~bvh::kBlockBit))
           return std::nullopt;
       }
     }
@@ -78,9 +78,9 @@ class Collector {
     return sum;
   }
 
-  bool addBlock(const bvh::Block& block) {
-    for (std::uint32_t slot = block.first; slot < block.first + block.count; ++slot)
-      if (bvh::squaredDistance(hierarchy_.frames()[slot], x_) <= squaredRadius_) found_.push_back(slot);
+  bool addBlock(std::uint32_t block) {
+    for (const std::uint32_t slot : hierarchy_.slotsOf(block))
+      if (bvh::squaredDistance(hierarchy_.frame(slot), x_) <= squaredRadius_) found_.push_back(slot);
     return found_.size() <= most_;
   }
 

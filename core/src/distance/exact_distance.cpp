@@ -70,19 +70,23 @@ bool enclosesAnyPoint(const WindingSign& winding, const Box& mesh) {
 /// connected if they share an edge that no third triangle uses and are consistently oriented at that edge.
 std::vector<std::uint32_t> largestOfComponents(const Hierarchy& hierarchy,
                                                const std::vector<mesh::DirectedEdge>& sides) {
-  const auto frames = hierarchy.frames();
-  mesh::DisjointSets components(frames.size());
+  const auto count = static_cast<std::uint32_t>(hierarchy.triangles().size());
+  mesh::DisjointSets components(count);
   mesh::forEachEdge(sides, [&](std::span<const mesh::DirectedEdge> edge) {
     if (edge.size() == 2 && edge[0].rising != edge[1].rising) components.join(edge[0].face, edge[1].face);
   });
-  const auto area = [&](std::uint32_t slot) { return frames[slot].length * frames[slot].apexAcross; };
-  std::vector<std::uint32_t> largest(frames.size());  // indexed by the first triangle of each component
-  for (std::uint32_t slot = 0; slot < frames.size(); ++slot) {
+  std::vector<double> areas(count);  // doubled
+  tbb::parallel_for(0U, count, [&](std::uint32_t slot) {
+    const bvh::TriangleFrame frame = hierarchy.frame(slot);
+    areas[slot] = frame.length * frame.apexAcross;
+  });
+  std::vector<std::uint32_t> largest(count);  // indexed by the first triangle of each component
+  for (std::uint32_t slot = 0; slot < count; ++slot) {
     const std::uint32_t first = components.first(slot);
-    if (first == slot || area(slot) > area(largest[first])) largest[first] = slot;
+    if (first == slot || areas[slot] > areas[largest[first]]) largest[first] = slot;
   }
   std::vector<std::uint32_t> slots;
-  for (std::uint32_t slot = 0; slot < frames.size(); ++slot)
+  for (std::uint32_t slot = 0; slot < count; ++slot)
     if (components.first(slot) == slot) slots.push_back(largest[slot]);
   return slots;
 }
@@ -115,7 +119,8 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
     return ChosenInsideTest{.choice = {InsideTest::winding, std::move(reason), position},
                             .winding = std::move(winding)};
   };
-  const auto frames = hierarchy.frames();
+  const std::size_t count = hierarchy.triangles().size();
+  const auto originOf = [&](std::size_t slot) { return hierarchy.frame(static_cast<std::uint32_t>(slot)).origin; };
 
   // Choose the winding number if the mesh has unbalanced edges, along which more triangles run in one direction than in
   // the other. The mesh then has holes.
@@ -134,9 +139,9 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
 
   // Choose the winding number if a triangle is too thin or two surfaces are too close. Rounding errors could then
   // select the pseudonormal of a wrong surface.
-  const auto thin = std::ranges::find_if_not(frames, bvh::hasArea);
-  if (thin != frames.end())
-    return byWinding("a face is thinner than the rounding errors of its corners", thin->origin,
+  const auto isThin = [&](std::size_t slot) { return !hasArea(hierarchy.frame(static_cast<std::uint32_t>(slot))); };
+  if (const auto thin = firstWhere(count, isThin))
+    return byWinding("a face is thinner than the rounding errors of its corners", originOf(*thin),
                      WindingSign(hierarchy, mesh, std::move(edges)));
   const Crossings crossings = surface::findCrossings(hierarchy, 1, kTooNear, progress);
   if (!crossings.found.empty())
@@ -150,15 +155,15 @@ ChosenInsideTest chooseInsideTest(const Hierarchy& hierarchy, const TriangleMesh
     WindingSign winding(hierarchy, mesh, std::move(edges));
     const auto isWrong = [&](std::size_t i) { return !winding.separatesOutsideFromInside(largest[i]); };
     if (const auto wrong = firstWhere(largest.size(), isWrong))
-      return byWinding("a component is oriented the wrong way, or lies within another", frames[largest[*wrong]].origin,
+      return byWinding("a component is oriented the wrong way, or lies within another", originOf(largest[*wrong]),
                        std::move(winding));
   }
   Pseudonormals normals(hierarchy);
   const auto tooSharp = [&](std::size_t slot) {
     return sign::isSharp(hierarchy, normals, static_cast<std::uint32_t>(slot));
   };
-  if (const auto sharp = firstWhere(frames.size(), tooSharp))
-    return byWinding("an edge or corner is too sharp for normals", frames[*sharp].origin,
+  if (const auto sharp = firstWhere(count, tooSharp))
+    return byWinding("an edge or corner is too sharp for normals", originOf(*sharp),
                      WindingSign(hierarchy, mesh, std::move(edges)));
   return {.choice = {InsideTest::pseudonormal, "the mesh has no holes and does not intersect itself"},
           .normals = std::move(normals)};
@@ -208,8 +213,8 @@ struct ExactDistance::Data {
     inside.winding = WindingSign(wholeMesh, mesh, BoundaryEdges(wholeMesh));
     surface::OuterHull hull = surface::makeOuterHull(wholeMesh, mesh, inside.winding, progress);
     hierarchy = Hierarchy(hull.mesh, source.box);
-    std::vector<std::uint32_t> slotOf(wholeMesh.frames().size());
-    for (std::uint32_t slot = 0; slot < slotOf.size(); ++slot) slotOf[wholeMesh.frames()[slot].triangle] = slot;
+    std::vector<std::uint32_t> slotOf(wholeMesh.triangles().size());
+    for (std::uint32_t slot = 0; slot < slotOf.size(); ++slot) slotOf[wholeMesh.numbers()[slot]] = slot;
     hullSlots = std::move(hull.sourceTriangles);
     for (std::uint32_t& slot : hullSlots) slot = slotOf[slot];  // until now, the number of the mesh's triangle
   }
@@ -228,18 +233,17 @@ struct ExactDistance::Data {
   /// that a query point on a vertex has distance 0. If the inside test is by pseudonormals, the distance has the
   /// pseudonormal's sign.
   Foot resolve(const Hierarchy& triangles, const Vector3& x, const bvh::Nearest& nearest) const {
-    const std::uint32_t slot = triangles.slotAt(nearest.triangleRef);
-    const bvh::TriangleFrame& frame = triangles.frames()[slot];
+    const std::uint32_t slot = nearest.slot;
     const bvh::FramePoint& point = nearest.point;
     std::uint32_t side = point.side[1] < point.side[0] ? 1 : 0;
     if (point.side[2] < point.side[side]) side = 2;
     // If the point projects onto an edge up to rounding errors, the closest point is not in the interior of the
     // face.
-    const double rounding = bvh::kFlat * bvh::kFlat * (frame.length * frame.length + point.height * point.height);
+    const double rounding = bvh::kFlat * bvh::kFlat * (nearest.length * nearest.length + point.height * point.height);
     if (point.inside && point.side[side] > rounding)  // adding 0 turns -0 into 0
-      return {x - frame.normal * point.height, point.height + 0.0, slot, Feature::face};
+      return {x - nearest.normal * point.height, point.height + 0.0, slot, Feature::face};
 
-    const std::uint32_t from = (frame.firstCorner + side) % 3, to = (from + 1) % 3;
+    const std::uint32_t from = (nearest.firstCorner + side) % 3, to = (from + 1) % 3;
     const std::uint32_t va = triangles.triangles()[slot][from], vb = triangles.triangles()[slot][to];
     const Vector3& a = triangles.vertices()[va];
     const Vector3& b = triangles.vertices()[vb];
@@ -275,12 +279,12 @@ struct ExactDistance::Data {
   /// Returns the closest point with everything that is known of it, but for the inside tests other than pseudonormals.
   ClosestPoint closestOf(const Vector3& x, const bvh::Nearest& nearest) const {
     const Foot foot = resolve(hierarchy, x, nearest);
-    const bvh::TriangleFrame& frame = hierarchy.frames()[foot.slot];
-    ClosestPoint closest{foot.point, foot.signedDistance, frame.triangle, foot.feature, foot.index};
+    const std::uint32_t triangle = hierarchy.numbers()[foot.slot];
+    ClosestPoint closest{foot.point, foot.signedDistance, triangle, foot.feature, foot.index};
     if (!hullSlots.empty()) {
-      describeInMesh(closest, wholeMesh.frames()[hullSlots[frame.triangle]]);
+      describeInMesh(closest, wholeMesh.frame(hullSlots[triangle]));
     } else if (foot.feature == Feature::face) {
-      closest.barycentric = barycentric(frame, x);
+      closest.barycentric = barycentric(hierarchy.frame(foot.slot), x);
     } else if (foot.feature == Feature::edge) {
       closest.barycentric[foot.index] = 1 - foot.along;
       closest.barycentric[(foot.index + 1) % 3] = foot.along;
@@ -308,14 +312,12 @@ struct ExactDistance::Data {
 
   /// Returns the unit vector from the closest point on the nearest triangle to x. If x is so close to the triangle that
   /// rounding decides about this direction, returns the triangle's normal, on the side of x.
-  static Vector3 directionFrom(const Foot& closest, const Hierarchy& triangles, const Vector3& x,
-                               const bvh::Nearest& nearest) {
+  static Vector3 directionFrom(const Foot& closest, const Vector3& x, const bvh::Nearest& nearest) {
     constexpr double kRounding = 1e-8;  // far more than the relative rounding error of a closest point
     const Vector3 difference = x - closest.point;
     const double length = difference.norm();
     if (closest.feature != Feature::face && length > kRounding * x.cwiseAbs().maxCoeff()) return difference / length;
-    const Vector3& normal = triangles.frames()[triangles.slotAt(nearest.triangleRef)].normal;
-    return nearest.point.height < 0 ? Vector3(-normal) : normal;
+    return nearest.point.height < 0 ? Vector3(-nearest.normal) : nearest.normal;
   }
 
   /// Finds the nearest triangles of points in a hierarchy, packet by packet, and calls visit(index of the point,
@@ -338,7 +340,7 @@ struct ExactDistance::Data {
     forEachNearest(triangles, points, [&](std::size_t i, const bvh::Nearest& nearest) {
       const Foot closest = resolve(triangles, points[i], nearest);
       out[i] = closest.signedDistance;
-      if (!directions.empty()) directions[i] = directionFrom(closest, triangles, points[i], nearest);
+      if (!directions.empty()) directions[i] = directionFrom(closest, points[i], nearest);
     });
   }
 

@@ -80,19 +80,19 @@ std::optional<WindingReference> ExactLeafSigns::referenceIn(const Box& box) cons
 void ExactLeafSigns::prepare() const {
   normals_.emplace(hierarchy_);
   const Crossings crossings = surface::findCrossings(hierarchy_, kMaxCrossings, kTooNear, {});
-  std::vector<bool> crosses(hierarchy_.frames().size(), !crossings.complete);
+  std::vector<bool> crosses(hierarchy_.triangles().size(), !crossings.complete);
   for (const Crossing& crossing : crossings.found)
     for (const std::uint32_t triangle : crossing.triangles) crosses[triangle] = true;
   known_.assign(crosses.size(), 0);
   for (std::size_t slot = 0; slot < known_.size(); ++slot)
-    if (crosses[hierarchy_.frames()[slot].triangle]) known_[slot] = 1 + static_cast<int>(Sides::unknown);
+    if (crosses[hierarchy_.numbers()[slot]]) known_[slot] = 1 + static_cast<int>(Sides::unknown);
 }
 
 ExactLeafSigns::Sides ExactLeafSigns::sidesOf(std::uint32_t slot) const {
   std::call_once(isPrepared_, [&] { prepare(); });
   const std::atomic_ref known(known_[slot]);
   if (known == 0) {
-    const bool isCertain = bvh::hasArea(hierarchy_.frames()[slot]) && !sign::isSharp(hierarchy_, *normals_, slot);
+    const bool isCertain = bvh::hasArea(hierarchy_.frame(slot)) && !sign::isSharp(hierarchy_, *normals_, slot);
     known = static_cast<std::uint8_t>(1 + static_cast<int>(isCertain ? winding_.sidesOf(slot) : Sides::unknown));
   }
   return static_cast<Sides>(known.load() - 1);

@@ -26,9 +26,8 @@ struct CornersByVertex {
 CornersByVertex groupCorners(const bvh::Hierarchy& hierarchy) {
   const auto triangles = hierarchy.triangles();
   std::vector<std::uint32_t> slots(triangles.size());  // position of each mesh triangle in the hierarchy's order
-  tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t slot) {
-    slots[hierarchy.frames()[slot].triangle] = static_cast<std::uint32_t>(slot);
-  });
+  tbb::parallel_for(std::size_t{0}, slots.size(),
+                    [&](std::size_t slot) { slots[hierarchy.numbers()[slot]] = static_cast<std::uint32_t>(slot); });
   CornersByVertex grouped{std::vector<std::uint32_t>(hierarchy.vertices().size() + 1, 0),
                           std::vector<std::uint32_t>(3 * triangles.size())};
   for (const auto& triangle : triangles)
@@ -41,14 +40,25 @@ CornersByVertex groupCorners(const bvh::Hierarchy& hierarchy) {
   return grouped;
 }
 
-Vector3 unitNormal(const bvh::TriangleFrame& frame) { return hasArea(frame) ? frame.normal : Vector3(Vector3::Zero()); }
+Vector3 unitNormal(const bvh::Hierarchy& hierarchy, std::uint32_t slot) {
+  return bvh::unitNormalOf(hierarchy.corners(slot));
+}
+
+/// Returns the unit normals of all triangles in the hierarchy's order.
+std::vector<Vector3> unitNormalsOf(const bvh::Hierarchy& hierarchy) {
+  std::vector<Vector3> normals(hierarchy.triangles().size());
+  tbb::parallel_for(std::size_t{0}, normals.size(),
+                    [&](std::size_t slot) { normals[slot] = unitNormal(hierarchy, static_cast<std::uint32_t>(slot)); });
+  return normals;
+}
 
 /// Computes the pseudonormals of vertices, one vertex after another, and reuses its buffers from vertex to
 /// vertex.
 class VertexVisitor {
  public:
-  VertexVisitor(const bvh::Hierarchy& hierarchy, std::vector<std::uint32_t>& nextSide)
-      : frames_(hierarchy.frames()),
+  VertexVisitor(const bvh::Hierarchy& hierarchy, std::span<const Vector3> unitNormals,
+                std::vector<std::uint32_t>& nextSide)
+      : unitNormals_(unitNormals),
         triangles_(hierarchy.triangles()),
         vertices_(hierarchy.vertices()),
         nextSide_(nextSide) {}
@@ -64,7 +74,7 @@ class VertexVisitor {
       const std::uint32_t next = triangles_[slot][(k + 1) % 3], previous = triangles_[slot][before];
       const Vector3 toNext = vertices_[next] - vertices_[vertex];
       const Vector3 toPrevious = vertices_[previous] - vertices_[vertex];
-      sum += std::atan2(toNext.cross(toPrevious).norm(), toNext.dot(toPrevious)) * unitNormal(frames_[slot]);
+      sum += std::atan2(toNext.cross(toPrevious).norm(), toNext.dot(toPrevious)) * unitNormals_[slot];
       if (next >= vertex) addSide(next, corner);
       if (previous > vertex) addSide(previous, 3 * slot + before);
     }
@@ -89,7 +99,7 @@ class VertexVisitor {
   }
   std::uint32_t numberOf(std::uint64_t side) const { return numbers_[static_cast<std::uint32_t>(side)]; }
 
-  std::span<const bvh::TriangleFrame> frames_;
+  std::span<const Vector3> unitNormals_;  ///< by slot
   std::span<const Triangle> triangles_;
   std::span<const Vector3> vertices_;
   std::vector<std::uint32_t>& nextSide_;
@@ -104,8 +114,9 @@ class VertexVisitor {
 Pseudonormals::Pseudonormals(const bvh::Hierarchy& hierarchy)
     : vertices_(hierarchy.vertices().size()), nextSide_(3 * hierarchy.triangles().size()) {
   const CornersByVertex grouped = groupCorners(hierarchy);
+  const std::vector<Vector3> unitNormals = unitNormalsOf(hierarchy);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size()), [&](const auto& range) {
-    VertexVisitor visitor(hierarchy, nextSide_);
+    VertexVisitor visitor(hierarchy, unitNormals, nextSide_);
     for (std::size_t v = range.begin(); v < range.end(); ++v)
       vertices_[v] =
           visitor.visit(static_cast<std::uint32_t>(v),
@@ -114,14 +125,14 @@ Pseudonormals::Pseudonormals(const bvh::Hierarchy& hierarchy)
 }
 
 Vector3 Pseudonormals::ofEdge(const bvh::Hierarchy& hierarchy, std::uint32_t slot, std::uint32_t k) const {
-  const auto rank = [&](std::uint32_t side) { return std::pair(hierarchy.frames()[side / 3].triangle, side); };
+  const auto rank = [&](std::uint32_t side) { return std::pair(hierarchy.numbers()[side / 3], side); };
   std::uint32_t side = 3 * slot + k;
   while (rank(nextSide_[side]) > rank(side)) side = nextSide_[side];
   const std::uint32_t last = side;
   Vector3 sum = Vector3::Zero();
   do {
     side = nextSide_[side];
-    sum += unitNormal(hierarchy.frames()[side / 3]);
+    sum += unitNormal(hierarchy, side / 3);
   } while (side != last);
   return sum;
 }

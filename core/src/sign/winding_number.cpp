@@ -44,7 +44,7 @@ double squaredFarDistance(double area, double radius, double error) {
 void WindingNumber::addCluster(std::uint32_t child, std::uint32_t begin, std::uint32_t end) {
   const auto firstSlot = [&](std::uint32_t of) {
     while ((of & bvh::kBlockBit) == 0) of = hierarchy_->nodes()[of].child[0];
-    return hierarchy_->blocks()[of & ~bvh::kBlockBit].first;
+    return (of & ~bvh::kBlockBit) * std::uint32_t(bvh::kWidth);
   };
   const std::size_t self = clusters_.size();
   clusters_.push_back({.begin = begin, .end = end});

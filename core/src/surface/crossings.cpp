@@ -227,7 +227,7 @@ struct OrderedTriangles {
 
 OrderedTriangles inOrderOf(const bvh::Hierarchy& hierarchy) {
   OrderedTriangles ordered{hierarchy.vertices(), hierarchy.triangles(), {}};
-  for (const bvh::TriangleFrame& frame : hierarchy.frames()) ordered.numbers.push_back(frame.triangle);
+  ordered.numbers.assign(hierarchy.numbers().begin(), hierarchy.numbers().end());
   return ordered;
 }
 

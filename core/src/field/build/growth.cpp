@@ -109,14 +109,12 @@ class Growth {
   void fitFirstCells() {
     constexpr std::size_t kChunk = 4096;
     BuildTree& tree = state_.tree;
-    if (tree.nodes.empty()) {
-      tree.addBaseCells();
-      if (setup_.exactCells) {
-        const auto smooth = [&](const Box& cell) { return refiner_.smoothFit(cell); };
-        placeExactLeaves(
-            tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress,
-            [&](const ExactEstimate& soFar) { requireMemoryForExact(soFar, setup_.distance.bytes(), setup_.options); });
-      }
+    if (tree.nodes.empty()) tree.addBaseCells();
+    if (state_.fittedCells == 0 && setup_.exactCells) {
+      const auto smooth = [&](const Box& cell) { return refiner_.smoothFit(cell); };
+      placeExactLeaves(
+          tree, *setup_.exactCells, smooth, setup_.options.maxDepth, setup_.progress,
+          [&](const ExactEstimate& soFar) { requireMemoryForExact(soFar, setup_.distance.bytes(), setup_.options); });
     }
     const std::size_t count = tree.nodes.size();
     while (state_.fittedCells < count) {

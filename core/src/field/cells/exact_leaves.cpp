@@ -145,16 +145,16 @@ std::vector<std::uint32_t> splitChosen(BuildTree& tree, std::span<const std::uin
   return children;
 }
 
-/// Decides what becomes of cells of one depth, and fits those that stay whole.
+/// Decides what becomes of cells, and fits those that stay whole.
 std::vector<Choice> chooseForCells(BuildTree& tree, std::span<const std::uint32_t> level, const ExactCells& cells,
-                                   const SmoothFit& smoothFit, bool isDivisible, const Progress& progress) {
+                                   const SmoothFit& smoothFit, int maxDepth, const Progress& progress) {
   constexpr std::size_t kChunk = 1024;
   std::vector<Choice> choices(level.size());
   for (std::size_t begin = 0; begin < level.size(); begin += kChunk) {
     progress.update("finding exact cells", double(begin) / double(level.size()));
     tbb::parallel_for(begin, std::min(begin + kChunk, level.size()), [&](std::size_t i) {
       BuildNode& node = tree.nodes[level[i]];
-      choices[i] = chooseForCell(node, tree.boxOf(node), cells, smoothFit, isDivisible);
+      choices[i] = chooseForCell(node, tree.boxOf(node), cells, smoothFit, int(node.depth) < maxDepth);
     });
   }
   return choices;
@@ -197,11 +197,12 @@ ExactCells::Outcome chooseExact(const Box& cell, const ExactCells& cells, const 
 
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
                       const Progress& progress, const std::function<void(const ExactEstimate&)>& afterDepth) {
-  std::vector<std::uint32_t> level(tree.nodes.size());
-  std::iota(level.begin(), level.end(), 0U);
+  std::vector<std::uint32_t> level;
+  for (std::uint32_t n = 0; n < tree.nodes.size(); ++n)
+    if (tree.nodes[n].firstChild == 0 && !tree.nodes[n].fit.isFinal) level.push_back(n);
   ExactEstimate size;
-  for (int depth = 0; !level.empty(); ++depth) {
-    const auto choices = chooseForCells(tree, level, cells, smoothFit, depth < maxDepth, progress);
+  while (!level.empty()) {
+    const auto choices = chooseForCells(tree, level, cells, smoothFit, maxDepth, progress);
     for (const std::uint32_t node : level) size.listBytes += bytesOf(tree.nodes[node].fit.list);
     level = splitChosen(tree, level, choices);
     size.nodes = double(tree.nodes.size());
@@ -218,8 +219,8 @@ ExactEstimate estimateExactLeaves(BuildTree&& baseCells, const ExactCells& cells
   ExactEstimate estimate{.nodes = double(level.size()), .overestimate = kOverestimateBySamples};
   std::mt19937 random;  // always with the same seed: the estimate is the same for any number of threads
   double each = 1;      // number of cells that each cell of the sample stands for
-  for (int depth = 0; !level.empty() && estimate.nodes <= mostNodes; ++depth) {
-    auto choices = chooseForCells(sample, level, cells, none, depth < maxDepth, progress);
+  while (!level.empty() && estimate.nodes <= mostNodes) {
+    auto choices = chooseForCells(sample, level, cells, none, maxDepth, progress);
     estimate.listBytes += each * takeLists(sample, level);
     each *= sampleSplits(choices, random);
     level = splitChosen(sample, level, choices);

@@ -86,9 +86,9 @@ struct ExactEstimate {
 inline constexpr double kOverestimateBySamples = 5;
 
 /// Makes the leaves exact that may contain points close to the surface, or takes the polynomial from `smoothFit` where
-/// there is one. Starts from the base cells of a tree without fits, and divides cells whose lists are too long. Cells
-/// far from the surface remain without fits. Reports progress and throws `Cancelled`. Calls `afterDepth` with the size
-/// so far whenever the cells of a depth are done.
+/// there is one. Starts from the leaves of a tree whose fits are not final, such as its base cells, and divides cells
+/// whose lists are too long. Cells far from the surface remain without fits. Reports progress and throws `Cancelled`.
+/// Calls `afterDepth` with the size so far whenever these cells, or the children of those that were divided, are done.
 void placeExactLeaves(BuildTree& tree, const ExactCells& cells, const SmoothFit& smoothFit, int maxDepth,
                       const Progress& progress, const std::function<void(const ExactEstimate&)>& afterDepth);
 

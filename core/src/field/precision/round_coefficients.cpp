@@ -57,8 +57,9 @@ QuantizationLimits limitsOf(const FieldData& field) {
   return {settings, field.metadata.referenceLength, field.exact.offset};
 }
 
-/// Returns the greatest steps of a field's leaves that keep to the limits and to the RMS error.
-std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimits& limits) {
+/// Returns the greatest steps of a field's leaves that keep to the limits and to the RMS error, and those that are
+/// given.
+std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimits& limits, const KeptSteps& kept) {
   QuantizedPart part;
   forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
     part.add(query::cellSize(field, at.depth).prod(), double(c.size()));
@@ -67,17 +68,19 @@ std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimi
                                                      : kUnlimitedChange;
   std::vector<double> steps(field.nodes.size());
   forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
-    steps[at.node] = std::min(forRms, limits.greatestStep(c, node::degree(field.nodes[at.node])));
+    const double given = kept.steps.empty() ? 0 : kept.steps[at.node];
+    steps[at.node] = given > 0 ? given : std::min(forRms, limits.greatestStep(c, node::degree(field.nodes[at.node])));
   });
   return steps;
 }
 
 /// Quantizes with steps that are all made greater until the coefficients take no more than `mostBytes`. Without such a
-/// limit the steps are as given.
-std::optional<query::Quantized> quantizedWithin(const FieldData& field, std::vector<double> steps, double mostBytes) {
+/// limit the steps are as given, and `fieldStep` is that of the field unless it is 0.
+std::optional<query::Quantized> quantizedWithin(const FieldData& field, std::vector<double> steps, double mostBytes,
+                                                double fieldStep) {
   constexpr double kFactor = 1.05;
   constexpr int kMostTries = 500;  // The last step is 4e10 times the first, and all integers are 0.
-  std::optional<query::Quantized> result = query::quantized(field, steps);
+  std::optional<query::Quantized> result = query::quantized(field, steps, fieldStep);
   if (mostBytes < kUnlimitedChange && !steps.empty()) {
     // With steps that differ more, no factor would help.
     const double least = std::ldexp(*std::ranges::max_element(steps), -QuantizedCoefficients::kMostShift);
@@ -101,10 +104,11 @@ double leastError(const FieldData& field) {
 
 /// Quantizes the coefficients of a field as `CoefficientType::quantized` says. Returns false, and leaves the field as
 /// it is, if that is not possible.
-bool quantizeCoefficients(FieldData& field, double mostBytes) {
+bool quantizeCoefficients(FieldData& field, double mostBytes, const KeptSteps& kept) {
   FieldMetadata& metadata = field.metadata;
   const QuantizationLimits limits = limitsOf(field);
-  std::optional<query::Quantized> quantized = quantizedWithin(field, greatestSteps(field, limits), mostBytes);
+  std::optional<query::Quantized> quantized =
+      quantizedWithin(field, greatestSteps(field, limits, kept), mostBytes, kept.step);
   if (!quantized) return false;
   metadata.roundingRms = query::quantizedRounding(field, quantized->nodes, quantized->coefficients).rms;
   const double change = greatestChange(field, *quantized, limits), maxError = metadata.settings.maxError;
@@ -183,10 +187,10 @@ double QuantizedPart::stepForChange(double rms) const {
   return volume > 0 ? rms * std::sqrt(12 * volume / integers) : kUnlimitedChange;
 }
 
-void roundCoefficients(CoefficientType type, FieldData& field, double mostBytes) {
+void roundCoefficients(CoefficientType type, FieldData& field, double mostBytes, const KeptSteps& kept) {
   if (query::hasFloatVertices(field.exact)) query::roundVertices(field.exact);
   const bool mayQuantize = type == CoefficientType::quantized || type == CoefficientType::automatic;
-  if (mayQuantize && quantizeCoefficients(field, mostBytes)) return;
+  if (mayQuantize && quantizeCoefficients(field, mostBytes, kept)) return;
   const query::Rounding rounding = query::floatRounding(field);
   FieldMetadata& metadata = field.metadata;
   const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "hpsdf/detail/field_data.h"
 
@@ -65,10 +66,17 @@ class QuantizationLimits {
   std::array<double, kMaxDegree + 1> changeByStep_{};  ///< greatest change by a step of 1, by degree
 };
 
+/// Steps of quantized coefficients that are given: the step of the whole field, and those of some leaves.
+struct KeptSteps {
+  double step = 0;                 ///< 0 if no steps are given
+  std::vector<double> steps = {};  ///< for each node; 0 for a leaf that may have any step
+};
+
 /// Rounds the coefficients of a field, and the vertices of its exact leaves, from double to `type`. Vertices that are
 /// floats already are stored as floats in any case. Sets `roundingRms` and `measuredError` in the field's metadata.
-/// Quantized coefficients take no more than `mostBytes`, at the price of a greater change.
+/// Quantized coefficients take no more than `mostBytes`, at the price of a greater change, and have the steps that are
+/// given by `kept`; not both can be asked for.
 void roundCoefficients(CoefficientType type, FieldData& field,
-                       double mostBytes = std::numeric_limits<double>::infinity());
+                       double mostBytes = std::numeric_limits<double>::infinity(), const KeptSteps& kept = {});
 
 }  // namespace hpsdf::detail

@@ -126,10 +126,12 @@ std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::u
   return offset + bytesOf(bits) > end ? 0 : bytesOf(bits);
 }
 
-std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps) {
+std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps, double fieldStep) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
-  Quantized result{.nodes = field.nodes,
-                   .coefficients = {.step = greatestStep(field.nodes, steps), .meanBits = 1, .bytes = {}}};
+  Quantized result{
+      .nodes = field.nodes,
+      .coefficients = {
+          .step = fieldStep > 0 ? fieldStep : greatestStep(field.nodes, steps), .meanBits = 1, .bytes = {}}};
   QuantizedCoefficients& out = result.coefficients;
   if (!(out.step >= QuantizedCoefficients::kLeastStep && out.step <= QuantizedCoefficients::kGreatestStep))
     return std::nullopt;

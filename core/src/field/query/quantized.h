@@ -76,9 +76,9 @@ struct Quantized {
 };
 
 /// Rounds the coefficients of a field from double. `steps` has an element for each node: the greatest step, in the
-/// orthonormal basis, that a leaf may have. The greatest of them becomes the step of the field. Returns std::nullopt if
-/// the coefficients take more bits than `QuantizedCoefficients` has.
-std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps);
+/// orthonormal basis, that a leaf may have. The step of the field is the greatest of them, or `fieldStep` unless that
+/// is 0. Returns std::nullopt if the coefficients take more bits than `QuantizedCoefficients` has.
+std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps, double fieldStep = 0);
 
 /// Gives a field these nodes and coefficients in place of its own.
 void take(Quantized&& quantized, FieldData& field);

@@ -1,0 +1,77 @@
+#pragma once
+// One construction of a field by Algorithm 1: its stages, one after the other.
+
+#include <cstdint>
+#include <functional>
+
+#include "field/build/checkpoint_file.h"
+#include "field/build/limits.h"
+#include "field/build/refiner.h"
+#include "field/cells/build_tree.h"
+#include "field/cells/cell_fit.h"
+#include "field/kept/kept_leaves.h"
+#include "hpsdf/build.h"
+
+namespace hpsdf::detail {
+
+/// Returns the settings with the strategy that takes effect. Throws `Error` if exact leaves were asked for and would
+/// not fit into memory, long before they would fill it.
+BuildOptions settled(BuildOptions options, const DistanceFunction& distance, const Box& domain,
+                     const Progress& progress);
+
+/// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.
+class Construction {
+ public:
+  /// Keeps references to the arguments.
+  Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
+               const Progress& progress);
+
+  /// From now on, saves the state of the construction to a file. If the file already holds a state, continues
+  /// from that state and returns true.
+  bool resume(CheckpointFile& file);
+
+  /// From now on, offers the field of the present state after each round of refinements.
+  void offerTo(const OfferField& offer);
+
+  /// Begins with the leaves that are kept of an earlier field, which are neither fitted nor refined. Cells of that
+  /// field all of whose leaves are to be built anew begin as one leaf. Their part of the target error is the share that
+  /// their leaves had in the error of the earlier field. Keeps a reference to `kept`.
+  void keep(const KeptLeaves& kept);
+
+  std::uint64_t steps() const { return state_.steps; }
+
+  /// Refines the octree until an error or a limit ends it. `afterStep` may be empty (`GrowthObserver`).
+  void grow(const std::function<void(std::uint64_t)>& afterStep = {});
+
+  /// Returns the field of the present state. It is made from a copy of the state's tree.
+  Field snapshot() { return Field(finish(BuildTree(state_.tree))); }
+  FieldData finish() { return finish(std::move(state_.tree)); }
+
+ private:
+  /// Makes a field from the state's tree or a copy of it. Prunes the tree, raises its degrees, lays it out in
+  /// arrays, applies continuity, rounds the coefficients and computes bounds, as far as the options ask for it.
+  FieldData finish(BuildTree&& tree);
+  /// Returns the field of the present state, as it would be if no stages followed the refinement.
+  Field fieldSoFar() const;
+  /// Returns the bytes that the limit leaves for the coefficients of a field.
+  double mostCoefficientBytes(const FieldData& field) const;
+  /// Returns true if twice the octree would not exceed the allowed memory.
+  bool hasMemoryForAnother() const { return hasMemory(refiner_.memoryNeed(2), setup_.options); }
+  void prune(BuildTree& tree) const;
+  /// Fits every leaf of the tree anew, one degree higher. All coefficients of a leaf then come from samples in
+  /// this leaf.
+  void enrich(BuildTree& tree) const;
+  FieldMetadata metadata(const ErrorTotals& totals) const;
+
+  ConstructionState state_;
+  ByteBudget budget_;
+  ConstructionSetup setup_;
+  CellFitter fitter_;
+  GrowthObserver observer_{.afterStep = {}, .atWholeState = [] {}};
+  Refiner refiner_;
+  std::uint64_t ownEvaluations_ = 0;  ///< evaluations of the exact distance by earlier calls of `finish`
+  const KeptLeaves* kept_ = nullptr;  ///< the leaves of an earlier field with which the construction began
+  double keptError_ = 0;              ///< estimate of the weighted error of these leaves
+};
+
+}  // namespace hpsdf::detail
