@@ -18,9 +18,12 @@ using cli::Call;  // a call of the program, not app::Call (a command in a script
 
 class Rebuild : public Cli {
  protected:
-  /// Writes a torus whose corner with the greatest y is moved outwards by `by`, in other units.
-  std::string torus(const std::string& name, double by, double scale = 1) const {
+  /// Writes a torus, in other units. Its corner with the greatest y is moved outwards by `by`, and the one nearest to
+  /// the middle is moved towards that by the share `inside`.
+  std::string torus(const std::string& name, double by, double scale = 1, double inside = 0) const {
     TriangleMesh mesh = shapes::mesh("torus");
+    auto nearest = std::ranges::min_element(mesh.vertices, {}, [](const Vector3& v) { return v.norm(); });
+    *nearest *= 1 - inside;
     auto farthest = std::ranges::max_element(mesh.vertices, {}, [](const Vector3& v) { return v.y(); });
     farthest->y() += by;
     std::ostringstream text;
@@ -42,7 +45,7 @@ TEST_F(Rebuild, keepsAndReports) {
   EXPECT_LT(json.at("kept_leaves"), json.at("leaves_before"));
   EXPECT_LT(json.at("distances"), json.at("distances_before"));
   EXPECT_EQ(json.at("changed_triangles"), 12);  // six around a corner, before and after
-  EXPECT_EQ(json.at("holes_moved"), false);
+  EXPECT_EQ(json.at("has_holes"), false);
   EXPECT_GT(json.at("measured").at("near").at("rms"), 0);
   EXPECT_EQ(load(at("g.hpsdf")).metadata().source.name, "after.obj");
   const Outcome text = run({{"rebuild", at("f.hpsdf"), before, after, "-o", at("h.hpsdf"), "--threads", "1"}});
@@ -50,15 +53,17 @@ TEST_F(Rebuild, keepsAndReports) {
   EXPECT_EQ(readFile(at("g.hpsdf")), readFile(at("h.hpsdf")));
 }
 
-/// The meshes of a normalized field are transformed as the first of them was.
+/// The box of a normalized field's mesh must stay, because it says how the mesh is transformed.
 TEST_F(Rebuild, normalizedFields) {
-  const std::string before = torus("before.obj", 0, 30), after = torus("after.obj", 0.01, 30);
+  const std::string before = torus("before.obj", 0, 30), after = torus("after.obj", 0, 30, 0.01);
+  const std::string wider = torus("wider.obj", 0.01, 30);
   ASSERT_EQ(run({{"build", before, "-o", at("f.hpsdf"), "--target-error", "1e-6", "--normalize"}}).status, 0);
   const Outcome outcome = run({{"rebuild", at("f.hpsdf"), before, after, "-o", at("g.hpsdf"), "--json"}});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(Json::parse(outcome.out).at("changed_triangles"), 12);
-  EXPECT_EQ(load(at("g.hpsdf")).metadata().source.normalization.scale,
-            load(at("f.hpsdf")).metadata().source.normalization.scale);
+  EXPECT_EQ(run({{"verify", at("g.hpsdf"), after, "--max-mismatches", "0", "--points", "1000"}}).err, "");
+  expectRefused({{"rebuild", at("f.hpsdf"), before, wider, "-o", at("h.hpsdf")}},
+                "wider.obj: has another box than the mesh of the field, which is normalized");
 }
 
 TEST_F(Rebuild, mistakesAreRefused) {

@@ -115,7 +115,7 @@ const std::multimap<std::string, std::string> kTrials = {
     {"undo", "color degree; undo; shot output=$out/shot.png"},
     {"redo", "color degree; undo; redo; shot output=$out/shot.png"},
     {"copy-view", "cells lines degrees=exact; copy-view output=$out/view.hps"},
-    {"settings", "settings strategy=hpx target-error=1e-2; rebuild; save output=$out/f.hpsdf"},
+    {"settings", "settings strategy=hpx target-error=1e-2; apply; save output=$out/f.hpsdf"},
     {"apply", "apply max-steps=10; save output=$out/f.hpsdf"},
     {"rebuild",
      "rebuild before=builtin:gear,teeth=3,segments=1 after=builtin:gear,teeth=3,segments=1,hole=0.28 "

@@ -463,11 +463,11 @@ TEST(Explorer, flyingToAPointPutsItInTheMiddle) {
 TEST(Explorer, aRebuildDropsParametersOfAnotherContinuity) {
   Bench bench;
   bench.run("build analytic:sphere target-error=1e-3 continuity=both continuity-weight=0.5 blend-width=0.1");
-  bench.run("settings continuity=weak ; rebuild");
+  bench.run("settings continuity=weak ; apply");
   EXPECT_EQ(bench.session.current().field.data().blend, 0);
   EXPECT_EQ(bench.session.current().field.metadata().settings.continuityWeight, 0.5);
   bench.run("build analytic:sphere target-error=1e-3 continuity=both continuity-weight=0.5 blend-width=0.1");
-  bench.run("settings continuity=exact ; rebuild");
+  bench.run("settings continuity=exact ; apply");
   EXPECT_EQ(bench.session.current().field.data().blend, 0.1);
   EXPECT_EQ(bench.session.current().field.metadata().settings.continuityWeight, std::nullopt);
 }
@@ -484,7 +484,7 @@ TEST(Explorer, aRebuildUnchangedIsTheSameField) {
   EXPECT_EQ(bench.explorer().allSteps(), before.metadata.steps) << "the slider keeps its length";
   bench.run("apply");
   EXPECT_EQ(bench.session.current().field.data().nodes, before.nodes);
-  bench.run("settings mesh=builtin:torus ; rebuild");
+  bench.run("settings mesh=builtin:torus ; apply");
   EXPECT_EQ(bench.session.current().field.metadata().source.name, "builtin:torus");
   bench.run("settings max-steps=9 ; apply max-steps=2");
   EXPECT_EQ(bench.session.current().field.metadata().steps, 2u) << "what apply is given wins";
@@ -502,7 +502,7 @@ TEST(Explorer, aRebuildKeepsContinuity) {
   EXPECT_EQ(again.data().coefficients, before.coefficients);
   EXPECT_TRUE(again.metadata().settings.enrich);
   EXPECT_EQ(again.metadata().settings.continuityWeight, 0.5);
-  bench.run("settings continuity=none enrich=false ; rebuild");
+  bench.run("settings continuity=none enrich=false ; apply");
   EXPECT_FALSE(bench.session.current().field.metadata().settings.enrich);
   EXPECT_EQ(bench.session.current().field.metadata().settings.continuityWeight, std::nullopt);
 }
@@ -514,15 +514,15 @@ TEST(Explorer, rebuildsWithinATolerance) {
   const double tolerance = settings().tolerance;
   EXPECT_TRUE(bench.explorer().widgets().contains("build/tolerance"));
   EXPECT_FALSE(bench.explorer().widgets().contains("build/strategy"));
-  bench.run("settings grid=5 ; rebuild");
+  bench.run("settings grid=5 ; apply");
   EXPECT_EQ(settings().tolerance, tolerance);
   EXPECT_EQ(bench.session.current().field.grid()[0], 5U);
-  bench.run("settings tolerance=2% ; rebuild");
+  bench.run("settings tolerance=2% ; apply");
   EXPECT_EQ(settings().tolerance, 2 * tolerance);
-  bench.run("settings target-error=1e-3 ; rebuild");
+  bench.run("settings target-error=1e-3 ; apply");
   EXPECT_EQ(settings().tolerance, 0);
   EXPECT_EQ(settings().targetError.weighted(), 1e-3);
-  bench.run("settings tolerance=2% ; rebuild");
+  bench.run("settings tolerance=2% ; apply");
   EXPECT_EQ(settings().tolerance, 2 * tolerance);
 }
 
@@ -532,10 +532,10 @@ TEST(Explorer, rebuildsWhatWasSmoothedAfterATolerance) {
   const auto field = [&]() -> const Field& { return bench.session.current().field; };
   EXPECT_FALSE(bench.explorer().widgets().contains("build/tolerance"));
   EXPECT_TRUE(bench.explorer().widgets().contains("build/target-error"));
-  bench.run("settings tolerance=2% ; rebuild");
+  bench.run("settings tolerance=2% ; apply");
   EXPECT_GT(field().metadata().settings.tolerance, 0);
   EXPECT_EQ(field().metadata().settings.continuityWeight, std::nullopt);
-  bench.run("smooth ; settings target-error=1e-3 ; rebuild");
+  bench.run("smooth ; settings target-error=1e-3 ; apply");
   EXPECT_EQ(field().metadata().settings.targetError.weighted(), 1e-3);
   EXPECT_TRUE(field().metadata().settings.continuityWeight);
   EXPECT_EQ(field().metadata().settings.quadrature, BuildOptions().quadrature);

@@ -87,9 +87,10 @@ TEST(Hierarchy, holdsEachTriangleOnceInFullBlocks) {
   }
 }
 
-/// The size that the comment of `Hierarchy` and docs/performance.md say.
+/// The size that the comment of `Hierarchy` tells.
 TEST(Hierarchy, takesAtMost110BytesATriangle) {
-  for (const TriangleMesh& mesh : {shapes::mesh("sphere,subdivisions=5"), shapes::mesh("torus,segments=150,sides=70")}) {
+  for (const TriangleMesh& mesh :
+       {shapes::mesh("sphere,subdivisions=5"), shapes::mesh("torus,segments=150,sides=70")}) {
     const Hierarchy hierarchy = hierarchyOf(mesh);
     EXPECT_LT(double(hierarchy.bytes()) / double(mesh.triangles.size()), 110);
     EXPECT_GT(double(hierarchy.bytes()) / double(mesh.triangles.size()), 100);

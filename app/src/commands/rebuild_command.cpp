@@ -9,9 +9,10 @@
 #include "console/interrupt.h"
 #include "console/long_work.h"
 #include "construction/build_arguments.h"
+#include "construction/build_field.h"
 #include "construction/surface.h"
-#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/build.h"
+#include "hpsdf/detail/build_settings.h"
 #include "hpsdf/verify.h"
 #include "session/field_argument.h"
 #include "session/field_summary.h"
@@ -22,30 +23,24 @@
 namespace hpsdf::app {
 namespace {
 
-/// The meshes before and after a change, in the units of the field.
-struct MeshPair {
-  TriangleMesh before, after;
-};
-
-TriangleMesh loadMesh(const Console& console, const std::string& surface) {
+PreparedSurface loadMesh(const Console& console, const std::string& surface, const Source& source) {
   return namingSurface(surface, [&] {
     requireMesh(surface);
-    return importSurface(console, surface).mesh;
+    PreparedSurface prepared = prepareSurface(console, surface, !source.normalization.isIdentity());
+    const Normalization &found = prepared.normalization, &wanted = source.normalization;
+    if (found.scale != wanted.scale || found.center != wanted.center)
+      throw Error("has another box than the mesh of the field, which is normalized: build its field anew");
+    return prepared;
   });
-}
-
-MeshPair loadMeshes(const Console& console, const Arguments& arguments, const Source& source) {
-  MeshPair meshes{loadMesh(console, arguments.text("before")), loadMesh(console, arguments.text("after"))};
-  if (source.normalization.isIdentity()) return meshes;
-  const Box box = boundingBox(meshes.before);
-  return {normalized(meshes.before, box), normalized(meshes.after, box)};
 }
 
 /// Returns the options for the distance to the changed mesh. Where the field's signs come from pseudonormals, they must
 /// be certain for the changed mesh, too.
-DistanceOptions distanceOptionsFor(const Source& source) {
+DistanceOptions distanceOptionsFor(const Source& source, int threads) {
   const bool isByNormals = source.insideTest == InsideTest::pseudonormal;
-  return {.insideTest = isByNormals ? InsideTest::automatic : source.insideTest, .thickness = source.thickness};
+  return {.insideTest = isByNormals ? InsideTest::automatic : source.insideTest,
+          .thickness = source.thickness,
+          .threads = threads};
 }
 
 std::string percent(double share) { return fmt::format("{:.1f} %", 100 * share); }
@@ -54,7 +49,7 @@ std::string percent(double share) { return fmt::format("{:.1f} %", 100 * share);
 struct RebuildFigures {
   std::uint64_t changedTriangles, leaves, kept, distances, distancesBefore;
   double keptVolume, seconds;
-  bool holesMoved;
+  bool hasHoles;
 
   double keptShare() const { return leaves > 0 ? double(kept) / double(leaves) : 0; }
   double distanceShare() const { return distancesBefore > 0 ? double(distances) / double(distancesBefore) : 0; }
@@ -67,14 +62,14 @@ Json figuresJson(const RebuildFigures& figures) {
           {"kept_volume", figures.keptVolume},
           {"distances", figures.distances},
           {"distances_before", figures.distancesBefore},
-          {"holes_moved", figures.holesMoved},
+          {"has_holes", figures.hasHoles},
           {"seconds", figures.seconds}};
 }
 
 std::string figuresText(const RebuildFigures& figures) {
-  return fmt::format("kept: {} of {} leaves ({}), {} of the domain; {} triangles differ\n",
-                     grouped(figures.kept), grouped(figures.leaves), percent(figures.keptShare()),
-                     percent(figures.keptVolume), grouped(figures.changedTriangles)) +
+  return fmt::format("kept: {} of {} leaves ({}), {} of the domain; {} triangles differ\n", grouped(figures.kept),
+                     grouped(figures.leaves), percent(figures.keptShare()), percent(figures.keptVolume),
+                     grouped(figures.changedTriangles)) +
          fmt::format("distances: {}, {} of the earlier construction's\n", grouped(figures.distances),
                      percent(figures.distanceShare()));
 }
@@ -99,29 +94,29 @@ void runRebuild(Session& session, const Arguments& arguments) {
   const std::string after = arguments.text("after");
   const Field& field = session.current().field;
   const Source& source = field.metadata().source;
+  const int threads = arguments.whole("threads");
   const auto start = std::chrono::steady_clock::now();
-  const MeshPair meshes = loadMeshes(console, arguments, source);
-  const auto exact = withNormalization(distanceTo(console, meshes.after, distanceOptionsFor(source)),
-                                       source.normalization);
-  const RebuildOptions options{.threads = arguments.whole("threads")};
-  const BuildOptions settings = settingsOf(field.data());
+  const PreparedSurface meshBefore = loadMesh(console, arguments.text("before"), source);
+  const PreparedSurface meshAfter = loadMesh(console, after, source);
+  const auto exact = distanceTo(console, after, meshAfter, distanceOptionsFor(source, threads));
+  BuildOptions settings = settingsOf(field.data());
+  settings.threads = threads;
   RebuiltField rebuilt = withProgress(console, [&](const Progress& progress) {
-    RebuiltField made = rebuild(field, meshes.before, meshes.after, *exact, options, progress);
+    RebuiltField made = rebuild(field, meshBefore.mesh, meshAfter.mesh, *exact, {.threads = threads}, progress);
     made.field = measured(std::move(made.field), *exact, settings, progress);
     return made;
   });
-  if (rebuilt.holesMoved)
-    note(console, "edges of holes have moved, which may change signs everywhere: all was built anew");
+  warnOfField(console, rebuilt.field, settings, meshAfter.report);
+  if (rebuilt.hasHoles) note(console, "a mesh has holes, which winding numbers close: all was built anew");
+  const bool isSame = rebuilt.changedTriangles == 0;
   const RebuildFigures figures{.changedTriangles = rebuilt.changedTriangles,
                                .leaves = rebuilt.leaves,
                                .kept = rebuilt.kept,
-                               .distances = rebuilt.changedTriangles > 0
-                                                ? rebuilt.field.metadata().exactEvaluations
-                                                : 0,
+                               .distances = isSame ? 0 : rebuilt.field.metadata().exactEvaluations,
                                .distancesBefore = field.metadata().exactEvaluations,
                                .keptVolume = rebuilt.keptVolume,
                                .seconds = secondsSince(start),
-                               .holesMoved = rebuilt.holesMoved};
+                               .hasHoles = rebuilt.hasHoles};
   session.setField({std::move(rebuilt.field), arguments.textOr("output", session.current().name), {}, after});
   session.setExact(exact);
   saveMade(session, arguments);
@@ -137,15 +132,15 @@ void addRebuildCommand(Registry& registry) {
       .help = paragraphs(R"(
 Makes the field of AFTER from FIELD, the field of BEFORE. Leaves that no changed triangle can reach stay as they are, to
 the bit; the cells around the changes are built anew, with the settings that the field keeps. The result keeps to the
-target error as a whole construction does, but takes few distances where little has changed: for repaired scans, for
-parts that move, for editors. The report says how much was kept, and the errors that were measured.
+target error as a whole construction does, but takes few distances where little has changed: for editors, for parts that
+move, for scans that are retouched. The report says how much was kept, and the errors that were measured.
 
 Triangles are the same if their corners have the same coordinates; their order and numbers do not matter. BEFORE must be
-the mesh from which the field was made, and AFTER must stay in the field's domain. A field within a tolerance or a limit of
-bytes, a weakly continuous one, and one of an outer hull cannot be updated.
+the mesh from which the field was made, and AFTER must stay in the field's domain; if the field is normalized, with the same
+box. A field within a tolerance or a limit of bytes, a weakly continuous one, and one of an outer hull cannot be updated.
 
-Where signs come from winding numbers, edges of holes that have moved may change signs everywhere, and all is built
-anew.)"),
+If more than half of the triangles differ, all is built anew; and also if BEFORE or AFTER has holes and signs come from
+winding numbers, because the surfaces that close the holes may change everywhere.)"),
       .examples = {"hpsdf rebuild part.hpsdf part.stl changed.stl -o changed.hpsdf"},
       .parameters = {fieldParameter(),
                      {"before", text("BEFORE").positional().required(), "Mesh from which the field was made."},

@@ -187,13 +187,18 @@ BuiltField buildField(const Console& console, BuildInput input, const std::strin
       return measured(buildResumably(*input.exact, input.domain, input.options, state, progress), *input.exact,
                       input.options, progress);
     });
-    warnOfErrorLeft(console, field.metadata());
-    noteOtherPrecision(console, input.options.coefficients, field);
-    if (input.options.bounds) warnOfBounds(console, input.mesh);
+    warnOfField(console, field, input.options, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};
   };
   return namingSurface(
       surface, [&] { return withinMemory(arguments, construct); }, checkpoint.string());
+}
+
+void warnOfField(const Console& console, const Field& field, const BuildOptions& options,
+                 const std::optional<MeshReport>& mesh) {
+  warnOfErrorLeft(console, field.metadata());
+  noteOtherPrecision(console, options.coefficients, field);
+  if (options.bounds) warnOfBounds(console, mesh);
 }
 
 void warnOfBounds(const Console& console, const std::optional<MeshReport>& mesh) {

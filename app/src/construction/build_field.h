@@ -51,6 +51,11 @@ BuiltField buildField(const Console& console, const std::string& surface, const 
 BuiltField buildField(const Console& console, BuildInput input, const std::string& surface, const Arguments& arguments,
                       const std::filesystem::path& checkpoint = {});
 
+/// Warns of what a field that was built with these options misses: of a maximum error, a precision, or the conditions
+/// of its bounds.
+void warnOfField(const Console& console, const Field& field, const BuildOptions& options,
+                 const std::optional<MeshReport>& mesh);
+
 /// Returns the name of the checkpoint file in which the construction of the field file `output` saves its state.
 std::filesystem::path checkpointOf(const std::filesystem::path& output);
 

@@ -68,27 +68,28 @@ struct RebuiltField {
   std::uint64_t leaves = 0;            ///< number of leaves of the earlier field
   std::uint64_t kept = 0;              ///< number of its leaves that are leaves of the new field, too
   double keptVolume = 0;               ///< their share of the domain's volume
-  /// True if no leaf was kept because edges of holes have moved: signs by winding number then change everywhere.
-  bool holesMoved = false;
+  /// True if no leaf was kept because one of the meshes has holes and signs come from winding numbers: the surfaces
+  /// that close the holes then change everywhere.
+  bool hasHoles = false;
 };
 
 /// Builds the field of a mesh that differs from the mesh of an earlier field in some triangles. Leaves of the earlier
-/// field which no changed triangle can reach keep their polynomials or lists of triangles, to the bit. The other parts
-/// of the octree are built anew, with the settings of the earlier field. Their part of the
-/// target error is their share in the earlier field's error, so that the whole field keeps to the target error, as a
-/// whole construction does. Triangles are the same if their corners are, whatever their indices; moving, adding and
-/// removing triangles are alike.
+/// field which no changed triangle can reach keep their polynomials, to the bit, or their lists of triangles. The other
+/// parts of the octree are built anew, with the settings of the earlier field and its length L. They have that part of
+/// the target error which the kept leaves leave: the errors of leaves are not stored, and count by the embedded
+/// estimate. Where the kept leaves leave hardly anything, the field may exceed the target error by 2 %.
+///
+/// Triangles are the same if their corners are, whatever their indices; moving, adding and removing triangles are
+/// alike. If more than half of the triangles differ, the whole field is built anew. For equal meshes the result is the
+/// earlier field with the name and the fingerprint of the new mesh.
 ///
 /// `before` is the mesh of the earlier field, and `after` the mesh to which `distance` measures, for instance an
 /// `ExactDistance`. Both are in the units of the field. The metadata of the new field has the number of evaluations of
 /// `distance`, but no number of steps and no measured errors.
 ///
-/// If the inside test of either mesh is not `InsideTest::pseudonormal`, the signs at the centres of leaves, and at the
-/// corners of those through which the surface may pass, are compared before and after the change.
-///
-/// Throws `Error` if `before` is not the mesh of the earlier field, if `after` leaves its domain, for outer hulls, and
-/// for a field that was built within a tolerance, within a limit of bytes, or with weak continuity, because its cells
-/// depend on each other. Throws as `build` does.
+/// Throws `Error` if `before` is not the mesh of the earlier field, if `distance` measures to another mesh than
+/// `after`, if `after` leaves the domain, for outer hulls, and for a field that was built within a tolerance, within a
+/// limit of bytes, or with weak continuity, because its cells depend on each other. Throws as `build` does.
 RebuiltField rebuild(const Field& field, const TriangleMesh& before, const TriangleMesh& after,
                      const DistanceFunction& distance, const RebuildOptions& options = {},
                      const Progress& progress = {});

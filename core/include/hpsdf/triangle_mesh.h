@@ -63,7 +63,4 @@ Normalization normalizationOf(const Box& surface);
 /// [-1, 1] (Koschier et al. 2016, sec. 4). Throws `Error` (of the kind `mesh`) for a mesh without finite extent.
 TriangleMesh normalized(const TriangleMesh& mesh);
 
-/// Returns a copy of the mesh, transformed as the function above transforms a mesh with the bounding box `surface`.
-TriangleMesh normalized(const TriangleMesh& mesh, const Box& surface);
-
 }  // namespace hpsdf

@@ -85,16 +85,13 @@ Normalization normalizationOf(const Box& surface) { return {surface.center(), 2 
 
 TriangleMesh normalized(const TriangleMesh& mesh) {
   requireValidIndices(mesh);
-  return normalized(mesh, boundingBox(mesh));
-}
-
-TriangleMesh normalized(const TriangleMesh& mesh, const Box& surface) {
-  const double longest = longestSide(surface, mesh.name.empty() ? "mesh" : mesh.name);
+  const Box box = boundingBox(mesh);
+  const double longest = longestSide(box, mesh.name.empty() ? "mesh" : mesh.name);
   TriangleMesh result = mesh;
-  if (normalizationOf(surface).isIdentity()) return result;  // not even rounded, so that a field's mesh is found again
+  if (normalizationOf(box).isIdentity()) return result;  // not even rounded, so that a field's mesh is found again
   // (x - min) - (max - x) equals 2(x - centre) but avoids rounding the centre. Along the longest side of the box it is
   // exactly -longest at min and +longest at max, and it never decreases with x. Therefore no vertex leaves [-1, 1].
-  for (Vector3& v : result.vertices) v = ((v - surface.min()) - (surface.max() - v)) / longest;
+  for (Vector3& v : result.vertices) v = ((v - box.min()) - (box.max() - v)) / longest;
   return result;
 }
 

@@ -84,30 +84,28 @@ void forEachOnlyIn(const SortedTriangles& one, const SortedTriangles& other, con
   }
 }
 
-bool changesHoles(const MeshChange& change) {
-  bool changes = false;
-  mesh::forEachEdge(mesh::directedEdgesOf(change.triangles.triangles), [&](std::span<const mesh::DirectedEdge> edge) {
-    int sum = 0;
-    for (const mesh::DirectedEdge& side : edge) sum += side.rising == (side.face < change.removed) ? 1 : -1;
-    changes = changes || sum != 0;
-  });
-  return changes;
-}
-
 }  // namespace
+
+bool hasHoles(const TriangleMesh& mesh) {
+  bool has = false;
+  mesh::forEachEdge(mesh::directedEdgesOf(mesh.triangles), [&](std::span<const mesh::DirectedEdge> edge) {
+    const auto rising = std::ranges::count_if(edge, &mesh::DirectedEdge::rising);
+    has = has || 2 * std::size_t(rising) != edge.size();
+  });
+  return has;
+}
 
 MeshChange changeBetween(const TriangleMesh& before, const TriangleMesh& after) {
   const SortedTriangles first(before), second(after);
   Collected collected;
   MeshChange change;
   forEachOnlyIn(first, second, [&](const Corners& corners) {
-    collected.add(corners);
+    collected.add({corners[0], corners[2], corners[1]});
     ++change.removed;
   });
   forEachOnlyIn(second, first, [&](const Corners& corners) { collected.add(corners); });
   change.triangles = collected.take();
   change.triangles.name = after.name;
-  change.movesHoles = changesHoles(change);
   return change;
 }
 

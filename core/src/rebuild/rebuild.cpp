@@ -1,12 +1,12 @@
-#include "hpsdf/build.h"
-
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "field/build/construction.h"
 #include "field/build/limits.h"
 #include "field/kept/kept_leaves.h"
+#include "hpsdf/build.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/exact_distance.h"
@@ -27,6 +27,8 @@ void requireRebuildable(const Field& field, const TriangleMesh& before, const Tr
   if (metadata.source.fingerprint != fingerprint(before))
     throw Error(ErrorKind::mesh, before.name,
                 "is not the mesh of the field, which was built from " + metadata.source.name);
+  if (source.fingerprint != fingerprint(after))
+    throw Error(ErrorKind::mesh, after.name, "is not the mesh to which the distance measures");
   if (metadata.settings.tolerance > 0) refuse("was built within a tolerance");
   if (metadata.settings.maxBytes) refuse("was built within a limit of bytes");
   if (metadata.settings.continuityWeight) refuse("is weakly continuous");
@@ -46,31 +48,26 @@ BuildOptions settingsFor(const Field& field, const RebuildOptions& options) {
   return settings;
 }
 
-/// Returns that no leaf is kept, so that the construction begins with the base cells.
-KeptLeaves noLeavesOf(const Field& field) {
-  return {.before = &field.data(), .isKept = std::vector<bool>(field.data().nodes.size())};
-}
+bool isByWinding(InsideTest test) { return test == InsideTest::winding; }
 
+/// Finds the leaves that are kept where some triangles differ.
 KeptLeaves keptLeavesOf(const Field& field, const rebuilding::MeshChange& change, const DistanceFunction& distance,
-                        const Progress& progress) {
-  // Which sides of the changed triangles are inside does not matter.
-  const ExactDistance toChange(change.triangles, {.insideTest = InsideTest::pseudonormal});
+                        const RebuildOptions& options, const Progress& progress) {
+  const ExactDistance toChange(change.triangles, {.insideTest = InsideTest::pseudonormal, .threads = options.threads});
   const DistanceFunction toChangedTriangles(toChange);
-  const InsideTest before = field.metadata().source.insideTest, now = distance.source().insideTest;
-  const bool isByNormals = before == InsideTest::pseudonormal && now == InsideTest::pseudonormal;
-  const bool isShell = now == InsideTest::shell;
-  return detail::findKeptLeaves(field,
-                                {.now = distance,
-                                 .toChange = toChangedTriangles,
-                                 .offset = isShell ? distance.source().thickness / 2 : 0,
-                                 .checksSigns = !isByNormals && !isShell},
-                                progress);
+  const Source &before = field.metadata().source, &now = distance.source();
+  detail::ChangedSurface changed{.now = distance, .toChange = toChangedTriangles};
+  if (now.insideTest == InsideTest::shell) changed.offset = now.thickness / 2;
+  if (isByWinding(before.insideTest) || isByWinding(now.insideTest))
+    changed.windingChange = [&](std::span<const Vector3> points, std::span<double> out) {
+      toChange.windingNumbers(points, out);
+    };
+  return detail::findKeptLeaves(field, changed, progress);
 }
 
-FieldData fieldWith(const KeptLeaves& kept, const DistanceFunction& distance, const BuildOptions& settings,
+FieldData fieldWith(KeptLeaves& kept, const DistanceFunction& distance, const BuildOptions& settings,
                     const Progress& progress) {
-  detail::Construction construction(distance, kept.before->domain, settings, progress);
-  construction.keep(kept);
+  detail::Construction construction(distance, kept.before->domain, settings, progress, &kept);
   construction.grow();
   FieldData field = construction.finish();
   field.metadata.exactEvaluations += kept.evaluations;
@@ -78,10 +75,11 @@ FieldData fieldWith(const KeptLeaves& kept, const DistanceFunction& distance, co
   return field;
 }
 
-/// Returns the field itself, as that of an equal mesh.
+/// Returns the field itself, as that of an equal mesh whose triangles or vertices have other numbers.
 FieldData sameField(const Field& field, const Source& source) {
   FieldData same = field.data();
-  same.metadata.source = source;
+  same.metadata.source.name = source.name;
+  same.metadata.source.fingerprint = source.fingerprint;
   return same;
 }
 
@@ -93,19 +91,25 @@ RebuiltField rebuild(const Field& field, const TriangleMesh& before, const Trian
   const BuildOptions settings = settingsFor(field, options);
   detail::checkOptions(field.domain(), settings);
   return withThreads(options.threads, [&] {
-    const std::uint64_t leaves = statistics(field).leaves;
     const rebuilding::MeshChange change = rebuilding::changeBetween(before, after);
-    if (change.triangles.triangles.empty())
-      return RebuiltField{
-          .field = Field(sameField(field, distance.source())), .leaves = leaves, .kept = leaves, .keptVolume = 1};
-    const bool holesMoved = change.movesHoles && distance.source().insideTest == InsideTest::winding;
-    const KeptLeaves kept = holesMoved ? noLeavesOf(field) : keptLeavesOf(field, change, distance, progress);
-    return RebuiltField{.field = Field(fieldWith(kept, distance, settings, progress)),
-                        .changedTriangles = change.triangles.triangles.size(),
-                        .leaves = leaves,
+    const std::size_t changed = change.triangles.triangles.size(),
+                      all = before.triangles.size() + after.triangles.size();
+    KeptLeaves kept = KeptLeaves::none(field.data());
+    if (changed == 0)
+      return RebuiltField{.field = Field(sameField(field, distance.source())),
+                          .leaves = kept.leaves,
+                          .kept = kept.leaves,
+                          .keptVolume = 1};
+    const bool isWound = isByWinding(field.metadata().source.insideTest) || isByWinding(distance.source().insideTest);
+    const bool hasHoles = isWound && (rebuilding::hasHoles(before) || rebuilding::hasHoles(after));
+    if (!hasHoles && 2 * changed <= all) kept = keptLeavesOf(field, change, distance, options, progress);
+    FieldData made = fieldWith(kept, distance, settings, progress);
+    return RebuiltField{.field = Field(std::move(made)),
+                        .changedTriangles = changed,
+                        .leaves = kept.leaves,
                         .kept = kept.kept,
                         .keptVolume = kept.keptVolume,
-                        .holesMoved = holesMoved};
+                        .hasHoles = hasHoles};
   });
 }
 

@@ -22,7 +22,7 @@ namespace {
 /// Estimates the octree of the exact leaves, as far as it has no more than `mostNodes` nodes.
 ExactEstimate exactEstimate(const DistanceFunction& distance, const BuildOptions& options, const Box& domain,
                             double mostNodes, const Progress& progress) {
-  const std::optional<ExactCells> cells = exactCells(distance, domain, options);
+  const std::optional<ExactCells> cells = exactCells(distance, options, referenceLength(distance.source(), domain));
   if (!cells) return {};
   BuildTree baseCells{.domain = domain, .grid = options.grid, .nodes = {}};
   baseCells.addBaseCells();
@@ -38,7 +38,7 @@ BuildOptions settled(BuildOptions options, const DistanceFunction& distance, con
     options.strategy =
         automaticStrategy(distance.triangleSearch(), options, referenceLength(distance.source(), domain));
   if (options.strategy != Strategy::hpx) return options;
-  if (!exactCells(distance, domain, options)) {
+  if (!exactCells(distance, options, referenceLength(distance.source(), domain))) {
     options.strategy = Strategy::hp;
     return options;
   }
@@ -53,15 +53,20 @@ BuildOptions settled(BuildOptions options, const DistanceFunction& distance, con
 }
 
 Construction::Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
-             const Progress& progress)
+                           const Progress& progress, KeptLeaves* kept)
     : budget_(options),
-      setup_(makeSetup(distance, domain, options, budget_, progress)),
+      setup_(makeSetup(
+          distance, options, budget_,
+          kept != nullptr ? kept->before->metadata.referenceLength : referenceLength(distance.source(), domain),
+          progress)),
       fitter_(distance, options, state_.nearness, setup_.nearDistance, progress),
-      refiner_{setup_, fitter_, state_, observer_} {
+      refiner_{setup_, fitter_, state_, observer_},
+      kept_(kept) {
   state_.nearness = nearnessOf(options, domain);
   state_.tree.domain = domain;
   state_.tree.grid = options.grid;
   refiner_.requireMemory();  // checks the memory of the exact distance before anything is built
+  if (kept != nullptr) beginWithKept();
 }
 
 bool Construction::resume(CheckpointFile& file) {
@@ -82,18 +87,17 @@ void Construction::offerTo(const OfferField& offer) {
   };
 }
 
-void Construction::keep(const KeptLeaves& kept) {
+void Construction::beginWithKept() {
   constexpr std::size_t kMostTriangles = std::size_t{1} << 20;  // of a list, which was not too long before
-  kept_ = &kept;
+  constexpr double kLeastShare = 0.02;  // of the target error, so that it can be reached where Φ was smooth before
   const auto exactFit = [&](const Box& cell) {
     return setup_.exactCells ? setup_.exactCells->fitOfFarCell(cell, kMostTriangles) : std::nullopt;
   };
-  plant(kept, exactFit, state_.tree);
-  const FieldMetadata& before = kept.before->metadata;
-  const double share = kept.errorOfOthers;
-  keptError_ = (1 - share) * before.totalError * std::pow(before.referenceLength / 2, 5);
-  setup_.goal = setup_.goal.times(share);
-  setup_.growthGoal = setup_.growthGoal.times(share);
+  makeTree(*kept_, exactFit, state_.tree, setup_.progress);
+  const FieldMetadata& before = kept_->before->metadata;
+  keptError_ = kept_->keptError * before.totalError * std::pow(before.referenceLength / 2, 5);
+  for (ErrorGoal* goal : {&setup_.goal, &setup_.growthGoal})
+    goal->weighted = std::max(goal->weighted - keptError_, kLeastShare * goal->weighted);
 }
 
 void Construction::grow(const std::function<void(std::uint64_t)>& afterStep) {
@@ -118,6 +122,9 @@ FieldData Construction::finish(BuildTree&& tree) {
   field.blend = options.blend;
   roundCoefficients(budget_.coefficientType(), field, mostCoefficientBytes(field),
                     kept_ != nullptr ? keptSteps(*kept_, field) : KeptSteps{});
+  if (kept_ != nullptr)  // kept coefficients were rounded before
+    field.metadata.roundingRms = std::hypot(
+        field.metadata.roundingRms, std::sqrt(std::max(0.0, kept_->keptVolume)) * kept_->before->metadata.roundingRms);
 
   // Compute the error bounds, which hold for the rounded coefficients and include blending.
   if (options.bounds) field.metadata.exactEvaluations += findBounds(field, setup_.distance, setup_.progress);
@@ -185,6 +192,8 @@ FieldMetadata Construction::metadata(const ErrorTotals& totals) const {
   metadata.totalError = (totals.weighted + keptError_) / scale;
   metadata.referenceLength = setup_.referenceLength;
   metadata.measuredError = state_.measuredError;
+  if (kept_ != nullptr && kept_->kept > 0)
+    metadata.measuredError = std::max(metadata.measuredError, kept_->before->metadata.measuredError);
   metadata.exactEvaluations = fitter_.evaluations() - ownEvaluations_;
   metadata.steps = state_.steps;
   return metadata;

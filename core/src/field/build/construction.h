@@ -22,9 +22,12 @@ BuildOptions settled(BuildOptions options, const DistanceFunction& distance, con
 /// One construction of a field. It runs the stages of the paper's Algorithm 1 one after the other.
 class Construction {
  public:
-  /// Keeps references to the arguments.
+  /// Keeps references to the arguments. If `kept` is given, the construction begins with these leaves of an earlier
+  /// field, which are neither fitted nor refined; leaves that cannot be kept after all are taken out of it. Cells of
+  /// that field all of whose leaves are to be built anew begin as one leaf. They have that part of the target error
+  /// which the kept leaves leave, and a small part of it in any case. L is that of the earlier field.
   Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
-               const Progress& progress);
+               const Progress& progress, KeptLeaves* kept = nullptr);
 
   /// From now on, saves the state of the construction to a file. If the file already holds a state, continues
   /// from that state and returns true.
@@ -32,11 +35,6 @@ class Construction {
 
   /// From now on, offers the field of the present state after each round of refinements.
   void offerTo(const OfferField& offer);
-
-  /// Begins with the leaves that are kept of an earlier field, which are neither fitted nor refined. Cells of that
-  /// field all of whose leaves are to be built anew begin as one leaf. Their part of the target error is the share that
-  /// their leaves had in the error of the earlier field. Keeps a reference to `kept`.
-  void keep(const KeptLeaves& kept);
 
   std::uint64_t steps() const { return state_.steps; }
 
@@ -48,6 +46,7 @@ class Construction {
   FieldData finish() { return finish(std::move(state_.tree)); }
 
  private:
+  void beginWithKept();
   /// Makes a field from the state's tree or a copy of it. Prunes the tree, raises its degrees, lays it out in
   /// arrays, applies continuity, rounds the coefficients and computes bounds, as far as the options ask for it.
   FieldData finish(BuildTree&& tree);
@@ -70,7 +69,7 @@ class Construction {
   GrowthObserver observer_{.afterStep = {}, .atWholeState = [] {}};
   Refiner refiner_;
   std::uint64_t ownEvaluations_ = 0;  ///< evaluations of the exact distance by earlier calls of `finish`
-  const KeptLeaves* kept_ = nullptr;  ///< the leaves of an earlier field with which the construction began
+  KeptLeaves* kept_;                  ///< the leaves of an earlier field with which the construction began
   double keptError_ = 0;              ///< estimate of the weighted error of these leaves
 };
 

@@ -47,9 +47,8 @@ Gains gainsOf(const Fit& current, const Trial& trial, Estimator estimator) {
   return gainsBy(current, trial, [](const Fit& fit) { return fit.error.weighted; });
 }
 
-ConstructionSetup makeSetup(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
-                            const ByteBudget& budget, const Progress& progress) {
-  const double length = referenceLength(distance.source(), domain);
+ConstructionSetup makeSetup(const DistanceFunction& distance, const BuildOptions& options, const ByteBudget& budget,
+                            double length, const Progress& progress) {
   const ErrorGoal goal = errorGoal(options, length);
   const double asked = options.targetError.byDistance().nearDistance;
   return {.distance = distance,
@@ -60,11 +59,10 @@ ConstructionSetup makeSetup(const DistanceFunction& distance, const Box& domain,
           .goal = goal,
           .growthGoal = options.criterion == Criterion::optimal ? goal.times(kGrowth) : goal,
           .budget = budget,
-          .exactCells = exactCells(distance, domain, options)};
+          .exactCells = exactCells(distance, options, length)};
 }
 
-std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Box& domain, const BuildOptions& options) {
-  const double length = referenceLength(distance.source(), domain);
+std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options, double length) {
   if (options.strategy != Strategy::hpx || !mayHaveExactLeaves(distance, length)) return std::nullopt;
   return ExactCells(*distance.triangleSearch(), options.exactWithin * length,
                     static_cast<std::size_t>(options.exactTriangles), options.blend);

@@ -55,12 +55,14 @@ struct ConstructionSetup {
   }
 };
 
-/// Returns the setup of a construction. It keeps references to the arguments.
-ConstructionSetup makeSetup(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
-                            const ByteBudget& budget, const Progress& progress);
+/// Returns the setup of a construction in which the surface has the size `referenceLength`. It keeps references to the
+/// other arguments.
+ConstructionSetup makeSetup(const DistanceFunction& distance, const BuildOptions& options, const ByteBudget& budget,
+                            double referenceLength, const Progress& progress);
 
 /// Returns what makes exact leaves for these options; std::nullopt if they ask for none, or if there can be none.
-std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Box& domain, const BuildOptions& options);
+std::optional<ExactCells> exactCells(const DistanceFunction& distance, const BuildOptions& options,
+                                     double referenceLength);
 
 /// Callbacks during the refinement of the octree.
 struct GrowthObserver {
