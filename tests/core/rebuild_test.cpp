@@ -155,7 +155,7 @@ TEST(Rebuild, equalMeshesGiveTheSameField) {
   Case c = pulledTorus({.targetError = 1e-5, .grid = {3, 3, 3}});
   c.after = c.before;
   std::ranges::reverse(c.after.triangles);
-  for (Triangle& t : c.after.triangles) std::ranges::rotate(t, t.begin() + 1);
+  for (Triangle& t : c.after.triangles) std::rotate(t.begin(), t.begin() + 1, t.end());
   const Field before = builtBefore(c);
   const RebuiltField rebuilt = rebuild(before, c.before, c.after, ExactDistance(c.after));
   EXPECT_EQ(rebuilt.changedTriangles, 0u);

@@ -182,7 +182,7 @@ void runSettings(Session& session, const Arguments& arguments) {
       explorerOf(session).setSetting(parameter.name, arguments.text(parameter.name));
 }
 
-void runRebuild(Session& session, const Arguments& arguments) {
+void runApply(Session& session, const Arguments& arguments) {
   explorerOf(session).rebuild(arguments.given("max-steps") ? std::optional(arguments.whole("max-steps")) : std::nullopt,
                               arguments.flag("keep"));
 }
@@ -359,7 +359,7 @@ void addFieldAndShotCommands(Registry& registry) {
                      {"keep", flag(),
                       "Keep the field before it under the name 'kept' and show it beside the new one, for 'beside' and "
                       "for the colour difference."}},
-      .action = runRebuild,
+      .action = runApply,
   });
   registry.addForScripts({
       .name = "shot",

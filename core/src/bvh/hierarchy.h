@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <ranges>
 #include <span>
 #include <vector>
 
@@ -113,10 +112,9 @@ class Hierarchy {
   std::span<const std::uint32_t> numbers() const { return numbers_; }  ///< by slot: the triangle's index in the mesh
   std::span<const Vector3> vertices() const { return vertices_; }      ///< vertices in use, in the order of first use
 
-  /// Returns the slots of a block's triangles.
-  auto slotsOf(std::uint32_t block) const {
-    const std::uint32_t begin = block * kWidth;
-    return std::views::iota(begin, std::min(begin + std::uint32_t{kWidth}, std::uint32_t(triangles_.size())));
+  /// Returns one past the last slot of a block's triangles; the first one is kWidth·block.
+  std::uint32_t endOf(std::uint32_t block) const {
+    return std::min((block + 1) * kWidth, static_cast<std::uint32_t>(triangles_.size()));
   }
 
   std::array<Vector3, 3> corners(std::uint32_t slot) const {

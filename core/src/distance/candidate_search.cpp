@@ -79,7 +79,7 @@ class Collector {
   }
 
   bool addBlock(std::uint32_t block) {
-    for (const std::uint32_t slot : hierarchy_.slotsOf(block))
+    for (std::uint32_t slot = block * bvh::kWidth; slot < hierarchy_.endOf(block); ++slot)
       if (bvh::squaredDistance(hierarchy_.frame(slot), x_) <= squaredRadius_) found_.push_back(slot);
     return found_.size() <= most_;
   }

@@ -44,7 +44,7 @@ class SortedTriangles {
  private:
   Corners cornersAt(std::uint32_t triangle) const {
     Corners corners = cornersOf(mesh_, mesh_.triangles[triangle]);
-    std::ranges::rotate(corners, std::ranges::min_element(corners, rebuilding::isLess));
+    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end(), rebuilding::isLess), corners.end());
     return corners;
   }
 

@@ -18,7 +18,7 @@
 namespace hpsdf::detail {
 namespace {
 
-constexpr double kRounding = 1e-12;  // bound of the relative rounding errors of distances and boxes
+constexpr double kRelativeRounding = 1e-12;  // bound of the relative rounding errors of distances and boxes
 constexpr std::size_t kAtOnce = 256;
 
 /// Returns the weighted error of a leaf by the embedded estimate; 0 for a leaf that lies outside the field's band.
@@ -122,9 +122,10 @@ class LeafFinder {
 
   bool isBeyondReach(const Box& cell, double now, double toChange) const {
     const Box box = boxOfWeight(cell, before_.blend);
-    const double rounding = kRounding * std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+    const double rounding =
+        kRelativeRounding * std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
     const double most = std::abs(now + change_.offset) + box.diagonal().norm();
-    return std::abs(toChange) > most * (1 + kRounding) + rounding;
+    return std::abs(toChange) > most * (1 + kRelativeRounding) + rounding;
   }
 
   const FieldData& before_;
