@@ -251,10 +251,10 @@ TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
     more.insert(more.begin(), {"build", surface, "-o", at("f.hpsdf"), "--max-steps", "0"});
     return run({more});
   };
-  const Outcome limited = built("builtin:torus", {"--memory-limit", "1e7"});
+  const Outcome limited = built("builtin:torus", {"--memory-limit", "1e6"});
   EXPECT_EQ(limited.status, 2);
   EXPECT_THAT(limited.err, HasSubstr("the distance that the field is made from holds"));
-  EXPECT_THAT(limited.err, HasSubstr("of memory, more than the 10.00 MB allowed"));
+  EXPECT_THAT(limited.err, HasSubstr("of memory, more than the 1.00 MB allowed"));
   EXPECT_EQ(built("builtin:torus", {"--memory-limit", "1e8"}).status, 0);
   EXPECT_EQ(built("builtin:torus,segments=700,sides=700", {}).status, 0) << "untold, the limit is for what grows";
 }

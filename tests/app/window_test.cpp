@@ -322,7 +322,7 @@ TEST_F(WindowTest, aSessionOfMouseAndKeyboardReplaysToTheSamePixels) {
         "target=",
         "\nshow slice\n", "\ncolor depth\n",
         "\nplane zoom=4\npanel worst=true\nundo\npanel questions=false\npanel colors=false\npanel build=true\nsettings "
-        "target-error=1e-4\nrebuild\nui hover ",
+        "target-error=1e-4\napply\nui hover ",
         "\nshot output=hpsdf-0001.png\nui hover "})
     EXPECT_THAT(script, HasSubstr(line));
   const std::string first = contents(file("hpsdf-0001.png")), last = contents(file("last.png"));

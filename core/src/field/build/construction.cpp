@@ -79,7 +79,7 @@ bool Construction::resume(CheckpointFile& file) {
   return reader.has_value();
 }
 
-void Construction::offerTo(const OfferField& offer) {
+void Construction::offerTo(const std::function<void(const std::function<Field()>&)>& offer) {
   if (!offer) return;
   observer_.atWholeState = [this, &offer] {
     if (state_.stage != ConstructionState::Stage::fitFirstCells && hasMemoryForAnother())

@@ -10,7 +10,9 @@
 #include "field/cells/build_tree.h"
 #include "field/cells/cell_fit.h"
 #include "field/kept/kept_leaves.h"
-#include "hpsdf/build.h"
+#include "hpsdf/build_options.h"
+#include "hpsdf/distance_function.h"
+#include "hpsdf/field.h"
 
 namespace hpsdf::detail {
 
@@ -33,8 +35,8 @@ class Construction {
   /// from that state and returns true.
   bool resume(CheckpointFile& file);
 
-  /// From now on, offers the field of the present state after each round of refinements.
-  void offerTo(const OfferField& offer);
+  /// From now on, offers the field of the present state after each round of refinements (`OfferField`).
+  void offerTo(const std::function<void(const std::function<Field()>& fieldSoFar)>& offer);
 
   std::uint64_t steps() const { return state_.steps; }
 
