@@ -216,7 +216,7 @@ TEST_F(BuildCommand, memoryLimitsThatMessagesNameSuffice) {
   for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
            {"analytic:torus", "--target-error", "1e-7", "--memory-limit", "1e6"},
            {"analytic:torus", "--grid", "40", "--memory-limit", "1e6"},
-           {"builtin:gear", "--tolerance", "1", "--grid", "20", "--memory-limit", "2.7e6"},
+           {"builtin:gear,segments=24", "--tolerance", "1", "--grid", "20", "--memory-limit", "2.7e6"},
            {"builtin:torus", "--target-error", "1e-5", "--memory-limit", "1e5"},
            {"builtin:gear", "--strategy", "hpx", "--memory-limit", "2e6"}}) {
     std::vector<std::string> words = {"build", "-o", at("f.hpsdf")};
@@ -262,7 +262,7 @@ TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
 TEST_F(BuildCommand, studiesNameTheOptionThatAllowsMoreMemory) {
   for (const std::vector<std::string>& kind :
        {std::vector<std::string>{"tradeoff", "--target-errors", "1e-3"}, {"continuity"}, {"convergence"}}) {
-    std::vector<std::string> words = {"study", kind[0], "builtin:torus", "-o", at("study"), "--memory-limit", "1e7"};
+    std::vector<std::string> words = {"study", kind[0], "builtin:torus", "-o", at("study"), "--memory-limit", "9e6"};
     words.insert(words.end(), kind.begin() + 1, kind.end());
     const Outcome outcome = run({words});
     EXPECT_EQ(outcome.status, 2) << kind[0];

@@ -45,7 +45,7 @@ TEST_F(Rebuild, keepsAndReports) {
   EXPECT_LT(json.at("kept_leaves"), json.at("leaves_before"));
   EXPECT_LT(json.at("distances"), json.at("distances_before"));
   EXPECT_EQ(json.at("changed_triangles"), 12);  // six around a corner, before and after
-  EXPECT_EQ(json.at("has_holes"), false);
+  EXPECT_EQ(json.at("signs_change"), false);
   EXPECT_GT(json.at("measured").at("near").at("rms"), 0);
   EXPECT_EQ(load(at("g.hpsdf")).metadata().source.name, "after.obj");
   const Outcome text = run({{"rebuild", at("f.hpsdf"), before, after, "-o", at("h.hpsdf"), "--threads", "1"}});

@@ -203,7 +203,7 @@ TEST(Rebuild, signsAreCheckedWhereWindingNumbersDecide) {
   const TriangleMesh after = joined(inner, around);
   const ExactDistance exact(after);
   const RebuiltField rebuilt = rebuild(before, inner, after, exact);
-  EXPECT_FALSE(rebuilt.hasHoles);
+  EXPECT_FALSE(rebuilt.signsChange);
   for (const Vector3& x : {Vector3(0.45, 0, 0), Vector3(0, 0.4, 0.1), Vector3(-0.3, 0.2, 0), Vector3(0.1, 0, 0)})
     EXPECT_NEAR(rebuilt.field.value(x), exact(x), 0.02) << x.transpose();
   EXPECT_LT(rebuilt.field.value({0.45, 0, 0}), 0);
@@ -221,26 +221,73 @@ TEST(Rebuild, holesThatWindingNumbersCloseLeaveNothing) {
   const Field before = build(ExactDistance(open), domain, options);
   const ExactDistance exact(wider);
   const RebuiltField rebuilt = rebuild(before, open, wider, exact);
-  EXPECT_TRUE(rebuilt.hasHoles);
+  EXPECT_TRUE(rebuilt.signsChange);
   EXPECT_EQ(rebuilt.kept, 0u);
   EXPECT_EQ(rebuilt.field.data().coefficients, build(exact, domain, options).data().coefficients);
-  EXPECT_TRUE(rebuild(before, open, closed, ExactDistance(closed)).hasHoles);
+  EXPECT_TRUE(rebuild(before, open, closed, ExactDistance(closed)).signsChange);
 }
 
-/// A wall far away from a body with holes does not matter to a shell, which has no signs.
+/// Holes do not matter to a shell, which has no signs.
 TEST(Rebuild, shellsMayHaveHoles) {
   const DistanceOptions wall{.insideTest = InsideTest::shell, .thickness = 0.05};
   Case c = pulledTorus({.targetError = 1e-5, .grid = {4, 4, 4}, .strategy = Strategy::hp});
   c.signs = wall;
-  c.before.triangles.resize(c.before.triangles.size() / 2);
-  c.after.triangles.resize(c.before.triangles.size());
+  for (TriangleMesh* mesh : {&c.before, &c.after})
+    std::erase_if(mesh->triangles, [&](const Triangle& t) { return c.before.vertices[t[0]].y() < 0; });
   const Field before = builtBefore(c);
   const ExactDistance exact(c.after, wall);
   const RebuiltField rebuilt = rebuild(before, c.before, c.after, exact);
-  EXPECT_FALSE(rebuilt.hasHoles);
+  EXPECT_FALSE(rebuilt.signsChange);
+  EXPECT_GT(rebuilt.changedTriangles, 0u);
+  EXPECT_LT(rebuilt.kept, rebuilt.leaves);
   EXPECT_GT(rebuilt.kept, rebuilt.leaves / 2);
   EXPECT_GE(sameLeaves(before, rebuilt.field), rebuilt.kept);
   EXPECT_LT(errorsOf(rebuilt.field, exact)[1], 1.2 * errorsOf(build(exact, domainOf(c), c.options), exact)[1]);
+}
+
+/// The space around a mesh is inside if its signed volume is negative, however far from a change.
+TEST(Rebuild, anotherOrientationChangesAllSigns) {
+  const TriangleMesh inward = support::reversed(moved(shapes::mesh("sphere,subdivisions=3"), {0, 0, 0}, 0.3));
+  const TriangleMesh after = joined(inward, moved(shapes::mesh("sphere,subdivisions=1"), {1.2, 0, 0}, 0.6));
+  const Box domain = domainAround(boundingBox(after));
+  const BuildOptions options{.targetError = 1e-4, .grid = {3, 3, 3}, .strategy = Strategy::hp};
+  for (const InsideTest test : {InsideTest::automatic, InsideTest::winding}) {
+    const Field before = build(ExactDistance(inward, {.insideTest = test}), domain, options);
+    const ExactDistance exact(after, {.insideTest = test});
+    const RebuiltField rebuilt = rebuild(before, inward, after, exact);
+    EXPECT_TRUE(rebuilt.signsChange);
+    EXPECT_LT(before.value({-0.4, 0, 0}), 0);
+    EXPECT_GT(rebuilt.field.value({-0.4, 0, 0}), 0);
+  }
+}
+
+/// Stages after the refinement leave kept leaves alone, and pruning makes the new cells as coarse as the others.
+TEST(Rebuild, prunedAndBlendedFields) {
+  BuildOptions options = kFine;
+  options.targetError = 1e-6;
+  options.criterion = Criterion::optimal;
+  options.blend = kDefaultBlend;
+  const Case c = pulledTorus(options);
+  const Field before = builtBefore(c);
+  const ExactDistance exact(c.after);
+  const RebuiltField rebuilt = rebuild(before, c.before, c.after, exact);
+  const Field whole = build(exact, domainOf(c), options);
+  EXPECT_GT(rebuilt.kept, rebuilt.leaves / 2);
+  EXPECT_EQ(rebuilt.field.data().blend, kDefaultBlend);
+  EXPECT_LE(rebuilt.field.metadata().totalError, 1.02e-6);
+  EXPECT_LT(double(rebuilt.field.bytes()), 1.1 * double(whole.bytes()));
+  EXPECT_LT(errorsOf(rebuilt.field, exact)[1], 1.2 * errorsOf(whole, exact)[1]);
+}
+
+/// A field that ended before its target error is not built further than it was.
+TEST(Rebuild, aimsAtTheErrorThatWasReached) {
+  Case c = pulledTorus();
+  c.options.maxSteps = 200;
+  const Field before = builtBefore(c);
+  ASSERT_GT(before.metadata().totalError, 1e-6);
+  const RebuiltField rebuilt = rebuild(before, c.before, c.after, ExactDistance(c.after));
+  EXPECT_LE(rebuilt.field.metadata().totalError, 1.02 * before.metadata().totalError);
+  EXPECT_LT(statistics(rebuilt.field).leaves, 2 * rebuilt.leaves);
 }
 
 /// A body that appears where Φ was smooth has hardly a share in the error of the earlier field.

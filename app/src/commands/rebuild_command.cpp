@@ -49,7 +49,7 @@ std::string percent(double share) { return fmt::format("{:.1f} %", 100 * share);
 struct RebuildFigures {
   std::uint64_t changedTriangles, leaves, kept, distances, distancesBefore;
   double keptVolume, seconds;
-  bool hasHoles;
+  bool signsChange;
 
   double keptShare() const { return leaves > 0 ? double(kept) / double(leaves) : 0; }
   double distanceShare() const { return distancesBefore > 0 ? double(distances) / double(distancesBefore) : 0; }
@@ -62,7 +62,7 @@ Json figuresJson(const RebuildFigures& figures) {
           {"kept_volume", figures.keptVolume},
           {"distances", figures.distances},
           {"distances_before", figures.distancesBefore},
-          {"has_holes", figures.hasHoles},
+          {"signs_change", figures.signsChange},
           {"seconds", figures.seconds}};
 }
 
@@ -70,7 +70,7 @@ std::string figuresText(const RebuildFigures& figures) {
   return fmt::format("kept: {} of {} leaves ({}), {} of the domain; {} triangles differ\n", grouped(figures.kept),
                      grouped(figures.leaves), percent(figures.keptShare()), percent(figures.keptVolume),
                      grouped(figures.changedTriangles)) +
-         fmt::format("distances: {}, {} of the earlier construction's\n", grouped(figures.distances),
+         fmt::format("distances: {}, {} of those that FIELD took\n", grouped(figures.distances),
                      percent(figures.distanceShare()));
 }
 
@@ -107,7 +107,9 @@ void runRebuild(Session& session, const Arguments& arguments) {
     return made;
   });
   warnOfField(console, rebuilt.field, settings, meshAfter.report);
-  if (rebuilt.hasHoles) note(console, "a mesh has holes, which winding numbers close: all was built anew");
+  if (rebuilt.signsChange)
+    note(console,
+         "no leaf was kept, because signs may change everywhere: the inside test is another one, or a mesh has holes");
   const bool isSame = rebuilt.changedTriangles == 0;
   const RebuildFigures figures{.changedTriangles = rebuilt.changedTriangles,
                                .leaves = rebuilt.leaves,
@@ -116,7 +118,7 @@ void runRebuild(Session& session, const Arguments& arguments) {
                                .distancesBefore = field.metadata().exactEvaluations,
                                .keptVolume = rebuilt.keptVolume,
                                .seconds = secondsSince(start),
-                               .hasHoles = rebuilt.hasHoles};
+                               .signsChange = rebuilt.signsChange};
   session.setField({std::move(rebuilt.field), arguments.textOr("output", session.current().name), {}, after});
   session.setExact(exact);
   saveMade(session, arguments);
@@ -132,15 +134,15 @@ void addRebuildCommand(Registry& registry) {
       .help = paragraphs(R"(
 Makes the field of AFTER from FIELD, the field of BEFORE. Leaves that no changed triangle can reach stay as they are, to
 the bit; the cells around the changes are built anew, with the settings that the field keeps. The result keeps to the
-target error as a whole construction does, but takes few distances where little has changed: for editors, for parts that
+target error, which each update may exceed by 2 %, but takes few distances where little has changed: for editors, for parts that
 move, for scans that are retouched. The report says how much was kept, and the errors that were measured.
 
 Triangles are the same if their corners have the same coordinates; their order and numbers do not matter. BEFORE must be
 the mesh from which the field was made, and AFTER must stay in the field's domain; if the field is normalized, with the same
 box. A field within a tolerance or a limit of bytes, a weakly continuous one, and one of an outer hull cannot be updated.
 
-If more than half of the triangles differ, all is built anew; and also if BEFORE or AFTER has holes and signs come from
-winding numbers, because the surfaces that close the holes may change everywhere.)"),
+If more than half of the triangles differ, all is built anew. So it is if signs may change everywhere: if AFTER needs another
+inside test than BEFORE, or if signs come from winding numbers and one of the meshes has holes.)"),
       .examples = {"hpsdf rebuild part.hpsdf part.stl changed.stl -o changed.hpsdf"},
       .parameters = {fieldParameter(),
                      {"before", text("BEFORE").positional().required(), "Mesh from which the field was made."},

@@ -68,16 +68,18 @@ struct RebuiltField {
   std::uint64_t leaves = 0;            ///< number of leaves of the earlier field
   std::uint64_t kept = 0;              ///< number of its leaves that are leaves of the new field, too
   double keptVolume = 0;               ///< their share of the domain's volume
-  /// True if no leaf was kept because one of the meshes has holes and signs come from winding numbers: the surfaces
-  /// that close the holes then change everywhere.
-  bool hasHoles = false;
+  /// True if no leaf was kept because signs may change everywhere: the inside test is another one; or signs come from
+  /// winding numbers, and one of the meshes has holes, or the sign of its volume (`signedVolume`) changes.
+  bool signsChange = false;
 };
 
 /// Builds the field of a mesh that differs from the mesh of an earlier field in some triangles. Leaves of the earlier
-/// field which no changed triangle can reach keep their polynomials, to the bit, or their lists of triangles. The other
-/// parts of the octree are built anew, with the settings of the earlier field and its length L. They have that part of
-/// the target error which the kept leaves leave: the errors of leaves are not stored, and count by the embedded
-/// estimate. Where the kept leaves leave hardly anything, the field may exceed the target error by 2 %.
+/// field which no changed triangle can reach keep the coefficients of their polynomials, to the bit, or their lists of
+/// triangles. The other parts of the octree are built anew, with the settings of the earlier field and its length L.
+/// The new cells may have the part of the target error that the kept leaves do not use. The errors of leaves are not
+/// stored; their shares are those of the embedded estimate. New cells may have 2 % of the target error in any case, so
+/// that each update may exceed the target error by 2 %. If the earlier construction ended above its target error, the
+/// error that it reached is aimed at instead.
 ///
 /// Triangles are the same if their corners are, whatever their indices; moving, adding and removing triangles are
 /// alike. If more than half of the triangles differ, the whole field is built anew. For equal meshes the result is the

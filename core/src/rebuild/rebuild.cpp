@@ -1,3 +1,4 @@
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -48,17 +49,31 @@ BuildOptions settingsFor(const Field& field, const RebuildOptions& options) {
   return settings;
 }
 
-bool isByWinding(InsideTest test) { return test == InsideTest::winding; }
+/// Where a change of some triangles may change signs.
+enum class SignChange : std::uint8_t {
+  local,       ///< only where a changed triangle is nearest, or the winding number changes
+  everywhere,  ///< in the whole field, because of a hole, another inside test or the orientation of the mesh
+};
+
+SignChange signChange(const Field& field, const TriangleMesh& before, const TriangleMesh& after, const Source& now) {
+  const InsideTest test = field.metadata().source.insideTest;
+  if (test != now.insideTest) return SignChange::everywhere;
+  if (test != InsideTest::winding) return SignChange::local;
+  // A closed mesh that is oriented inward has the inside around it.
+  const bool turns = (signedVolume(before) < 0) != (signedVolume(after) < 0);
+  return turns || rebuilding::hasHoles(before) || rebuilding::hasHoles(after) ? SignChange::everywhere
+                                                                              : SignChange::local;
+}
 
 /// Finds the leaves that are kept where some triangles differ.
 KeptLeaves keptLeavesOf(const Field& field, const rebuilding::MeshChange& change, const DistanceFunction& distance,
                         const RebuildOptions& options, const Progress& progress) {
   const ExactDistance toChange(change.triangles, {.insideTest = InsideTest::pseudonormal, .threads = options.threads});
   const DistanceFunction toChangedTriangles(toChange);
-  const Source &before = field.metadata().source, &now = distance.source();
+  const Source& now = distance.source();
   detail::ChangedSurface changed{.now = distance, .toChange = toChangedTriangles};
   if (now.insideTest == InsideTest::shell) changed.offset = now.thickness / 2;
-  if (isByWinding(before.insideTest) || isByWinding(now.insideTest))
+  if (now.insideTest == InsideTest::winding)
     changed.windingChange = [&](std::span<const Vector3> points, std::span<double> out) {
       toChange.windingNumbers(points, out);
     };
@@ -95,21 +110,21 @@ RebuiltField rebuild(const Field& field, const TriangleMesh& before, const Trian
     const std::size_t changed = change.triangles.triangles.size(),
                       all = before.triangles.size() + after.triangles.size();
     KeptLeaves kept = KeptLeaves::none(field.data());
-    if (changed == 0)
+    if (changed == 0 && field.metadata().source.insideTest == distance.source().insideTest)
       return RebuiltField{.field = Field(sameField(field, distance.source())),
                           .leaves = kept.leaves,
                           .kept = kept.leaves,
                           .keptVolume = 1};
-    const bool isWound = isByWinding(field.metadata().source.insideTest) || isByWinding(distance.source().insideTest);
-    const bool hasHoles = isWound && (rebuilding::hasHoles(before) || rebuilding::hasHoles(after));
-    if (!hasHoles && 2 * changed <= all) kept = keptLeavesOf(field, change, distance, options, progress);
+    const SignChange signs = signChange(field, before, after, distance.source());
+    if (signs == SignChange::local && 2 * changed <= all)
+      kept = keptLeavesOf(field, change, distance, options, progress);
     FieldData made = fieldWith(kept, distance, settings, progress);
     return RebuiltField{.field = Field(std::move(made)),
                         .changedTriangles = changed,
                         .leaves = kept.leaves,
                         .kept = kept.kept,
                         .keptVolume = kept.keptVolume,
-                        .hasHoles = hasHoles};
+                        .signsChange = signs == SignChange::everywhere};
   });
 }
 

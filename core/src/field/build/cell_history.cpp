@@ -128,7 +128,7 @@ class RefinementReplay {
         progress_(progress),
         options_(options),
         budget_(options_),
-        setup_(makeSetup(distance, options_, budget_, referenceLength(distance.source(), field.domain()), progress)),
+        setup_(makeSetup(distance, options_, budget_, field.metadata().referenceLength, progress)),
         fitter_(distance, options_, state_.nearness, setup_.nearDistance, progress),
         refiner_{setup_, fitter_, state_, observer_},
         scale_(std::pow(setup_.referenceLength / 2, 5)),

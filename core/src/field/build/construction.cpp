@@ -95,9 +95,12 @@ void Construction::beginWithKept() {
   };
   makeTree(*kept_, exactFit, state_.tree, setup_.progress);
   const FieldMetadata& before = kept_->before->metadata;
-  keptError_ = kept_->keptError * before.totalError * std::pow(before.referenceLength / 2, 5);
-  for (ErrorGoal* goal : {&setup_.goal, &setup_.growthGoal})
-    goal->weighted = std::max(goal->weighted - keptError_, kLeastShare * goal->weighted);
+  const double errorBefore = before.totalError * std::pow(before.referenceLength / 2, 5);
+  keptError_ = kept_->keptError * errorBefore;
+  double& goal = setup_.goal.weighted;
+  if (kept_->kept > 0) goal = std::max(goal, errorBefore);
+  goal = std::max(goal - keptError_, kLeastShare * goal);
+  setup_.growthGoal = setup_.options.criterion == Criterion::optimal ? setup_.goal.times(kGrowth) : setup_.goal;
 }
 
 void Construction::grow(const std::function<void(std::uint64_t)>& afterStep) {

@@ -26,8 +26,8 @@ class Construction {
  public:
   /// Keeps references to the arguments. If `kept` is given, the construction begins with these leaves of an earlier
   /// field, which are neither fitted nor refined; leaves that cannot be kept after all are taken out of it. Cells of
-  /// that field all of whose leaves are to be built anew begin as one leaf. They have that part of the target error
-  /// which the kept leaves leave, and a small part of it in any case. L is that of the earlier field.
+  /// that field all of whose leaves are to be built anew begin as one leaf. The new cells may have the part of the
+  /// target error that the kept leaves do not use, and a small part in any case. L is that of the earlier field.
   Construction(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                const Progress& progress, KeptLeaves* kept = nullptr);
 

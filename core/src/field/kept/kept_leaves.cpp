@@ -21,7 +21,8 @@ namespace {
 constexpr double kRelativeRounding = 1e-12;  // bound of the relative rounding errors of distances and boxes
 constexpr std::size_t kAtOnce = 256;
 
-/// Returns the weighted error of a leaf by the embedded estimate; 0 for a leaf that lies outside the field's band.
+/// Returns the weighted error of a leaf by the embedded estimate. Returns 0 for leaves without error: those outside the
+/// field's band, exact ones, and of a field with exact leaves the linear ones, which stand for triangles in one plane.
 double embeddedError(const FieldData& field, const Nearness& nearness, std::uint32_t leaf, const Vector3& size) {
   const std::uint64_t bits = field.nodes[leaf];
   if (node::isExact(bits)) return 0;
@@ -29,6 +30,7 @@ double embeddedError(const FieldData& field, const Nearness& nearness, std::uint
     const int degree = node::degree(bits);
     std::array<double, std::size_t(coefficientCount(kMaxDegree))> coefficients;
     std::copy_n(c, coefficientCount(degree), coefficients.begin());
+    if (degree == 1 && field.metadata.settings.strategy == Strategy::hpx) return 0.0;
     const double band = field.metadata.settings.band;
     if (band > 0 && std::abs(coefficients[0]) > band + size.norm() / 2) return 0.0;
     return nearness.weight(coefficients[0]) * basis::topDegreeError(coefficients.data(), degree, size.prod());
