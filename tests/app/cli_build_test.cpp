@@ -262,7 +262,7 @@ TEST_F(BuildCommand, memoryLimitIncludesTheExactDistance) {
 TEST_F(BuildCommand, studiesNameTheOptionThatAllowsMoreMemory) {
   for (const std::vector<std::string>& kind :
        {std::vector<std::string>{"tradeoff", "--target-errors", "1e-3"}, {"continuity"}, {"convergence"}}) {
-    std::vector<std::string> words = {"study", kind[0], "builtin:torus", "-o", at("study"), "--memory-limit", "9e6"};
+    std::vector<std::string> words = {"study", kind[0], "builtin:torus", "-o", at("study"), "--memory-limit", "8e6"};
     words.insert(words.end(), kind.begin() + 1, kind.end());
     const Outcome outcome = run({words});
     EXPECT_EQ(outcome.status, 2) << kind[0];
