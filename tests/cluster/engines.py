@@ -32,6 +32,15 @@ def count_built(folder: pathlib.Path) -> int:
     return sum(1 for file in fields.iterdir() if file.suffix == ".hpsdf") if fields.is_dir() else 0
 
 
+def step_of(process: int) -> int | None:
+    """Returns the slurmstepd that has started a process, or None."""
+    with contextlib.suppress(OSError):
+        parent = int(pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
+        if pathlib.Path(f"/proc/{parent}/comm").read_text().startswith("slurmstepd"):
+            return parent
+    return None
+
+
 def children_of(process: int) -> list[int]:
     """Returns the processes that a process has started, and those that they have started."""
     found = []
@@ -156,11 +165,16 @@ class Slurm:
     def kill_node(self, name: str) -> None:
         """Ends a node at once, with what runs on it, as if it had lost its power."""
         kill_tree(self.daemons[name].pid)
-        # The processes of jobs are children of slurmstepd, which is none of the node's daemon.
+        # The processes of jobs are children of slurmstepd, which is none of the node's daemon. It is killed first: it would
+        # tell the controller how its job has ended.
+        jobs = []
         for entry in pathlib.Path("/proc").iterdir():
             with contextlib.suppress(OSError):
                 if entry.name.isdigit() and f"SLURMD_NODENAME={name}\0" in (entry / "environ").read_text(errors="replace"):
-                    os.kill(int(entry.name), signal.SIGKILL)
+                    jobs.append(int(entry.name))
+        for process in [*(parent for parent in map(step_of, jobs) if parent is not None), *jobs]:
+            with contextlib.suppress(OSError):
+                os.kill(process, signal.SIGKILL)
         self.daemons[name].wait()
 
     def stop(self) -> None:
