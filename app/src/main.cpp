@@ -12,6 +12,8 @@
 #include "console/large_stack.h"
 #include "construction/mesh_process.h"
 #include "program.h"
+#include "ranks/mpi_group.h"
+#include "ranks/process_group.h"
 
 namespace {
 
@@ -35,12 +37,34 @@ bool showsColors() {
   return isatty(STDOUT_FILENO) == 1 && valueOf("NO_COLOR").empty() && (colors == "truecolor" || colors == "24bit");
 }
 
+int runWith(const std::vector<std::string>& words, hpsdf::app::ProcessGroup* group) {
+  // Of several processes that build a field together, the first alone writes.
+  const bool writes = group == nullptr || group->isFirst();
+  if (!writes) hpsdf::app::removeInterruptHandlers();
+  std::ostream nowhere(nullptr);
+  hpsdf::app::Console console{.in = std::cin,
+                              .out = writes ? std::cout : nowhere,
+                              .err = writes ? std::cerr : nowhere,
+                              .redrawsProgress = writes && isatty(STDERR_FILENO) == 1,
+                              .meshReader = hpsdf::app::ownProgram(),
+                              .writesProgress = writes,
+                              .showsColors = showsColors(),
+                              .group = group};
+  return hpsdf::app::runProgram(words, console);
+}
+
+int runTogether(const std::vector<std::string>& words) {
+  try {
+    return hpsdf::app::withProcessGroup([&](hpsdf::app::ProcessGroup& group) { return runWith(words, &group); });
+  } catch (const hpsdf::Error& error) {
+    std::cerr << "hpsdf: error: " << error.what() << std::endl;
+    return hpsdf::app::kExitBadInput;
+  }
+}
+
 int run(const std::vector<std::string>& words) {
   if (hpsdf::app::asksForReading(words)) return hpsdf::app::readForOtherProcess(words);
-  const bool terminal = isatty(STDERR_FILENO) == 1;
-  hpsdf::app::Console console{std::cin, std::cout, std::cerr, terminal, nullptr, hpsdf::app::ownProgram()};
-  console.showsColors = showsColors();
-  return hpsdf::app::runProgram(words, console);
+  return hpsdf::app::isStartedTogether() ? runTogether(words) : runWith(words, nullptr);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "construction/surface.h"
 #include "hpsdf/error.h"
 #include "language/help.h"
+#include "ranks/process_group.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -63,6 +64,8 @@ void execute(std::span<const std::string> given, const Registry& registry, const
   }
   if (command.scriptOnly)
     throw Error(fmt::format("'{}' is a command of scripts: hpsdf run -e '{} …'", command.name, command.name));
+  if (console.group != nullptr && command.name != "build")
+    throw Error(fmt::format("several processes build one field together: start '{}' without mpirun", command.name));
   std::vector<Word> arguments;
   for (const std::string& word : std::span(words).subspan(1)) arguments.push_back({.text = word});
   Session session(registry, console);
@@ -85,7 +88,7 @@ int cancelledStatus() {
 
 }  // namespace
 
-int runProgram(std::span<const std::string> words, const Console& console) {
+static int runAlone(std::span<const std::string> words, const Console& console) {
   try {
     const Registry registry = makeRegistry();
     execute(words, registry, console);
@@ -99,11 +102,21 @@ int runProgram(std::span<const std::string> words, const Console& console) {
     return cancelledStatus();
   } catch (const ReaderGone&) {
     return kExitReaderGone;
+  } catch (const PartDone&) {
+    return kExitDone;
   } catch (const Failed& failed) {
     return fail(console, failed.what(), failed.status());
   } catch (const std::exception& error) {
     return fail(console, errorText(error), kExitBadInput);
   }
+}
+
+int runProgram(std::span<const std::string> words, const Console& console) {
+  const int status = runAlone(words, console);
+  if (status != kExitDone && console.group != nullptr && !console.group->hasBegun)
+    failBefore(*console.group->ranks, fmt::format("rank {} could not begin", console.group->ranks->rank()));
+  // mpirun would end the other processes at once if one that is not the first failed.
+  return console.group != nullptr && !console.group->isFirst() ? kExitDone : status;
 }
 
 }  // namespace hpsdf::app

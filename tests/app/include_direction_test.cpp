@@ -22,7 +22,7 @@ namespace include_direction_test {
 namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
-constexpr std::array<std::string_view, 8> kRooms = {"core", "render", "physics", "openvdb",
+constexpr std::array<std::string_view, 9> kRooms = {"core", "render", "physics", "openvdb", "mpi",
                                                     "web",  "app",    "c",       "python"};
 constexpr std::size_t kMostFilesInFolder = 20;
 constexpr std::size_t kMostFilesInAppItself = 4;
@@ -166,7 +166,7 @@ std::set<std::string> quotedWords(const std::string& cell) {
 /// Reads table rows of the form "| `core/src/mesh` | contents | `util`, … | `header.h`, … |".
 Folders parseFolders(const std::string& design) {
   static const std::regex row(
-      R"(^\| `((?:core|render|physics|openvdb|web|app|c|python)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
+      R"(^\| `((?:core|render|physics|openvdb|mpi|web|app|c|python)/[^`]+)` \|([^|]*)\|([^|]*)\|([^|]*)\|$)");
   Folders folders;
   std::istringstream stream(design);
   std::string line;

@@ -18,6 +18,7 @@ run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build_dir} -G ${GENERATOR
   -D EXPECT_PHYSICS=${EXPECT_PHYSICS}
   -D EXPECT_BULLET=${EXPECT_BULLET}
   -D EXPECT_OPENVDB=${EXPECT_OPENVDB}
+  -D EXPECT_MPI=${EXPECT_MPI}
   -D EXPECT_RENDER=${EXPECT_RENDER})
 run(${CMAKE_COMMAND} --build ${build_dir} --config ${CONFIG})
 run(${CMAKE_COMMAND} --build ${build_dir} --config ${CONFIG} --target run)

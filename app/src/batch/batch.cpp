@@ -399,6 +399,8 @@ void checkBatch(const Arguments& arguments) {
 }
 
 void buildBatch(Session& session, const Arguments& arguments) {
+  if (session.console().group != nullptr)
+    throw Error("batch: several processes build one field together: start a list without mpirun, or share it by part");
   requireConsistent(arguments);
   const std::vector<BatchMesh> list = readBatchList(session.console(), arguments.text("batch"));
   const std::vector<BatchMesh> meshes = arguments.has("part") ? partOf(list, arguments.text("part")) : list;

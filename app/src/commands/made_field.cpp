@@ -13,6 +13,7 @@
 #include "hpsdf/app/failed.h"
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/field_file.h"
+#include "ranks/process_group.h"
 #include "session/asked_errors.h"
 #include "session/field_summary.h"
 
@@ -120,7 +121,8 @@ Json madeJson(const Session& session, const Arguments& arguments) {
 void buildAndReport(Session& session, const Arguments& arguments, const BuildSource& from,
                     const std::function<BuiltField(const std::filesystem::path& checkpoint)>& build) {
   const std::filesystem::path checkpoint = checkpointFile(arguments);
-  checkFieldOutput(arguments);
+  const ProcessGroup* group = session.console().group;
+  if (group == nullptr || group->isFirst()) checkFieldOutput(arguments);
   const InterruptGuard guard;  // on Ctrl-C, the file is written completely or not at all
   BuiltField built = buildKeepingState(build, checkpoint);
   session.setField({std::move(built.field), arguments.textOr("output", from.name), {}, from.surface});

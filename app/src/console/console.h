@@ -35,6 +35,8 @@ class WorkListener {
   virtual void ended() = 0;
 };
 
+struct ProcessGroup;
+
 /// The streams that the program uses. Tests pass streams of their own.
 struct Console {
   std::istream& in;
@@ -47,9 +49,10 @@ struct Console {
   std::filesystem::path meshReader = {};
   /// Meshes in memory that take the place of files of their names. It may be null.
   const std::map<std::string, TriangleMesh, std::less<>>* meshes = nullptr;
-  std::string work = {};       ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
-  bool writesProgress = true;  ///< false if only the listener shows progress
-  bool showsColors = false;    ///< true if `out` is a terminal that shows 24-bit colours
+  std::string work = {};          ///< prefix of progress messages, such as "3 of 10, bunny.obj: "
+  bool writesProgress = true;     ///< false if only the listener shows progress
+  bool showsColors = false;       ///< true if `out` is a terminal that shows 24-bit colours
+  ProcessGroup* group = nullptr;  ///< the processes that build a field together; null if this one is alone
 };
 
 /// Writes one line to the stream `err`, in place of a progress line. Any thread may call it. Control characters in

@@ -39,6 +39,10 @@ void installInterruptHandlers() {
   }
 }
 
+void removeInterruptHandlers() {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_DFL);
+}
+
 InterruptGuard::InterruptGuard() {
   if (guards++ == 0) firstSignal = 0;
 }

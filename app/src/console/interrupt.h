@@ -7,6 +7,9 @@ namespace hpsdf::app {
 /// a flag. Signals that the parent process ignores stay ignored.
 void installInterruptHandlers();
 
+/// Undoes it: the signals end this process without a message.
+void removeInterruptHandlers();
+
 /// While a guard exists, the first SIGINT, SIGTERM or SIGHUP does not end the process, so that the work can stop in an
 /// orderly way. Guards may be nested.
 class InterruptGuard {

@@ -12,6 +12,7 @@
 #include "construction/surface.h"
 #include "hpsdf/combine/combined_distance.h"
 #include "hpsdf/verify.h"
+#include "ranks/process_group.h"
 #include "text/text.h"
 
 namespace hpsdf::app {
@@ -109,6 +110,20 @@ OfferField offerTo(WorkListener* listener) {
   return [listener](const std::function<Field()>& fieldSoFar) { listener->offerField(fieldSoFar); };
 }
 
+/// Builds the field, together with other processes if there are any. Throws `PartDone` in all of them but the first.
+Field constructed(const Console& console, const BuildInput& input, const Checkpoint* checkpoint,
+                  const Progress& progress) {
+  if (console.group != nullptr) {
+    console.group->hasBegun = true;
+    std::optional<Field> field =
+        buildByRanks(*console.group->ranks, *input.exact, input.domain, input.options, checkpoint, progress);
+    if (!field) throw PartDone();
+    return std::move(*field);
+  }
+  if (checkpoint != nullptr) return buildResumably(*input.exact, input.domain, input.options, *checkpoint, progress);
+  return build(*input.exact, input.domain, input.options, progress, offerTo(console.listener));
+}
+
 }  // namespace
 
 std::filesystem::path checkpointOf(const std::filesystem::path& output) { return output.string() + ".checkpoint"; }
@@ -179,13 +194,11 @@ BuiltField buildField(const Console& console, BuildInput input, const std::strin
                       const std::filesystem::path& checkpoint) {
   const auto construct = [&]() -> BuiltField {
     const auto start = std::chrono::steady_clock::now();
+    std::optional<Checkpoint> state;
+    if (!checkpoint.empty()) state = checkpointAt(console, checkpoint, arguments);
     Field field = withProgress(console, [&](const Progress& progress) {
-      if (checkpoint.empty())
-        return measured(build(*input.exact, input.domain, input.options, progress, offerTo(console.listener)),
-                        *input.exact, input.options, progress);
-      const Checkpoint state = checkpointAt(console, checkpoint, arguments);
-      return measured(buildResumably(*input.exact, input.domain, input.options, state, progress), *input.exact,
-                      input.options, progress);
+      return measured(constructed(console, input, state ? &*state : nullptr, progress), *input.exact, input.options,
+                      progress);
     });
     warnOfField(console, field, input.options, input.mesh);
     return {std::move(field), std::move(input.exact), input.mesh, input.setUpSeconds + secondsSince(start)};

@@ -23,6 +23,7 @@
 #include "hpsdf/output/grids.h"
 #include "hpsdf/output/sample_file.h"
 #include "hpsdf/output/sample_points.h"
+#include "hpsdf/parallel/ranks.h"
 #include "hpsdf/range.h"
 #include "hpsdf/safe_distance.h"
 #include "hpsdf/shapes.h"

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "hpsdf/build_options.h"
+#include "util/exact_sum.h"
 
 namespace hpsdf::detail {
 
@@ -47,6 +48,28 @@ struct ErrorTotals {
     (cell.near ? nearSquared : farSquared) += times * cell.squared;
     (cell.near ? nearVolume : farVolume) += times * cell.volume;
   }
+};
+
+/// The sums of `ErrorTotals` without rounding. They do not depend on the order in which leaves are added, nor on leaves
+/// that were added and taken away again.
+class ExactTotals {
+ public:
+  void add(const CellError& cell, int times = 1) {
+    weighted_.add(cell.weighted, times);
+    (cell.near ? nearSquared_ : farSquared_).add(cell.squared, times);
+    (cell.near ? nearVolume_ : farVolume_).add(cell.volume, times);
+  }
+  ErrorTotals rounded() const {
+    return {weighted_.value(), nearSquared_.value(), nearVolume_.value(), farSquared_.value(), farVolume_.value()};
+  }
+  /// Calls f with each of the sums, in a fixed order.
+  template <typename F>
+  void forEachSum(const F& f) {
+    for (ExactSum* sum : {&weighted_, &nearSquared_, &nearVolume_, &farSquared_, &farVolume_}) f(*sum);
+  }
+
+ private:
+  ExactSum weighted_, nearSquared_, nearVolume_, farSquared_, farVolume_;
 };
 
 /// The errors at which the construction ends. Lengths are in the units of the field.

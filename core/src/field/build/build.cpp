@@ -1,7 +1,9 @@
 #include "hpsdf/build.h"
 
 #include <algorithm>
+#include <exception>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -9,9 +11,12 @@
 #include "field/build/checkpoint_file.h"
 #include "field/build/construction.h"
 #include "field/build/tolerance_build.h"
+#include "field/shares/shares.h"
 #include "hpsdf/detail/build_settings.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
+#include "hpsdf/parallel/ranks.h"
+#include "util/refuse.h"
 
 namespace hpsdf {
 namespace {
@@ -55,6 +60,43 @@ Field buildResumably(const DistanceFunction& distance, const Box& domain, const 
     return construction.finish();
   }));
 }
+
+std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance, const Box& domain,
+                                  const BuildOptions& options, const Checkpoint* checkpoint, const Progress& progress) {
+  Shares shares(ranks);
+  const auto construct = [&]() -> std::optional<FieldData> {
+    const BuildOptions settings = settled(options, distance, domain, progress);
+    std::optional<CheckpointFile> file;
+    if (checkpoint != nullptr && shares.isFirst()) file.emplace(*checkpoint, distance, domain, settings);
+    Construction construction(distance, domain, settings, progress);
+    construction.shareWith(shares);
+    if (file && construction.resume(*file) && checkpoint->resumed) checkpoint->resumed(construction.steps());
+    construction.grow();
+    if (!construction.goesOn()) return std::nullopt;
+    FieldData field = construction.finish();
+    return shares.isFirst() ? std::optional(std::move(field)) : std::nullopt;
+  };
+  try {
+    checkOptions(domain, options);
+    for (const auto& [isGiven, what] :
+         {std::pair(options.tolerance > 0, "tolerance"), std::pair(options.maxBytes.has_value(), "limit of bytes")})
+      if (isGiven)
+        refuseOptions("several processes cannot build a field within a ", what, ": leave out the ", what,
+                      ", or start one process");
+    std::optional<FieldData> data = withThreads(options.threads, construct);
+    return data ? std::optional<Field>(std::move(*data)) : std::nullopt;
+  } catch (const Cancelled& cancelled) {
+    // The other ranks are probably cancelled too, or killed, and so is this one if it waits for long.
+    constexpr double kSeconds = 0.3;
+    shares.fail(cancelled.what(), kSeconds);
+    throw;
+  } catch (const std::exception& error) {
+    shares.fail(error.what());  // the other ranks need not wait for this one
+    throw;
+  }
+}
+
+void failBefore(Ranks& ranks, const std::string& why) { Shares(ranks).fail(why); }
 
 void buildStages(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,
                  std::span<const std::uint64_t> steps, const std::function<void(Field)>& visit,

@@ -52,12 +52,18 @@ class CheckpointFile {
   Clock::time_point next_;
 };
 
+/// Writes the numbers of a construction state that are not part of its octree, and the number of evaluations of the
+/// exact distance, to a message; and reads them.
+void write(MessageWriter& message, ConstructionState& state, std::uint64_t evaluations);
+std::uint64_t read(const Message& message, ConstructionState& state);
+
 /// Writes the construction state and the number of evaluations of the exact distance. Does not change the state,
 /// which is non-const only because the same functions also read it.
 void save(CheckedWriter& writer, ConstructionState& state, std::uint64_t evaluations);
 
 /// Reads the construction state that `save` wrote, and returns the number of evaluations of the exact distance.
-/// The domain and the grid of `state` must already be set. Throws `Error` unless a construction with this
+/// The domain and the grid of `state` must already be set. What is derived from the octree is left out
+/// (`Refiner::countAll`). Throws `Error` unless a construction with this
 /// setup could have saved this state.
 std::uint64_t restore(CheckedReader& reader, ConstructionState& state, const ConstructionSetup& setup);
 

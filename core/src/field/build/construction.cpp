@@ -19,6 +19,8 @@
 namespace hpsdf::detail {
 namespace {
 
+using Stage = ConstructionState::Stage;
+
 /// Estimates the octree of the exact leaves, as far as it has no more than `mostNodes` nodes.
 ExactEstimate exactEstimate(const DistanceFunction& distance, const BuildOptions& options, const Box& domain,
                             double mostNodes, const Progress& progress) {
@@ -70,20 +72,89 @@ Construction::Construction(const DistanceFunction& distance, const Box& domain, 
 }
 
 bool Construction::resume(CheckpointFile& file) {
-  observer_.atWholeState = [this, &file] {
-    if (!file.isDue()) return;
-    file.keep([this](CheckedWriter& writer) { save(writer, state_, fitter_.evaluations()); });
-  };
+  file_ = &file;
+  observer_.isDue = [&file] { return file.isDue(); };
+  observer_.atWholeState = [this] { saveState(); };
   std::optional<CheckedReader> reader = file.open();
-  if (reader) fitter_.setEvaluations(restore(*reader, state_, setup_));
-  return reader.has_value();
+  if (!reader) return false;
+  fitter_.setEvaluations(restore(*reader, state_, setup_));
+  if (state_.stage != Stage::fitFirstCells && refiner_.shares == nullptr) refiner_.countAll();
+  return true;
+}
+
+void Construction::saveState() {
+  if (refiner_.shares == nullptr) {
+    if (file_ != nullptr && file_->isDue())
+      file_->keep([this](CheckedWriter& writer) { save(writer, state_, fitter_.evaluations()); });
+    return;
+  }
+  ConstructionState whole = state_;
+  refiner_.shares->gatherAtFirst({whole.tree, whole.deferred});
+  const std::uint64_t evaluations = refiner_.shares->sum(fitter_.evaluations() - refiner_.aheadOfTurn);
+  whole.fittedCells = whole.tree.nodes.size();
+  if (file_ != nullptr) file_->keep([&](CheckedWriter& writer) { save(writer, whole, evaluations); });
+}
+
+void Construction::shareWith(Shares& shares) {
+  refiner_.shares = &shares;
+  observer_.atWholeState = [this] { saveState(); };
+}
+
+void Construction::spread() {
+  Shares& shares = *refiner_.shares;
+  if (!shares.isFirst() || state_.stage == Stage::fitFirstCells) {
+    // A state in which not all first cells are fitted holds little, and is begun anew.
+    state_.tree.nodes.clear();
+    state_.tree.addBaseCells();
+    state_.fittedCells = 0;
+    fitter_.setEvaluations(0);
+  }
+  MessageWriter message;
+  write(message, state_, fitter_.evaluations());
+  const Message first = shares.fromFirst(message.take());
+  if (!shares.isFirst()) {
+    read(first, state_);
+    for (BuildNode& node : state_.tree.nodes) node.fit = fitElsewhere();
+  }
+  if (state_.stage == Stage::probe) return;
+  shares.divide({state_.tree, state_.deferred}, setup_.options.maxDepth,
+                [](const BuildNode& node) { return node.fit.isFinal ? 0 : 1; });
+  if (state_.stage == Stage::refine) refiner_.countAll();
+}
+
+void Construction::gather() {
+  Shares& shares = *refiner_.shares;
+  fitter_.setEvaluations(shares.sum(fitter_.evaluations()));
+  shares.gatherAtFirst({state_.tree, state_.deferred});
+}
+
+void Construction::growByRanks() {
+  spread();
+  if (state_.stage != Stage::probe) {
+    growByErrors(refiner_);
+    if (finishesByParts()) return;
+    gather();
+  }
+  goesOn_ = refiner_.shares->isFirst();
+  endSharing();
+  refiner_.countAll();
+}
+
+bool Construction::finishesByParts() const {
+  const BuildOptions& options = setup_.options;
+  return options.strategy != Strategy::hpx && options.criterion != Criterion::optimal && !options.continuityWeight &&
+         !(options.maxError > 0);
+}
+
+void Construction::endSharing() {
+  refiner_.shares->close();
+  refiner_.shares = nullptr;  // rank 0 goes on alone
 }
 
 void Construction::offerTo(const std::function<void(const std::function<Field()>&)>& offer) {
   if (!offer) return;
   observer_.atWholeState = [this, &offer] {
-    if (state_.stage != ConstructionState::Stage::fitFirstCells && hasMemoryForAnother())
-      offer([this] { return fieldSoFar(); });
+    if (state_.stage != Stage::fitFirstCells && hasMemoryForAnother()) offer([this] { return fieldSoFar(); });
   };
 }
 
@@ -105,8 +176,8 @@ void Construction::beginWithKept() {
 
 void Construction::grow(const std::function<void(std::uint64_t)>& afterStep) {
   observer_.afterStep = afterStep;
-  growByErrors(refiner_);
-  if (setup_.options.maxError > 0) refineByProbes(refiner_);
+  refiner_.shares == nullptr ? growByErrors(refiner_) : growByRanks();
+  if (goesOn_ && setup_.options.maxError > 0) refineByProbes(refiner_);
 }
 
 FieldData Construction::finish(BuildTree&& tree) {
@@ -116,7 +187,13 @@ FieldData Construction::finish(BuildTree&& tree) {
   // Prune the tree and raise its degrees. The cells are then final.
   if (options.criterion == Criterion::optimal) prune(tree);
   if (options.enrich) enrich(tree);
-  FieldMetadata built = metadata(sumOfErrors(tree));
+  Shares* shares = refiner_.shares;
+  ExactTotals totals = sumOfErrors(tree);
+  if (shares != nullptr) {
+    shares->add(totals);
+    fitter_.setEvaluations(shares->sum(fitter_.evaluations()));
+  }
+  FieldMetadata built = metadata(totals.rounded());
   FieldData field = layOut(std::move(tree), std::move(built), setup_.distance.triangleSearch());
 
   // Reduce the jumps between cells in double precision, then round the coefficients. The coefficients are then final.
@@ -124,7 +201,13 @@ FieldData Construction::finish(BuildTree&& tree) {
     continuity::makeWeaklyContinuous(field, {.weight = *options.continuityWeight}, setup_.progress);
   field.blend = options.blend;
   roundCoefficients(budget_.coefficientType(), field, mostCoefficientBytes(field),
-                    kept_ != nullptr ? keptSteps(*kept_, field) : KeptSteps{});
+                    kept_ != nullptr ? keptSteps(*kept_, field) : KeptSteps{},
+                    shares != nullptr ? shares->across() : AcrossParts{});
+  if (shares != nullptr) {
+    field = shares->gatheredAtFirst(std::move(field));
+    endSharing();
+    if (field.nodes.empty()) return field;  // rank 0 has it
+  }
   if (kept_ != nullptr)  // kept coefficients were rounded before
     field.metadata.roundingRms = std::hypot(
         field.metadata.roundingRms, std::sqrt(std::max(0.0, kept_->keptVolume)) * kept_->before->metadata.roundingRms);
@@ -136,7 +219,7 @@ FieldData Construction::finish(BuildTree&& tree) {
 }
 
 Field Construction::fieldSoFar() const {
-  FieldData field = layOut(state_.tree, metadata(sumOfErrors(state_.tree)), setup_.distance.triangleSearch());
+  FieldData field = layOut(state_.tree, metadata(sumOfErrors(state_.tree).rounded()), setup_.distance.triangleSearch());
   field.blend = setup_.options.blend;
   roundCoefficients(CoefficientType::float32, field);
   return Field(std::move(field));
@@ -155,8 +238,8 @@ void Construction::prune(BuildTree& tree) const {
   if (budget_.mayQuantize()) limits.quantization = setup_.quantizationLimits();
   // If the refinement missed its goal for another reason than the limit of bytes, relax the goal of pruning, so
   // that pruning can still undo refinements.
-  if (!setup_.growthGoal.reached(state_.totals) && !state_.isFull)
-    limits.goal = setup_.goal.relaxedTo(state_.totals, 1 / kGrowth);
+  if (!setup_.growthGoal.reached(state_.totals.rounded()) && !state_.isFull)
+    limits.goal = setup_.goal.relaxedTo(state_.totals.rounded(), 1 / kGrowth);
   if (options.maxBytes) limits.mostBytes = budget_.limit() - state_.exactSize.inField;
   limits.leastDegree = leastDegree(options);
   limits.mostDegree = mostDegree(options);

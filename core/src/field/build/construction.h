@@ -35,13 +35,20 @@ class Construction {
   /// from that state and returns true.
   bool resume(CheckpointFile& file);
 
+  /// From now on, shares the construction with other processes. Call it before `resume`, which only rank 0 may call.
+  void shareWith(Shares& shares);
+
   /// From now on, offers the field of the present state after each round of refinements (`OfferField`).
   void offerTo(const std::function<void(const std::function<Field()>& fieldSoFar)>& offer);
 
   std::uint64_t steps() const { return state_.steps; }
 
-  /// Refines the octree until an error or a limit ends it. `afterStep` may be empty (`GrowthObserver`).
+  /// Refines the octree until an error or a limit ends it. `afterStep` may be empty (`GrowthObserver`). If several
+  /// processes build the field, each has a part of its octree afterwards, or rank 0 has all of it (`finishesByParts`).
   void grow(const std::function<void(std::uint64_t)>& afterStep = {});
+
+  /// Returns false if another process finishes the field alone, which has the whole octree.
+  bool goesOn() const { return goesOn_; }
 
   /// Returns the field of the present state. It is made from a copy of the state's tree.
   Field snapshot() { return Field(finish(BuildTree(state_.tree))); }
@@ -49,8 +56,21 @@ class Construction {
 
  private:
   void beginWithKept();
-  /// Makes a field from the state's tree or a copy of it. Prunes the tree, raises its degrees, lays it out in
-  /// arrays, applies continuity, rounds the coefficients and computes bounds, as far as the options ask for it.
+  /// Gives all processes the state of rank 0, and each of them a part of the octree.
+  void spread();
+  /// Takes the whole octree to rank 0.
+  void gather();
+  /// Refines the octree together with the other processes. After that rank 0 has all of it.
+  void growByRanks();
+  /// Saves the state if that is due. If several processes build the field, all of them call this when it is due, and
+  /// only rank 0 has a file.
+  void saveState();
+  /// Returns true if each process can lay out and round its part of the field, so that no process needs all cells.
+  bool finishesByParts() const;
+  void endSharing();
+  /// Makes a field from the state's tree or a copy of it. If other processes hold parts of the octree, rank 0 alone
+  /// gets a field, and the others one without nodes. Prunes the tree, raises its degrees, lays it out in arrays,
+  /// applies continuity, rounds the coefficients and computes bounds, as far as the options ask for it.
   FieldData finish(BuildTree&& tree);
   /// Returns the field of the present state, as it would be if no stages followed the refinement.
   Field fieldSoFar() const;
@@ -71,8 +91,10 @@ class Construction {
   GrowthObserver observer_{.afterStep = {}, .atWholeState = [] {}};
   Refiner refiner_;
   std::uint64_t ownEvaluations_ = 0;  ///< evaluations of the exact distance by earlier calls of `finish`
-  KeptLeaves* kept_;                  ///< the leaves of an earlier field with which the construction began
-  double keptError_ = 0;              ///< estimate of the weighted error of these leaves
+  bool goesOn_ = true;
+  CheckpointFile* file_ = nullptr;  ///< keeps the state; only on rank 0 if several processes build the field
+  KeptLeaves* kept_;                ///< the leaves of an earlier field with which the construction began
+  double keptError_ = 0;            ///< estimate of the weighted error of these leaves
 };
 
 }  // namespace hpsdf::detail

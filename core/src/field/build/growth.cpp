@@ -7,11 +7,12 @@
 #include <functional>
 #include <numeric>
 #include <optional>
-#include <queue>
 #include <utility>
 #include <vector>
 
 #include "field/build/refiner.h"
+#include "field/shares/leaf_queue.h"
+#include "field/shares/shares.h"
 
 namespace hpsdf::detail {
 namespace {
@@ -75,36 +76,53 @@ class GrowthProgress {
   double fraction_ = 0;
 };
 
+/// A leaf that is refined in a round.
+struct Chosen {
+  LeafRank leaf;
+  int rank = 0;            ///< the process that holds it
+  std::uint32_t node = 0;  ///< its number, if this process holds it
+};
+
 /// Grows the octree by refining the leaves of a priority queue in rounds. The refinements of a round are tried
 /// in parallel but applied in the order of the queue, so that the result does not depend on the number of
-/// threads.
+/// threads. If several processes build the field, each of them holds and refines a part of the leaves. All know the
+/// errors before and after each refinement, and therefore the sums of errors; while a process waits for others, it
+/// tries leaves ahead of their turn.
 class Growth {
  public:
   explicit Growth(Refiner& refiner)
-      : setup_(refiner.setup), fitter_(refiner.fitter), state_(refiner.state), refiner_(refiner) {
-    if (state_.stage != Stage::refine) return;
-    // Rebuild the queue from the leaves, because a restored state does not contain the queue.
+      : setup_(refiner.setup),
+        fitter_(refiner.fitter),
+        state_(refiner.state),
+        refiner_(refiner),
+        queue_(refiner.state.tree) {
+    if (state_.stage == Stage::refine) enqueueLeaves();
+  }
+
+  void run() {
+    if (state_.stage == Stage::fitFirstCells) fitFirstCells();
+    divideWhenDue();
+    if (refiner_.observer.afterStep) refiner_.observer.afterStep(state_.steps);
+    if (state_.stage == Stage::refine && growsByErrors()) refineWorstCells();
+    fitter_.takeBack(std::exchange(refiner_.aheadOfTurn, 0));
+  }
+
+ private:
+  static constexpr std::size_t kRound = 32;  // few leaves at a time, because the paper refines cells one by one
+
+  Shares* shares() const { return refiner_.shares; }
+  int ownRank() const { return shares() != nullptr ? shares()->rank() : 0; }
+
+  /// Returns true if the errors are small enough to end the refinement.
+  bool reachedGoal() const { return setup_.growthGoal.reached(state_.totals.rounded()); }
+
+  /// Fills the queue with the leaves of the octree, because a restored state does not contain the queue.
+  void enqueueLeaves() {
     std::vector<bool> isDeferred(state_.tree.nodes.size());
     for (const std::uint32_t leaf : state_.deferred) isDeferred[leaf] = true;
     for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n)
       if (state_.tree.nodes[n].firstChild == 0 && !isDeferred[n]) enqueue(n);
   }
-
-  void run() {
-    if (state_.stage == Stage::fitFirstCells) fitFirstCells();
-    if (refiner_.observer.afterStep) refiner_.observer.afterStep(state_.steps);
-    if (state_.stage == Stage::refine && growsByErrors()) refineWorstCells();
-  }
-
- private:
-  struct Entry {
-    double error;
-    std::uint32_t node;
-    bool operator<(const Entry& other) const { return std::pair(error, other.node) < std::pair(other.error, node); }
-  };
-
-  /// Returns true if the errors are small enough to end the refinement.
-  bool reachedGoal() const { return setup_.growthGoal.reached(state_.totals); }
 
   void fitFirstCells() {
     constexpr std::size_t kChunk = 4096;
@@ -126,13 +144,10 @@ class Growth {
         if (node.firstChild == 0 && !node.fit.isFinal) node.fit = refiner_.firstFit(tree.boxOf(node));
       });
       state_.fittedCells = end;
-      refiner_.observer.atWholeState();
+      if (shares() == nullptr) refiner_.observer.atWholeState();
     }
-    for (const BuildNode& node : tree.nodes)
-      if (node.firstChild == 0) state_.coefficients += setup_.budget.finalCoefficients(node.fit);
-    state_.exactSize = setup_.exactSize(tree);
     if (setup_.goal.byDistance()) chooseNearness();
-    refiner_.sumTotals();
+    refiner_.countAll();
     refiner_.countCoefficientBytes();
     requireRoomForFirstCells();
     for (std::size_t n = 0; n < count; ++n)
@@ -160,12 +175,15 @@ class Growth {
   /// Chooses the exponent θ of the weight by which errors far from the surface count less. With this θ, a cell at the
   /// mean distance of the far cells has the weight (near error / far error)². Both errors are the user's target errors.
   void chooseNearness() {
-    double distance = 0, volume = 0;
+    ExactSum distances, volumes;
     for (const BuildNode& node : state_.tree.nodes) {
       if (node.firstChild != 0 || node.fit.isFinal || node.fit.error.near) continue;
-      distance += node.fit.error.volume * std::abs(node.fit.coefficients[0]);
-      volume += node.fit.error.volume;
+      distances.add(node.fit.error.volume * std::abs(node.fit.coefficients[0]));
+      volumes.add(node.fit.error.volume);
     }
+    if (shares() != nullptr)
+      for (ExactSum* sum : {&distances, &volumes}) shares()->add(*sum);
+    const double distance = distances.value(), volume = volumes.value();
     Nearness& nearness = state_.nearness;
     const ErrorGoal& goal = setup_.goal;
     nearness.kind = NearnessKind::exponential;
@@ -181,39 +199,173 @@ class Growth {
   bool growsByErrors() const { return !setup_.options.targetError.isNone() || !(setup_.options.maxError > 0); }
 
   void refineWorstCells() {
-    while (!reachedGoal() && refiner_.mayStep() && (!queue_.empty() || enqueueDeferred())) {
-      refineRound();
-      // Sum the errors anew if rounding errors of the running total could end the construction too early or keep
-      // it from ending.
-      if (reachedGoal() || state_.totals.weighted < 1e-6 * state_.lastSum) refiner_.sumTotals();
-      refiner_.observer.atWholeState();
-    }
+    if (shares() != nullptr) evaluations_ = shares()->sum(fitter_.evaluations());
+    while (!reachedGoal() && refiner_.mayStep() && refineRound()) divideWhenDue();
   }
 
-  void refineRound() {
+  /// Refines the leaves with the greatest errors. Returns false if there are none.
+  bool refineRound() {
+    if (shares() == nullptr) evaluations_ = fitter_.evaluations();
     setup_.progress.update("refining", fractionDone());
     refiner_.requireMemory(growthFactor(&GrowthProgress::leastFactor), growthFactor(&GrowthProgress::likelyFactor));
-    const std::vector<std::uint32_t> worst = worstLeaves();
-    std::vector<Trial> trials = tryAll(worst);
+    bool isDue = shares() == nullptr;
+    const std::vector<Chosen> worst = shares() != nullptr ? chooseWorstOfAll(isDue) : chooseWorst();
+    if (worst.empty()) return enqueueDeferred();
+    tryMissing(worst);
+    const std::vector<StepErrors> errors = shares() != nullptr ? shareErrors(worst) : std::vector<StepErrors>{};
     for (std::size_t w = 0; w < worst.size(); ++w) {
-      if (reachedGoal() || !refiner_.mayStep())  // keep the leaf: an exact sum may still show that the goal is missed
-        enqueue(worst[w]);
+      const bool isOwn = worst[w].rank == ownRank(), mayRefine = !reachedGoal() && refiner_.mayStep();
+      if (isOwn && mayRefine)
+        refine(worst[w].node);
+      else if (isOwn)
+        queue_.push(worst[w].node);
+      else if (mayRefine)
+        refiner_.countStep(errors[w]);
+    }
+    if (isDue) refiner_.observer.atWholeState();
+    return true;
+  }
+
+  /// Takes leaves with the greatest errors from the queue. Sets aside the leaves near the surface if the near error
+  /// has reached its goal, and the leaves far from the surface if the far error has reached its goal.
+  std::vector<Chosen> chooseWorst() {
+    std::vector<Chosen> worst;
+    while (worst.size() < kRound && !queue_.isEmpty()) {
+      const std::uint32_t leaf = queue_.pop();
+      if (isExactEnough(state_.tree.nodes[leaf].fit.error))
+        state_.deferred.push_back(leaf);
       else
-        refine(worst[w], std::move(trials[w]));
+        worst.push_back({queue_.rankOf(leaf), ownRank(), leaf});
+    }
+    return worst;
+  }
+
+  /// Does what `chooseWorst` does with the leaves of all processes. Sets `isDue` if the state should be saved after the
+  /// round.
+  std::vector<Chosen> chooseWorstOfAll(bool& isDue) {
+    const std::size_t deferredBefore = state_.deferred.size();
+    const std::vector<Chosen> own = chooseWorst();
+    MessageWriter writer;
+    writer.flag(shares()->isFirst() && refiner_.observer.isDue && refiner_.observer.isDue());
+    writer.item(fitter_.evaluations() - refiner_.aheadOfTurn);
+    for (const Chosen& chosen : own) writer.item(chosen.leaf);
+    const std::vector<Message> messages = shares()->gatherAll(writer.take(), [&] { tryAhead(); });
+
+    std::vector<Chosen> all;
+    evaluations_ = 0;
+    for (int rank = 0; rank < shares()->count(); ++rank) {
+      MessageReader reader(messages[std::size_t(rank)]);
+      bool flag = false;
+      reader.flag(flag);
+      isDue = isDue || flag;
+      std::uint64_t evaluations = 0;
+      reader.item(evaluations);
+      evaluations_ += evaluations;
+      for (std::size_t i = 0; !reader.isAtEnd(); ++i) {
+        Chosen& chosen = all.emplace_back();
+        reader.item(chosen.leaf);
+        chosen.rank = rank;
+        if (rank == ownRank()) chosen.node = own.at(i).node;
+      }
+    }
+    std::ranges::sort(all, [](const Chosen& a, const Chosen& b) { return a.leaf < b.leaf; });
+    if (all.size() < kRound) return all;
+
+    // One process alone would not have looked at the leaves behind the last of the round.
+    const LeafRank last = all[kRound - 1].leaf;
+    for (std::size_t i = kRound; i < all.size(); ++i)
+      if (all[i].rank == ownRank()) queue_.push(all[i].node);
+    all.resize(kRound);
+    std::vector<std::uint32_t>& deferred = state_.deferred;
+    for (std::size_t i = deferred.size(); i-- > deferredBefore;) {
+      if (!(last < queue_.rankOf(deferred[i]))) continue;
+      queue_.push(deferred[i]);
+      deferred.erase(deferred.begin() + std::ptrdiff_t(i));
+    }
+    return all;
+  }
+
+  /// Tells all processes the errors of the refinements of the chosen leaves, and returns those of all of them.
+  std::vector<StepErrors> shareErrors(const std::vector<Chosen>& worst) {
+    MessageWriter writer;
+    for (const Chosen& chosen : worst) {
+      if (chosen.rank != ownRank()) continue;
+      const Trial& trial = queue_.trial(chosen.node);
+      const StepErrors errors =
+          refiner_.errorsOf(chosen.node, trial, refiner_.raises(state_.tree.nodes[chosen.node], trial));
+      writer.item(errors.before);
+      writer.list(errors.after);
+    }
+    const std::vector<Message> messages = shares()->gatherAll(writer.take(), [&] { tryAhead(); });
+    std::vector<MessageReader> readers(messages.begin(), messages.end());
+    std::vector<StepErrors> all(worst.size());
+    for (std::size_t w = 0; w < worst.size(); ++w) {
+      MessageReader& reader = readers[std::size_t(worst[w].rank)];
+      reader.item(all[w].before);
+      reader.list(all[w].after);
+    }
+    return all;
+  }
+
+  /// Tries the refinements of the chosen leaves of this process that were not tried ahead.
+  void tryMissing(const std::vector<Chosen>& worst) {
+    std::vector<std::uint32_t> missing;
+    for (const Chosen& chosen : worst) {
+      if (chosen.rank != ownRank()) continue;
+      if (queue_.hasTrial(chosen.node))
+        refiner_.aheadOfTurn -= queue_.trial(chosen.node).evaluations;
+      else
+        missing.push_back(chosen.node);
+    }
+    std::vector<Trial> trials = tryAll(missing);
+    for (std::size_t i = 0; i < missing.size(); ++i) queue_.keepTrial(missing[i], std::move(trials[i]));
+  }
+
+  /// Tries a few leaves whose turn has not come, unless there are too many such trials.
+  void tryAhead() {
+    setup_.progress.throwIfCancelled();
+    constexpr std::size_t kMostAhead = 1024;
+    const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
+    std::vector<std::uint32_t> leaves;
+    while (leaves.size() < threads) {
+      const std::optional<std::uint32_t> leaf = queue_.firstUntried(kMostAhead);
+      if (!leaf) break;
+      leaves.push_back(*leaf);
+      queue_.keepTrial(*leaf, {});  // so that the next one is another leaf
+    }
+    std::vector<Trial> trials = tryAll(leaves);
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      refiner_.aheadOfTurn += trials[i].evaluations;
+      queue_.keepTrial(leaves[i], std::move(trials[i]));
     }
   }
 
-  /// Takes the leaves with the greatest errors from the queue. Sets aside the leaves near the surface if the near error
-  /// has reached its goal, and the leaves far from the surface if the far error has reached its goal.
-  std::vector<std::uint32_t> worstLeaves() {
-    constexpr std::size_t kRound = 32;  // few leaves at a time, because the paper refines cells one by one
-    std::vector<std::uint32_t> worst;
-    while (worst.size() < kRound && !queue_.empty()) {
-      const std::uint32_t next = queue_.top().node;
-      queue_.pop();
-      (isExactEnough(state_.tree.nodes[next].fit.error) ? state_.deferred : worst).push_back(next);
+  /// Divides the leaves among the processes anew, so that each has about the same work left, whenever the number of
+  /// steps has grown by half.
+  void divideWhenDue() {
+    constexpr double kGrowthBetween = 1.5, kMostUneven = 1.03;
+    constexpr std::uint64_t kFirst = 32;
+    if (shares() == nullptr || state_.stage != Stage::refine || state_.steps < nextDivision_) return;
+    nextDivision_ = std::max(kFirst, std::uint64_t(kGrowthBetween * double(state_.steps)));
+    // The refinements that a leaf still needs grow about with the root of its error.
+    const auto work = [&](const BuildNode& node) {
+      return refiner_.allowed(node) ? std::sqrt(node.fit.error.weighted) : 0;
+    };
+    if (!shares()->isUneven(state_.tree, kMostUneven, work)) return;
+    std::map<LeafRank, Trial> tried = queue_.takeAll();
+    shares()->divide({state_.tree, state_.deferred}, setup_.options.maxDepth, work);
+    enqueueLeaves();
+    for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n) {
+      const auto found = state_.tree.nodes[n].firstChild == 0 ? tried.find(queue_.rankOf(n)) : tried.end();
+      if (found == tried.end()) continue;
+      queue_.keepTrial(n, std::move(found->second));
+      tried.erase(found);
     }
-    return worst;
+    for (const auto& [leaf, trial] : tried) {  // other processes have these leaves now
+      refiner_.aheadOfTurn -= trial.evaluations;
+      fitter_.takeBack(trial.evaluations);
+    }
+    refiner_.countAll();
   }
 
   /// Computes the trial refinements of leaves in parallel. The most expensive leaves come first, so that no
@@ -235,7 +387,8 @@ class Growth {
     return trials;
   }
 
-  void refine(std::uint32_t leaf, Trial&& trial) {
+  void refine(std::uint32_t leaf) {
+    Trial trial = queue_.takeTrial(leaf);
     const bool raises = refiner_.raises(state_.tree.nodes[leaf], trial);
     refiner_.apply(leaf, std::move(trial), raises);
     if (state_.isFull) return;
@@ -248,11 +401,13 @@ class Growth {
   /// error.
   bool isExactEnough(const CellError& cell) const {
     const ErrorGoal& goal = setup_.growthGoal;
-    return setup_.goal.byDistance() && (cell.near ? goal.nearReached(state_.totals) : goal.farReached(state_.totals));
+    if (!setup_.goal.byDistance()) return false;
+    const ErrorTotals totals = state_.totals.rounded();
+    return cell.near ? goal.nearReached(totals) : goal.farReached(totals);
   }
 
   /// Puts leaves that were set aside back into the queue: near leaves if the near error no longer meets its goal, and
-  /// far leaves if the far error no longer meets its goal. Returns false if the queue stays empty.
+  /// far leaves if the far error no longer meets its goal. Returns false if the queues of all processes stay empty.
   bool enqueueDeferred() {
     for (const std::uint32_t leaf : std::exchange(state_.deferred, {})) {
       if (isExactEnough(state_.tree.nodes[leaf].fit.error))
@@ -260,12 +415,13 @@ class Growth {
       else
         enqueue(leaf);
     }
-    return !queue_.empty();
+    const bool hasOwn = !queue_.isEmpty();
+    return shares() != nullptr ? shares()->sum(std::uint64_t{hasOwn}) > 0 : hasOwn;
   }
 
   void enqueue(std::uint32_t leaf) {
     const BuildNode& node = state_.tree.nodes[leaf];
-    if (node.fit.error.weighted > 0 && refiner_.allowed(node)) queue_.push({node.fit.error.weighted, leaf});
+    if (node.fit.error.weighted > 0 && refiner_.allowed(node)) queue_.push(leaf);
   }
 
   /// Returns one of the factors of `GrowthProgress`, or 1 if the construction does not end at a weighted error.
@@ -273,19 +429,19 @@ class Growth {
     const ErrorGoal& goal = setup_.growthGoal;
     const bool endsOtherwise = goal.byDistance() || setup_.options.maxSteps || setup_.options.maxBytes;
     if (endsOtherwise || !(goal.weighted > 0)) return 1;
-    return (progress_.*factor)(double(fitter_.evaluations()), state_.totals.weighted, goal.weighted);
+    return (progress_.*factor)(double(evaluations_), state_.totals.rounded().weighted, goal.weighted);
   }
 
   double fractionDone() {
     const ErrorGoal& goal = setup_.growthGoal;
-    const ErrorTotals& totals = state_.totals;
+    const ErrorTotals totals = state_.totals.rounded();
     double fraction = 0;
     if (goal.byDistance()) {
       const double near = totals.nearSquared / (goal.nearSquare * totals.nearVolume);
       const double far = totals.farSquared / (goal.farSquare * totals.farVolume);
-      fraction = progress_.update(double(fitter_.evaluations()), std::fmax(near, far), 1);
+      fraction = progress_.update(double(evaluations_), std::fmax(near, far), 1);
     } else if (goal.weighted > 0) {
-      fraction = progress_.update(double(fitter_.evaluations()), totals.weighted, goal.weighted);
+      fraction = progress_.update(double(evaluations_), totals.weighted, goal.weighted);
     }
     if (setup_.options.maxSteps) fraction = std::max(fraction, double(state_.steps) / double(*setup_.options.maxSteps));
     return std::max(fraction, refiner_.bytes() / setup_.budget.growthLimit(state_.exactSize.inField));
@@ -295,7 +451,9 @@ class Growth {
   const CellFitter& fitter_;
   ConstructionState& state_;
   Refiner& refiner_;
-  std::priority_queue<Entry> queue_;
+  LeafQueue queue_;
+  std::uint64_t nextDivision_ = 0;  ///< number of steps after which the leaves are divided anew
+  std::uint64_t evaluations_ = 0;   ///< of the exact distance, by all processes, except for leaves ahead of their turn
   GrowthProgress progress_;
 };
 

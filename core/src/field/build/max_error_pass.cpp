@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,11 @@ class MaxErrorPass {
     if (state_.stage != ConstructionState::Stage::probe) {
       for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n)
         if (state_.tree.nodes[n].firstChild == 0) pending.push_back(n);
+      // The order of the leaves must not depend on their numbers, which differ if several processes have made them.
+      std::ranges::sort(pending, {}, [&](std::uint32_t n) {
+        const BuildNode& node = state_.tree.nodes[n];
+        return std::tuple(node.depth, node.cellIndex[2], node.cellIndex[1], node.cellIndex[0]);
+      });
       state_.stage = ConstructionState::Stage::probe;
     }
     while (state_.processed < pending.size()) {
@@ -34,7 +40,6 @@ class MaxErrorPass {
       state_.processed += probed.size();
       refiner_.observer.atWholeState();
     }
-    refiner_.sumTotals();
   }
 
  private:

@@ -68,8 +68,8 @@ std::optional<ExactCells> exactCells(const DistanceFunction& distance, const Bui
                     static_cast<std::size_t>(options.exactTriangles), options.blend);
 }
 
-ErrorTotals sumOfErrors(const BuildTree& tree) {
-  ErrorTotals sum;
+ExactTotals sumOfErrors(const BuildTree& tree) {
+  ExactTotals sum;
   for (const BuildNode& node : tree.nodes)
     if (node.firstChild == 0) sum.add(node.fit.error);
   return sum;
@@ -132,8 +132,6 @@ void Refiner::makeExact(std::uint32_t leaf, Fit&& fit) {
   const double listed = bytesOf(fit.list);
   state.exactSize.inTree += listed;
   state.exactSize.inField += listed;
-  state.totals.add(before.error, -1);
-  state.totals.add(fit.error);
   before = std::move(fit);
 }
 
@@ -142,9 +140,10 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
   if (tree.nodes.size() > 0xffffffffu - 8)
     throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
 
+  const StepErrors errors = errorsOf(leaf, trial, raises);
   if (trial.exact) {
     makeExact(leaf, std::move(*trial.exact));
-    return countStep();
+    return countStep(errors);
   }
 
   // Refuse a refinement that would exceed the limit of bytes.
@@ -156,20 +155,25 @@ void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
     return;
   }
 
-  // Update the totals of the state: replace the leaf's coefficients and error by the coefficients and errors of
-  // its refinement.
   state.coefficients += added;
-  state.totals.add(tree.nodes[leaf].fit.error, -1);
   if (raises) {
     tree.nodes[leaf].fit = std::move(*trial.raised);
-    state.totals.add(tree.nodes[leaf].fit.error);
   } else {
     const bool keepsOwnFit = setup.options.criterion == Criterion::optimal;
     tree.split(leaf, std::move(*trial.children), keepsOwnFit ? std::move(*trial.raised) : Fit{});
-    const std::uint32_t first = tree.nodes[leaf].firstChild;
-    for (std::uint32_t child = first; child < first + 8; ++child) state.totals.add(tree.nodes[child].fit.error);
   }
-  countStep();
+  countStep(errors);
+}
+
+StepErrors Refiner::errorsOf(std::uint32_t leaf, const Trial& trial, bool raises) const {
+  StepErrors errors{.before = state.tree.nodes[leaf].fit.error, .after = {}};
+  if (trial.exact)
+    errors.after.push_back(trial.exact->error);
+  else if (raises)
+    errors.after.push_back(trial.raised->error);
+  else
+    for (const Fit& child : *trial.children) errors.after.push_back(child.error);
+  return errors;
 }
 
 /// Returns the bytes of the quantized coefficients of a field that is made from the present tree; infinity if they
@@ -200,7 +204,7 @@ void Refiner::countCoefficientBytes() {
   for (const BuildNode& node : state.tree.nodes)
     if (node.firstChild == 0) coefficients += node.fit.coefficients.size();
   if (coefficients == 0) return;
-  const double rms = std::sqrt(sumOfErrors(state.tree).weighted / state.tree.domain.volume());
+  const double rms = std::sqrt(sumOfErrors(state.tree).rounded().weighted / state.tree.domain.volume());
   const double bytes = quantizedBytes(state.tree, setup.quantizationLimits(), rms) / double(coefficients);
   state.coefficientBytes = std::min(state.coefficientBytes, bytes);
 }
@@ -214,15 +218,20 @@ bool Refiner::hasRoom(double nodes, double coefficients) {
   return bytesWith(nodes, coefficients) <= limit;
 }
 
-void Refiner::countStep() {
-  constexpr std::size_t kStepsBetweenSums = 1000;  // steps after which the total error is summed anew (paper, sec. 3.6)
-  if (++state.steps % kStepsBetweenSums == 0) sumTotals();
+void Refiner::countStep(const StepErrors& errors) {
+  state.totals.add(errors.before, -1);
+  for (const CellError& error : errors.after) state.totals.add(error);
+  ++state.steps;
   if (observer.afterStep) observer.afterStep(state.steps);
 }
 
-void Refiner::sumTotals() {
+void Refiner::countAll() {
   state.totals = sumOfErrors(state.tree);
-  state.lastSum = state.totals.weighted;
+  if (shares != nullptr) shares->add(state.totals);
+  state.coefficients = 0;
+  for (const BuildNode& node : state.tree.nodes)
+    if (node.firstChild == 0) state.coefficients += setup.budget.finalCoefficients(node.fit);
+  state.exactSize = setup.exactSize(state.tree);
 }
 
 MemoryNeed Refiner::memoryNeed(double leastFactor, double likelyFactor) const {

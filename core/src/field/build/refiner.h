@@ -10,6 +10,7 @@
 #include "field/cells/build_tree.h"
 #include "field/cells/exact_leaves.h"
 #include "field/precision/round_coefficients.h"
+#include "field/shares/shares.h"
 
 namespace hpsdf::detail {
 
@@ -22,8 +23,7 @@ struct ConstructionState {
   std::uint64_t fittedCells = 0;  ///< number of nodes, in their order, whose first fits are done
   std::uint64_t steps = 0;        ///< refinements so far: leaves whose degree was raised, or that were split
   Nearness nearness;
-  ErrorTotals totals;           ///< sums of errors over all leaves, updated with each step
-  double lastSum = 0;           ///< `totals.weighted` when it was last summed anew from all leaves
+  ExactTotals totals;           ///< sums of errors over all leaves, updated with each step; derived, not stored
   double measuredError = 0;     ///< greatest error among the leaves that the max-error pass has finished
   bool isFull = false;          ///< true once a refinement would have exceeded the limit of bytes
   std::uint64_t processed = 0;  ///< number of entries of `pending` that the max-error pass has finished
@@ -69,8 +69,17 @@ struct GrowthObserver {
   /// Called with the number of refinement steps: with 0 once the base cells are fitted, then after each step. May
   /// be empty.
   std::function<void(std::uint64_t steps)> afterStep;
-  /// Called whenever the state of the construction is complete, so that it can be saved.
+  /// Called whenever the state of the construction is complete, so that it can be saved. If several processes build
+  /// the field, all of them call it, after rounds before which `isDue` returned true on rank 0.
   std::function<void()> atWholeState;
+  /// Tells whether the state should be saved; may be empty. Called only if several processes build the field.
+  std::function<bool()> isDue = {};
+};
+
+/// The errors of a leaf, and of the leaf or the leaves that a refinement puts in its place.
+struct StepErrors {
+  CellError before;
+  std::vector<CellError> after;
 };
 
 /// Applies refinements to the octree of a construction's state. Keeps the error totals of the state up to date.
@@ -79,6 +88,8 @@ struct Refiner {
   const CellFitter& fitter;
   ConstructionState& state;
   const GrowthObserver& observer;
+  Shares* shares = nullptr;       ///< the other processes that build the field; nullptr if there are none
+  std::uint64_t aheadOfTurn = 0;  ///< evaluations for trials of leaves whose turn has not come
 
   /// Returns the refinements of a leaf that the limits of degree and depth allow, or std::nullopt if they allow
   /// none.
@@ -104,10 +115,12 @@ struct Refiner {
   /// `isFull` of the state instead.
   void apply(std::uint32_t leaf, Trial&& trial, bool raises);
 
-  /// Computes the error totals anew from all leaves, which removes the rounding errors of the running totals.
-  void sumTotals();
-  /// Counts a refinement, and sums the error totals anew from time to time.
-  void countStep();
+  /// Returns the errors before and after a refinement by a trial.
+  StepErrors errorsOf(std::uint32_t leaf, const Trial& trial, bool raises) const;
+  /// Counts a refinement, which this process or another one has applied, and updates the error totals.
+  void countStep(const StepErrors& errors);
+  /// Sums the errors of all leaves of all processes, and counts what this process holds.
+  void countAll();
   /// Replaces the fit of a leaf by a fit without error.
   void makeExact(std::uint32_t leaf, Fit&& fit);
   /// Returns the size in bytes of the field that would be made from the present octree.
@@ -136,7 +149,7 @@ struct Gains {
 /// embedded estimate where that sees the error of the current fit.
 Gains gainsOf(const Fit& current, const Trial& trial, Estimator estimator);
 
-ErrorTotals sumOfErrors(const BuildTree& tree);
+ExactTotals sumOfErrors(const BuildTree& tree);
 
 /// Fits the base cells, then refines the leaves with the greatest errors until the goal is reached (paper,
 /// Algorithm 1). Continues with the next step if the state was restored. Ends early if the limit of steps or

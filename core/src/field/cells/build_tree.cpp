@@ -116,6 +116,10 @@ static FieldData layOutTree(const BuildTree& tree, FieldMetadata metadata, const
       const Pair pair = stack.back();
       stack.pop_back();
       const BuildNode& node = tree.nodes[pair.from];
+      if (node.firstChild == 0 && node.fit.isElsewhere()) {
+        data.nodes[pair.to] = node::exactLeaf({}, 0);
+        continue;
+      }
       if (node.firstChild == 0 && node.fit.isExact()) {
         data.nodes[pair.to] = node::exactLeaf(node.fit.sign.rule, packer->pack(node.fit.list, node.fit.sign));
         release(pair.from);

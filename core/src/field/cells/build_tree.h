@@ -68,7 +68,8 @@ ExactSize exactSize(const BuildTree& tree, const TriangleSearch* search, Coeffic
 
 /// Copies the nodes and coefficients into the arrays of a field, depth first, so that neighbours in space are
 /// neighbours in memory. The coefficients remain double. Frees the memory of a temporary tree as it goes on.
-/// `search` provides the triangles of exact leaves; it may be nullptr if there are none.
+/// `search` provides the triangles of exact leaves; it may be nullptr if there are none. A leaf that another process
+/// holds becomes an exact leaf without triangles; a tree with such leaves has no other exact ones.
 FieldData layOut(const BuildTree& tree, FieldMetadata metadata, const TriangleSearch* search);
 FieldData layOut(BuildTree&& tree, FieldMetadata metadata, const TriangleSearch* search);
 

@@ -250,6 +250,7 @@ CellFitter::Samples CellFitter::sample(const basis::Projection& projection, std:
       std::copy(derivatives.begin(), derivatives.end(), to + 1);
     }
   });
+  samples.evaluations = static_cast<std::uint32_t>(total);
   evaluations_ += total;
   return samples;
 }
@@ -308,7 +309,7 @@ double CellFitter::checkedError(const Fit& fit, const Box& cell, const CheckPoin
   return kShare * (sum + worst);
 }
 
-double CellFitter::measuredIfDoubtful(const Fit& fit, const Box& cell, double squared) const {
+double CellFitter::measuredIfDoubtful(Fit& fit, const Box& cell, double squared) const {
   // A cell of a higher degree was refined because an error had been seen. A distance without triangles may be smooth
   // everywhere.
   constexpr int kHighestDegree = 2;
@@ -316,6 +317,7 @@ double CellFitter::measuredIfDoubtful(const Fit& fit, const Box& cell, double sq
   const std::span<const Vector3> points = pointsOfDoubt(squared, cell, nearness_.diagonal);
   if (points.empty()) return squared;
   const std::vector<double> exact = distances(cell, points);
+  fit.evaluations += static_cast<std::uint32_t>(points.size());
   double sum = 0;
   for (std::size_t i = 0; i < points.size(); ++i) sum += squaredErrorAt(fit, points[i], exact[i]);
   return std::max(squared, sum / static_cast<double>(points.size()));
@@ -359,8 +361,10 @@ Fit CellFitter::fit(const Box& cell, int degree) const {
   const Samples samples = sample(projection, {&cell, 1}, cell, rules(degree).orderOfOne);
   std::vector<double> coefficients = projection(samples.numbers);
   const double meanSquare = projection.meanSquare(samples.numbers, coefficients);
-  return makeFit({std::move(coefficients), degree + 1, meanSquare}, degree, cell,
-                 outsideBand(cell, projection, samples.numbers), samples.check);
+  Fit fit = makeFit({std::move(coefficients), degree + 1, meanSquare}, degree, cell,
+                    outsideBand(cell, projection, samples.numbers), samples.check);
+  fit.evaluations += samples.evaluations;
+  return fit;
 }
 
 Fit CellFitter::raisedByOwnSamples(const Box& cell, const Fit& current) const {
@@ -377,6 +381,7 @@ Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowe
   const bool wantsRaised = allowed != Refinement::octree || keepsProjections();
   if (allowed == Refinement::degree || (allowed == Refinement::either && current.raisesAtOnce)) {
     trial.raised = raisedByOwnSamples(cell, current);
+    trial.evaluations = trial.raised->evaluations;
     return trial;
   }
   const int degree = current.degree;
@@ -405,6 +410,8 @@ Trial CellFitter::attempt(const Box& cell, const Fit& current, Refinement allowe
                        : makeFit({basis::joined(raised, degree + 1), degree + 1, meanSquare}, degree + 1, cell,
                                  allOutside, samples.check);
   }
+  trial.evaluations = samples.evaluations + (trial.raised ? trial.raised->evaluations : 0);
+  for (const Fit& child : *trial.children) trial.evaluations += child.evaluations;
   return trial;
 }
 

@@ -39,6 +39,7 @@ struct CachedProjection {
 struct Fit {
   std::vector<double> coefficients;
   int degree = 0;
+  std::uint32_t evaluations = 0;  ///< of the exact distance, for this cell alone; not stored in checkpoints
   CellError error;
   bool outsideBand = false;
   /// True if the fit's samples show that a polynomial of one degree more would leave little of its error. Such a cell
@@ -52,6 +53,8 @@ struct Fit {
   LeafSign sign = {};
 
   bool isExact() const { return degree == kExactDegree; }
+  /// Returns true for a leaf that another process holds (`fitElsewhere`).
+  bool isElsewhere() const { return isFinal && coefficients.empty() && !isExact(); }
   /// Returns the value of the polynomial at a point in local coordinates of the cell.
   double valueAt(const Vector3& local) const;
 };
@@ -68,6 +71,7 @@ struct Trial {
   std::optional<Fit> raised;                   ///< fit of the cell, one degree higher
   std::optional<std::array<Fit, 8>> children;  ///< fits of the eight children, at the cell's degree
   std::optional<Fit> exact = {};               ///< fit without error; the other fits are then missing
+  std::uint64_t evaluations = 0;               ///< of the exact distance, for all of these fits
 };
 
 enum class Refinement : std::uint8_t { degree, octree, either };
@@ -91,6 +95,8 @@ class CellFitter {
 
   /// Number of evaluations of the exact distance so far.
   std::uint64_t evaluations() const { return evaluations_; }
+  /// Does not count this number of evaluations, whose results are not used.
+  void takeBack(std::uint64_t evaluations) const { evaluations_ -= evaluations; }
   /// Sets the number of evaluations so far, for a construction that continues from a file.
   void setEvaluations(std::uint64_t evaluations) { evaluations_ = evaluations; }
 
@@ -108,6 +114,7 @@ class CellFitter {
   struct Samples {
     std::vector<double> numbers;  ///< the samples that a projection takes, one cell after another
     CheckPoints check;            ///< check points of the whole cell; none unless the estimator is `checked`
+    std::uint32_t evaluations = 0;
   };
 
   const Rules& rules(int degree) const;
@@ -123,8 +130,8 @@ class CellFitter {
   /// the cell, suggest.
   double checkedError(const Fit& fit, const Box& cell, const CheckPoints& check) const;
   /// Returns `squared`, the mean squared error that samples and check points suggest. If it is too small to be
-  /// believed, measures the error at many more points and returns the greater of the two.
-  double measuredIfDoubtful(const Fit& fit, const Box& cell, double squared) const;
+  /// believed, measures the error at many more points, counts these, and returns the greater of the two.
+  double measuredIfDoubtful(Fit& fit, const Box& cell, double squared) const;
   double squaredError(const Fit& fit, double meanSquare) const;
   void rate(Fit& fit, double squared, const Box& cell) const;
   bool keepsProjections() const { return options_.criterion == Criterion::optimal; }

@@ -59,11 +59,17 @@ QuantizationLimits limitsOf(const FieldData& field) {
 
 /// Returns the greatest steps of a field's leaves that keep to the limits and to the RMS error, and those that are
 /// given.
-std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimits& limits, const KeptSteps& kept) {
-  QuantizedPart part;
+std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimits& limits, const KeptSteps& kept,
+                                  const AcrossParts& parts) {
+  ExactSum volumes, integers;
   forEachPolynomial(field, [&](const query::OctreeNode& at, std::span<const double> c) {
-    part.add(query::cellSize(field, at.depth).prod(), double(c.size()));
+    const double volume = query::cellSize(field, at.depth).prod();
+    volumes.add(volume);
+    integers.add(volume * double(c.size()));
   });
+  parts.add(volumes);
+  parts.add(integers);
+  const QuantizedPart part{.volume = volumes.value(), .integers = integers.value()};
   const double forRms = field.metadata.hasEstimate() ? limits.stepForRms(part, field.metadata.rmsEstimate(field.domain))
                                                      : kUnlimitedChange;
   std::vector<double> steps(field.nodes.size());
@@ -77,10 +83,10 @@ std::vector<double> greatestSteps(const FieldData& field, const QuantizationLimi
 /// Quantizes with steps that are all made greater until the coefficients take no more than `mostBytes`. Without such a
 /// limit the steps are as given, and `fieldStep` is that of the field unless it is 0.
 std::optional<query::Quantized> quantizedWithin(const FieldData& field, std::vector<double> steps, double mostBytes,
-                                                double fieldStep) {
+                                                double fieldStep, const AcrossParts& parts) {
   constexpr double kFactor = 1.05;
   constexpr int kMostTries = 500;  // The last step is 4e10 times the first, and all integers are 0.
-  std::optional<query::Quantized> result = query::quantized(field, steps, fieldStep);
+  std::optional<query::Quantized> result = query::quantized(field, steps, fieldStep, parts);
   if (mostBytes < kUnlimitedChange && !steps.empty()) {
     // With steps that differ more, no factor would help.
     const double least = std::ldexp(*std::ranges::max_element(steps), -QuantizedCoefficients::kMostShift);
@@ -104,18 +110,21 @@ double leastError(const FieldData& field) {
 
 /// Quantizes the coefficients of a field as `CoefficientType::quantized` says. Returns false, and leaves the field as
 /// it is, if that is not possible.
-bool quantizeCoefficients(FieldData& field, double mostBytes, const KeptSteps& kept) {
+bool quantizeCoefficients(FieldData& field, double mostBytes, const KeptSteps& kept, const AcrossParts& parts) {
   FieldMetadata& metadata = field.metadata;
   const QuantizationLimits limits = limitsOf(field);
   std::optional<query::Quantized> quantized =
-      quantizedWithin(field, greatestSteps(field, limits, kept), mostBytes, kept.step);
+      quantizedWithin(field, greatestSteps(field, limits, kept, parts), mostBytes, kept.step, parts);
   if (!quantized) return false;
-  metadata.roundingRms = query::quantizedRounding(field, quantized->nodes, quantized->coefficients).rms;
-  const double change = greatestChange(field, *quantized, limits), maxError = metadata.settings.maxError;
-  // Less than a hundredth of a maximum error is left out. Rounding errors of the sums may exceed it slightly.
-  constexpr double kRounding = 1.001;
-  if (metadata.settings.tolerance > 0 || (maxError > 0 && change > kRounding * kShareOfMaximum * maxError))
-    metadata.measuredError += change;
+  metadata.roundingRms = query::quantizedRounding(field, quantized->nodes, quantized->coefficients, parts).rms;
+  const double maxError = metadata.settings.maxError;
+  if (metadata.settings.tolerance > 0 || maxError > 0) {
+    // Less than a hundredth of a maximum error is left out. Rounding errors of the sums may exceed it slightly.
+    constexpr double kRounding = 1.001;
+    const double change = greatestChange(field, *quantized, limits);
+    if (metadata.settings.tolerance > 0 || change > kRounding * kShareOfMaximum * maxError)
+      metadata.measuredError += change;
+  }
   query::take(std::move(*quantized), field);
   const bool mustBeShort = mostBytes < kUnlimitedChange;
   if (mustBeShort || query::vertexRounding(field.exact) < kNegligible * leastError(field))
@@ -169,6 +178,7 @@ double QuantizationLimits::leastDistance(std::span<const double> coefficients, i
 
 double QuantizationLimits::greatestChange(std::span<const double> coefficients, int degree) const {
   if (allowed_.tolerance > 0) return kShareOfTolerance * allowed_.at(leastDistance(coefficients, degree));
+  if (exactWithin_ < 0) return max_;
   return leastDistance(coefficients, degree) <= exactWithin_ ? std::min(max_, nearlyExact_) : max_;
 }
 
@@ -187,11 +197,12 @@ double QuantizedPart::stepForChange(double rms) const {
   return volume > 0 ? rms * std::sqrt(12 * volume / integers) : kUnlimitedChange;
 }
 
-void roundCoefficients(CoefficientType type, FieldData& field, double mostBytes, const KeptSteps& kept) {
+void roundCoefficients(CoefficientType type, FieldData& field, double mostBytes, const KeptSteps& kept,
+                       const AcrossParts& parts) {
   if (query::hasFloatVertices(field.exact)) query::roundVertices(field.exact);
   const bool mayQuantize = type == CoefficientType::quantized || type == CoefficientType::automatic;
-  if (mayQuantize && quantizeCoefficients(field, mostBytes, kept)) return;
-  const query::Rounding rounding = query::floatRounding(field);
+  if (mayQuantize && quantizeCoefficients(field, mostBytes, kept, parts)) return;
+  const query::Rounding rounding = query::floatRounding(field, parts);
   FieldMetadata& metadata = field.metadata;
   const bool spoilsMaximum = metadata.settings.maxError > 0 && rounding.max > kNegligible * metadata.settings.maxError;
   const double tolerance = metadata.settings.tolerance;

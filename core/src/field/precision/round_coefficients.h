@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hpsdf/detail/field_data.h"
+#include "util/across_parts.h"
 
 namespace hpsdf::detail {
 
@@ -75,8 +76,10 @@ struct KeptSteps {
 /// Rounds the coefficients of a field, and the vertices of its exact leaves, from double to `type`. Vertices that are
 /// floats already are stored as floats in any case. Sets `roundingRms` and `measuredError` in the field's metadata.
 /// Quantized coefficients take no more than `mostBytes`, at the price of a greater change, and have the steps that are
-/// given by `kept`; not both can be asked for.
+/// given by `kept`; not both can be asked for. If `field` is a part of a field without exact leaves, `parts` are all of
+/// its parts, whose coefficients are rounded at the same time as those of the whole would be.
 void roundCoefficients(CoefficientType type, FieldData& field,
-                       double mostBytes = std::numeric_limits<double>::infinity(), const KeptSteps& kept = {});
+                       double mostBytes = std::numeric_limits<double>::infinity(), const KeptSteps& kept = {},
+                       const AcrossParts& parts = {});
 
 }  // namespace hpsdf::detail

@@ -28,15 +28,15 @@ const std::vector<Eigen::Vector3d>* doubleVertices(const ExactTriangles& exact) 
 /// Returns the change of a field with double coefficients by rounding. rounded(node, c) returns a pointer to the
 /// rounded coefficients of a leaf, whose own are c.
 template <typename Rounded>
-Rounding roundingOf(const FieldData& field, const Rounded& rounded) {
+Rounding roundingOf(const FieldData& field, const detail::AcrossParts& parts, const Rounded& rounded) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
   Rounding rounding;
   const double ofVertices = vertexRounding(field.exact);
   rounding.max = ofVertices;
-  double sum = 0;
+  detail::ExactSum sum;
   visitNodes(field, [&](const OctreeNode& at) {
     const std::uint64_t bits = field.nodes[at.node];
-    if (node::isExact(bits)) sum += ofVertices * ofVertices * cellSize(field, at.depth).prod();
+    if (node::isExact(bits)) sum.add(ofVertices * ofVertices * cellSize(field, at.depth).prod());
     if (!node::isLeaf(bits) || node::isExact(bits)) return true;
     const double* c = &coefficients[node::offset(bits)];
     const auto* after = rounded(at.node, c);
@@ -47,10 +47,12 @@ Rounding roundingOf(const FieldData& field, const Rounded& rounded) {
       max += std::abs(change);
     });
     rounding.max = std::max(rounding.max, max);
-    sum += squares * cellSize(field, at.depth).prod();
+    sum.add(squares * cellSize(field, at.depth).prod());
     return true;
   });
-  rounding.rms = std::sqrt(sum / field.domain.sizes().prod());
+  parts.add(sum);
+  rounding.max = parts.greatest(rounding.max);
+  rounding.rms = std::sqrt(sum.value() / field.domain.sizes().prod());
   return rounding;
 }
 
@@ -64,18 +66,18 @@ double vertexRounding(const ExactTriangles& exact) {
   return greatest;
 }
 
-Rounding floatRounding(const FieldData& field) {
+Rounding floatRounding(const FieldData& field, const detail::AcrossParts& parts) {
   std::vector<float> rounded;
-  return roundingOf(field, [&](std::uint32_t node, const double* c) {
+  return roundingOf(field, parts, [&](std::uint32_t node, const double* c) {
     rounded.assign(c, c + coefficientCount(node::degree(field.nodes[node])));
     return rounded.data();
   });
 }
 
 Rounding quantizedRounding(const FieldData& field, std::span<const std::uint64_t> nodes,
-                           const QuantizedCoefficients& coefficients) {
+                           const QuantizedCoefficients& coefficients, const detail::AcrossParts& parts) {
   std::vector<double> rounded(coefficientCount(kMaxDegree));
-  return roundingOf(field, [&](std::uint32_t node, const double*) {
+  return roundingOf(field, parts, [&](std::uint32_t node, const double*) {
     decodeLeaf(coefficients, nodes[node], rounded.data());
     return rounded.data();
   });

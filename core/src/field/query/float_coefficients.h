@@ -5,6 +5,7 @@
 #include <span>
 
 #include "hpsdf/detail/field_data.h"
+#include "util/across_parts.h"
 
 namespace hpsdf::query {
 
@@ -20,11 +21,12 @@ double vertexRounding(const ExactTriangles& exact);
 
 /// Computes by how much rounding to float changes a field. The coefficients of the field are double. A vertex that
 /// moves by δ changes no distance by more than δ; in `rms`, all exact leaves count with the greatest such δ.
-Rounding floatRounding(const FieldData& field);
+/// `parts` are those of a field of which `field` is one; the result is that of the whole field.
+Rounding floatRounding(const FieldData& field, const detail::AcrossParts& parts = {});
 
 /// Computes by how much a field with double coefficients differs from the same field with these nodes and coefficients.
 Rounding quantizedRounding(const FieldData& field, std::span<const std::uint64_t> nodes,
-                           const QuantizedCoefficients& coefficients);
+                           const QuantizedCoefficients& coefficients, const detail::AcrossParts& parts = {});
 
 /// Convert the coefficients of a field from double to float, or from any type to double. Other coefficients do not
 /// change.

@@ -126,12 +126,14 @@ std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::u
   return offset + bytesOf(bits) > end ? 0 : bytesOf(bits);
 }
 
-std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps, double fieldStep) {
+std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps, double fieldStep,
+                                   const detail::AcrossParts& parts) {
   const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
   Quantized result{
       .nodes = field.nodes,
-      .coefficients = {
-          .step = fieldStep > 0 ? fieldStep : greatestStep(field.nodes, steps), .meanBits = 1, .bytes = {}}};
+      .coefficients = {.step = fieldStep > 0 ? fieldStep : parts.greatest(greatestStep(field.nodes, steps)),
+                       .meanBits = 1,
+                       .bytes = {}}};
   QuantizedCoefficients& out = result.coefficients;
   if (!(out.step >= QuantizedCoefficients::kLeastStep && out.step <= QuantizedCoefficients::kGreatestStep))
     return std::nullopt;
@@ -151,7 +153,8 @@ std::optional<Quantized> quantized(const FieldData& field, std::span<const doubl
     if (!isWide) out.meanBits = std::max(out.meanBits, std::uint32_t(integers.widths[0]));
     node = node::quantizedLeaf(degree, shift & QuantizedCoefficients::kMostShift, isWide, node::offset(node));
   });
-  if (!fits) return std::nullopt;
+  if (!parts.all(fits)) return std::nullopt;
+  out.meanBits = static_cast<std::uint32_t>(parts.greatest(out.meanBits));
 
   // Write the integers.
   forEachPolynomial(result.nodes, [&](std::uint64_t& node) {
@@ -160,9 +163,12 @@ std::optional<Quantized> quantized(const FieldData& field, std::span<const doubl
     node = node::quantizedLeaf(degree, node::shift(node), node::isWide(node), std::uint32_t(out.bytes.size()));
     integers.write(degree, meanBitsOf(out, node), out.bytes);
   });
+  detail::ExactSum bytes;
+  bytes.add(double(out.bytes.size()));
+  parts.add(bytes);
   out.bytes.resize(out.bytes.size() + QuantizedCoefficients::kPadding);
   out.bytes.shrink_to_fit();
-  if (out.bytes.size() > 0xffffffff) return std::nullopt;
+  if (bytes.value() + QuantizedCoefficients::kPadding > 0xffffffff) return std::nullopt;
   return result;
 }
 

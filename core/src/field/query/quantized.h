@@ -12,6 +12,7 @@
 #include "basis/orthonormal.h"
 #include "field/query/evaluate.h"
 #include "hpsdf/detail/field_data.h"
+#include "util/across_parts.h"
 
 namespace hpsdf::query {
 
@@ -77,8 +78,10 @@ struct Quantized {
 
 /// Rounds the coefficients of a field from double. `steps` has an element for each node: the greatest step, in the
 /// orthonormal basis, that a leaf may have. The step of the field is the greatest of them, or `fieldStep` unless that
-/// is 0. Returns std::nullopt if the coefficients take more bits than `QuantizedCoefficients` has.
-std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps, double fieldStep = 0);
+/// is 0. Returns std::nullopt if the coefficients take more bits than `QuantizedCoefficients` has. `parts` are those of
+/// a field of which `field` is one.
+std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps, double fieldStep = 0,
+                                   const detail::AcrossParts& parts = {});
 
 /// Gives a field these nodes and coefficients in place of its own.
 void take(Quantized&& quantized, FieldData& field);

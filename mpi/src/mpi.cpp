@@ -1,0 +1,155 @@
+#include "hpsdf/mpi.h"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <numeric>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "hpsdf/error.h"
+
+namespace hpsdf::mpi {
+namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{1} << 30;  // of one call, because MPI counts in int
+
+int number(std::size_t count) { return static_cast<int>(count); }
+
+/// The beginning of a message, which all processes send each other at once. Most messages have no more than that.
+struct Head {
+  std::uint64_t size = 0;  ///< of the whole message
+  std::array<std::byte, 4088> bytes{};
+};
+
+class CommunicatorRanks : public Ranks {
+ public:
+  explicit CommunicatorRanks(MPI_Comm communicator) {
+    MPI_Comm_dup(communicator, &communicator_);
+    MPI_Comm_rank(communicator_, &rank_);
+    MPI_Comm_size(communicator_, &count_);
+  }
+  ~CommunicatorRanks() override { MPI_Comm_free(&communicator_); }
+
+  int rank() const override { return rank_; }
+  int count() const override { return count_; }
+
+  std::vector<Message> gatherAll(std::span<const std::byte> own, const std::function<void()>& whileWaiting) override {
+    Head head{.size = own.size()};
+    const std::size_t inHead = std::min(own.size(), head.bytes.size());
+    if (inHead > 0) std::memcpy(head.bytes.data(), own.data(), inHead);
+    heads_.resize(std::size_t(count_));
+    MPI_Request request = MPI_REQUEST_NULL;
+    MPI_Iallgather(&head, sizeof(Head), MPI_BYTE, heads_.data(), sizeof(Head), MPI_BYTE, communicator_, &request);
+    wait(request, whileWaiting);
+
+    std::vector<Message> messages{std::size_t(count_)};
+    std::vector<std::size_t> rest{std::vector<std::size_t>(std::size_t(count_))};
+    for (std::size_t from = 0; from < messages.size(); ++from) {
+      const Head& received = heads_[from];
+      const std::size_t size = std::min<std::size_t>(received.size, received.bytes.size());
+      messages[from].assign(received.bytes.begin(), received.bytes.begin() + std::ptrdiff_t(size));
+      rest[from] = received.size - size;
+    }
+    if (std::ranges::any_of(rest, [](std::size_t size) { return size > 0; }))
+      appendRest(own.subspan(inHead), rest, messages, whileWaiting);
+    return messages;
+  }
+
+  std::vector<Message> exchange(std::vector<Message> toEach) override {
+    std::vector<std::uint64_t> sent, received(std::size_t(count_), 0);
+    for (const Message& message : toEach) sent.push_back(message.size());
+    MPI_Alltoall(sent.data(), 1, MPI_UINT64_T, received.data(), 1, MPI_UINT64_T, communicator_);
+    std::vector<Message> messages{std::size_t(count_)};
+    std::vector<MPI_Request> requests;
+    for (int other = 0; other < count_; ++other) {
+      if (other == rank_) continue;
+      Message& message = messages[std::size_t(other)];
+      message.resize(received[std::size_t(other)]);
+      inParts(message, [&](std::span<std::byte> part, int tag) {
+        MPI_Irecv(part.data(), number(part.size()), MPI_BYTE, other, tag, communicator_, &requests.emplace_back());
+      });
+    }
+    for (int other = 0; other < count_; ++other) {
+      if (other == rank_) continue;
+      inParts(toEach[std::size_t(other)], [&](std::span<std::byte> part, int tag) {
+        MPI_Isend(part.data(), number(part.size()), MPI_BYTE, other, tag, communicator_, &requests.emplace_back());
+      });
+    }
+    MPI_Waitall(number(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+    messages[std::size_t(rank_)] = std::move(toEach[std::size_t(rank_)]);
+    return messages;
+  }
+
+ private:
+  /// Calls f(part, number of the part) for parts of a message that are not too long for one call.
+  template <typename F>
+  static void inParts(Message& message, const F& f) {
+    int part = 0;
+    for (std::size_t begin = 0; begin < message.size(); begin += kMostBytes)
+      f(std::span(message).subspan(begin, std::min(kMostBytes, message.size() - begin)), part++);
+  }
+
+  static void wait(MPI_Request& request, const std::function<void()>& whileWaiting) {
+    int isDone = 0;
+    for (MPI_Test(&request, &isDone, MPI_STATUS_IGNORE); isDone == 0; MPI_Test(&request, &isDone, MPI_STATUS_IGNORE)) {
+      if (whileWaiting) whileWaiting();
+      std::this_thread::yield();  // to other processes, where there are more of them than processors
+    }
+  }
+
+  /// Sends what the heads had no room for, and appends it to the messages.
+  void appendRest(std::span<const std::byte> own, const std::vector<std::size_t>& sizes, std::vector<Message>& messages,
+                  const std::function<void()>& whileWaiting) const {
+    const std::size_t all = std::accumulate(sizes.begin(), sizes.end(), std::size_t{0});
+    if (all > kMostBytes) throw Error("messages of " + std::to_string(all) + " bytes to all processes are too long");
+    std::vector<int> counts, begins;
+    std::size_t begin = 0;
+    for (const std::size_t size : sizes) {
+      counts.push_back(number(size));
+      begins.push_back(number(begin));
+      begin += size;
+    }
+    std::vector<std::byte> bytes(all);
+    MPI_Request request = MPI_REQUEST_NULL;
+    MPI_Iallgatherv(own.data(), number(own.size()), MPI_BYTE, bytes.data(), counts.data(), begins.data(), MPI_BYTE,
+                    communicator_, &request);
+    wait(request, whileWaiting);
+    for (std::size_t from = 0; from < messages.size(); ++from) {
+      const auto part = std::span(bytes).subspan(std::size_t(begins[from]), sizes[from]);
+      messages[from].insert(messages[from].end(), part.begin(), part.end());
+    }
+  }
+
+  MPI_Comm communicator_ = MPI_COMM_NULL;
+  int rank_ = 0, count_ = 1;
+  std::vector<Head> heads_;
+};
+
+}  // namespace
+
+Session::Session() {
+  int provided = MPI_THREAD_SINGLE;
+  MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &provided);
+  if (provided < MPI_THREAD_SERIALIZED) {
+    MPI_Finalize();
+    throw Error("this MPI does not allow calls from more than one thread: install one that does");
+  }
+}
+
+Session::~Session() { MPI_Finalize(); }
+
+std::unique_ptr<Ranks> ranksOf(int communicator) {
+  return std::make_unique<CommunicatorRanks>(MPI_Comm_f2c(communicator));
+}
+
+std::unique_ptr<Ranks> allRanks() { return std::make_unique<CommunicatorRanks>(MPI_COMM_WORLD); }
+
+}  // namespace hpsdf::mpi
