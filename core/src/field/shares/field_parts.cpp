@@ -79,7 +79,8 @@ class Assembly {
       std::uint64_t& bits = whole_.nodes[leaf];
       const auto& from = std::get<std::vector<T>>(parts_[source_[leaf]].coefficients);
       const auto begin = from.begin() + node::offset(bits);
-      if (joined.size() > 0xffffffff) throw Error("the field needs more than 2^32 coefficients; raise the target error");
+      if (joined.size() > 0xffffffff)
+        throw Error("the field needs more than 2^32 coefficients; raise the target error");
       bits = node::leaf(node::degree(bits), static_cast<std::uint32_t>(joined.size()));
       joined.insert(joined.end(), begin, begin + coefficientCount(node::degree(bits)));
     }
