@@ -1,5 +1,6 @@
-// Counts the calls of MPI that a process makes, by MPI's profiling interface: loaded before the program (LD_PRELOAD), it
-// stands between it and MPI. When MPI ends, each process appends a line of JSON to the file that HPSDF_MPI_COUNTS names.
+// Counts the calls of MPI that a process makes, by MPI's profiling interface: loaded before the program (LD_PRELOAD),
+// it stands between it and MPI. When MPI ends, each process appends a line of JSON to the file that HPSDF_MPI_COUNTS
+// names.
 
 #include <mpi.h>
 
@@ -70,12 +71,13 @@ int MPI_Finalize() {
   PMPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (const char* const name = std::getenv("HPSDF_MPI_COUNTS")) {
     if (std::FILE* const file = std::fopen(name, "a")) {
-      std::fprintf(file,
-                   "{\"rank\": %d, \"to_all\": %llu, \"bytes_to_all\": %llu, \"messages\": %llu, \"message_bytes\": %llu, "
-                   "\"peak_kb\": %ld, \"seconds\": %.3f}\n",
-                   rank, static_cast<unsigned long long>(counts.toAll),
-                   static_cast<unsigned long long>(counts.bytesToAll), static_cast<unsigned long long>(counts.messages),
-                   static_cast<unsigned long long>(counts.messageBytes), peakMemory(), PMPI_Wtime() - counts.start);
+      std::fprintf(
+          file,
+          "{\"rank\": %d, \"to_all\": %llu, \"bytes_to_all\": %llu, \"messages\": %llu, \"message_bytes\": %llu, "
+          "\"peak_kb\": %ld, \"seconds\": %.3f}\n",
+          rank, static_cast<unsigned long long>(counts.toAll), static_cast<unsigned long long>(counts.bytesToAll),
+          static_cast<unsigned long long>(counts.messages), static_cast<unsigned long long>(counts.messageBytes),
+          peakMemory(), PMPI_Wtime() - counts.start);
       std::fclose(file);
     }
   }

@@ -6,7 +6,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
+#include <functional>
+#include <memory>
 #include <numeric>
 #include <span>
 #include <string>
@@ -29,6 +30,15 @@ struct Head {
   std::array<std::byte, 4088> bytes{};
 };
 
+/// The memory of a call of MPI that goes on while the process does other work.
+struct Call {
+  MPI_Request request = MPI_REQUEST_NULL;
+  Head head;
+  std::vector<std::byte> own, rest;
+  std::vector<Head> heads;
+  std::vector<int> counts, begins;
+};
+
 class CommunicatorRanks : public Ranks {
  public:
   explicit CommunicatorRanks(MPI_Comm communicator) {
@@ -42,24 +52,26 @@ class CommunicatorRanks : public Ranks {
   int count() const override { return count_; }
 
   std::vector<Message> gatherAll(std::span<const std::byte> own, const std::function<void()>& whileWaiting) override {
-    Head head{.size = own.size()};
-    const std::size_t inHead = std::min(own.size(), head.bytes.size());
-    if (inHead > 0) std::memcpy(head.bytes.data(), own.data(), inHead);
-    heads_.resize(std::size_t(count_));
-    MPI_Request request = MPI_REQUEST_NULL;
-    MPI_Iallgather(&head, sizeof(Head), MPI_BYTE, heads_.data(), sizeof(Head), MPI_BYTE, communicator_, &request);
-    wait(request, whileWaiting);
+    auto call = std::make_unique<Call>();
+    call->own.assign(own.begin(), own.end());
+    call->head.size = own.size();
+    const std::size_t inHead = std::min(own.size(), call->head.bytes.size());
+    std::copy_n(own.begin(), inHead, call->head.bytes.begin());
+    call->heads.resize(std::size_t(count_));
+    MPI_Iallgather(&call->head, sizeof(Head), MPI_BYTE, call->heads.data(), sizeof(Head), MPI_BYTE, communicator_,
+                   &call->request);
+    wait(call, whileWaiting);
 
     std::vector<Message> messages{std::size_t(count_)};
-    std::vector<std::size_t> rest{std::vector<std::size_t>(std::size_t(count_))};
+    std::vector<std::size_t> rest(std::size_t(count_), 0);
     for (std::size_t from = 0; from < messages.size(); ++from) {
-      const Head& received = heads_[from];
+      const Head& received = call->heads[from];
       const std::size_t size = std::min<std::size_t>(received.size, received.bytes.size());
       messages[from].assign(received.bytes.begin(), received.bytes.begin() + std::ptrdiff_t(size));
       rest[from] = received.size - size;
     }
     if (std::ranges::any_of(rest, [](std::size_t size) { return size > 0; }))
-      appendRest(own.subspan(inHead), rest, messages, whileWaiting);
+      appendRest(std::move(call), inHead, rest, messages, whileWaiting);
     return messages;
   }
 
@@ -97,40 +109,45 @@ class CommunicatorRanks : public Ranks {
       f(std::span(message).subspan(begin, std::min(kMostBytes, message.size() - begin)), part++);
   }
 
-  static void wait(MPI_Request& request, const std::function<void()>& whileWaiting) {
+  /// Waits for a call. If `whileWaiting` throws, the call goes on, and its memory is kept for it.
+  void wait(std::unique_ptr<Call>& call, const std::function<void()>& whileWaiting) {
     int isDone = 0;
-    for (MPI_Test(&request, &isDone, MPI_STATUS_IGNORE); isDone == 0; MPI_Test(&request, &isDone, MPI_STATUS_IGNORE)) {
-      if (whileWaiting) whileWaiting();
-      std::this_thread::yield();  // to other processes, where there are more of them than processors
+    try {
+      for (MPI_Test(&call->request, &isDone, MPI_STATUS_IGNORE); isDone == 0;
+           MPI_Test(&call->request, &isDone, MPI_STATUS_IGNORE)) {
+        if (whileWaiting) whileWaiting();
+        std::this_thread::yield();  // to other processes, where there are more of them than processors
+      }
+    } catch (...) {
+      left_.push_back(std::move(call));
+      throw;
     }
   }
 
   /// Sends what the heads had no room for, and appends it to the messages.
-  void appendRest(std::span<const std::byte> own, const std::vector<std::size_t>& sizes, std::vector<Message>& messages,
-                  const std::function<void()>& whileWaiting) const {
+  void appendRest(std::unique_ptr<Call> call, std::size_t inHead, const std::vector<std::size_t>& sizes,
+                  std::vector<Message>& messages, const std::function<void()>& whileWaiting) {
     const std::size_t all = std::accumulate(sizes.begin(), sizes.end(), std::size_t{0});
     if (all > kMostBytes) throw Error("messages of " + std::to_string(all) + " bytes to all processes are too long");
-    std::vector<int> counts, begins;
     std::size_t begin = 0;
     for (const std::size_t size : sizes) {
-      counts.push_back(number(size));
-      begins.push_back(number(begin));
+      call->counts.push_back(number(size));
+      call->begins.push_back(number(begin));
       begin += size;
     }
-    std::vector<std::byte> bytes(all);
-    MPI_Request request = MPI_REQUEST_NULL;
-    MPI_Iallgatherv(own.data(), number(own.size()), MPI_BYTE, bytes.data(), counts.data(), begins.data(), MPI_BYTE,
-                    communicator_, &request);
-    wait(request, whileWaiting);
+    call->rest.resize(all);
+    MPI_Iallgatherv(call->own.data() + inHead, number(call->own.size() - inHead), MPI_BYTE, call->rest.data(),
+                    call->counts.data(), call->begins.data(), MPI_BYTE, communicator_, &call->request);
+    wait(call, whileWaiting);
     for (std::size_t from = 0; from < messages.size(); ++from) {
-      const auto part = std::span(bytes).subspan(std::size_t(begins[from]), sizes[from]);
+      const auto part = std::span(call->rest).subspan(std::size_t(call->begins[from]), sizes[from]);
       messages[from].insert(messages[from].end(), part.begin(), part.end());
     }
   }
 
   MPI_Comm communicator_ = MPI_COMM_NULL;
   int rank_ = 0, count_ = 1;
-  std::vector<Head> heads_;
+  std::vector<std::unique_ptr<Call>> left_;  ///< calls for which nobody waits any more
 };
 
 }  // namespace

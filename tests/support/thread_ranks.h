@@ -1,7 +1,6 @@
 #pragma once
 // Ranks that are threads of one process, for tests.
 
-#include <atomic>
 #include <cstddef>
 #include <exception>
 #include <functional>
@@ -22,13 +21,10 @@ class ThreadGroup {
   explicit ThreadGroup(int count) : count_(count) {}
 
   int count() const { return count_; }
-  std::size_t calls() const { return calls_.size(); }
-  std::size_t bytes() const { return bytes_; }
 
   /// Puts the messages of a rank down for call number `call`.
   void put(std::size_t call, int rank, std::vector<Ranks::Message> messages) {
     const std::scoped_lock lock(mutex_);
-    for (const Ranks::Message& message : messages) bytes_ += message.size();
     if (calls_.size() <= call) calls_.resize(call + 1);
     calls_[call].resize(std::size_t(count_));
     calls_[call][std::size_t(rank)] = std::move(messages);
@@ -51,7 +47,6 @@ class ThreadGroup {
   int count_;
   std::mutex mutex_;
   std::vector<std::vector<std::vector<Ranks::Message>>> calls_;  ///< by call, by rank
-  std::size_t bytes_ = 0;
 };
 
 class ThreadRank : public Ranks {

@@ -83,6 +83,24 @@ struct Chosen {
   std::uint32_t node = 0;  ///< its number, if this process holds it
 };
 
+template <typename Stream>
+void errorItems(Stream& stream, CellError& error) {
+  stream.item(error.weighted);
+  stream.item(error.squared);
+  stream.item(error.volume);
+  stream.flag(error.near);
+}
+
+/// Writes or reads the errors of a refinement.
+template <typename Stream>
+void errorItems(Stream& stream, StepErrors& errors) {
+  errorItems(stream, errors.before);
+  auto count = static_cast<std::uint8_t>(errors.after.size());
+  stream.item(count);
+  errors.after.resize(count);
+  for (CellError& error : errors.after) errorItems(stream, error);
+}
+
 /// Grows the octree by refining the leaves of a priority queue in rounds. The refinements of a round are tried
 /// in parallel but applied in the order of the queue, so that the result does not depend on the number of
 /// threads. If several processes build the field, each of them holds and refines a part of the leaves. All know the
@@ -291,19 +309,13 @@ class Growth {
     for (const Chosen& chosen : worst) {
       if (chosen.rank != ownRank()) continue;
       const Trial& trial = queue_.trial(chosen.node);
-      const StepErrors errors =
-          refiner_.errorsOf(chosen.node, trial, refiner_.raises(state_.tree.nodes[chosen.node], trial));
-      writer.item(errors.before);
-      writer.list(errors.after);
+      StepErrors errors = refiner_.errorsOf(chosen.node, trial, refiner_.raises(state_.tree.nodes[chosen.node], trial));
+      errorItems(writer, errors);
     }
     const std::vector<Message> messages = shares()->gatherAll(writer.take(), [&] { tryAhead(); });
     std::vector<MessageReader> readers(messages.begin(), messages.end());
     std::vector<StepErrors> all(worst.size());
-    for (std::size_t w = 0; w < worst.size(); ++w) {
-      MessageReader& reader = readers[std::size_t(worst[w].rank)];
-      reader.item(all[w].before);
-      reader.list(all[w].after);
-    }
+    for (std::size_t w = 0; w < worst.size(); ++w) errorItems(readers[std::size_t(worst[w].rank)], all[w]);
     return all;
   }
 

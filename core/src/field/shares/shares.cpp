@@ -79,13 +79,6 @@ std::vector<Message> Shares::exchange(std::vector<Message> toEach) {
   return ranks_.exchange(std::move(toEach));
 }
 
-double Shares::sum(double value) {
-  ExactSum sum;
-  sum.add(value);
-  add(sum);
-  return sum.value();
-}
-
 std::uint64_t Shares::sum(std::uint64_t value) {
   std::uint64_t sum = 0;
   for (const Message& message : gatherAll(messageOfNumbers(std::vector{value})))

@@ -41,9 +41,9 @@ class Shares {
   /// Ends the common work: there are no more calls.
   void close() { isOpen_ = false; }
 
-  /// Return the sum over all ranks.
-  double sum(double value);
+  /// Returns the sum over all ranks.
   std::uint64_t sum(std::uint64_t value);
+  /// Make the sums of a rank those over all ranks.
   void add(ExactSum& sum);
   void add(ExactTotals& totals);
 
