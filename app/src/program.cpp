@@ -74,7 +74,9 @@ void execute(std::span<const std::string> given, const Registry& registry, const
   requireWritten(console.out.flush(), outputFiles(command, parsed));  // errors of buffered output appear only here
 }
 
-int fail(const Console& console, const std::string& message, int status) {
+/// Writes the message of an error, and keeps it in `why`.
+int fail(const Console& console, const std::string& message, int status, std::string& why) {
+  why = message;
   console.err << "hpsdf: error: " << printable(message) << std::endl;
   return status;
 }
@@ -88,7 +90,8 @@ int cancelledStatus() {
 
 }  // namespace
 
-static int runAlone(std::span<const std::string> words, const Console& console) {
+/// Runs the program. Sets `why` to the message of an error.
+static int runAlone(std::span<const std::string> words, const Console& console, std::string& why) {
   try {
     const Registry registry = makeRegistry();
     execute(words, registry, console);
@@ -105,16 +108,17 @@ static int runAlone(std::span<const std::string> words, const Console& console) 
   } catch (const PartDone&) {
     return kExitDone;
   } catch (const Failed& failed) {
-    return fail(console, failed.what(), failed.status());
+    return fail(console, failed.what(), failed.status(), why);
   } catch (const std::exception& error) {
-    return fail(console, errorText(error), kExitBadInput);
+    return fail(console, errorText(error), kExitBadInput, why);
   }
 }
 
 int runProgram(std::span<const std::string> words, const Console& console) {
-  const int status = runAlone(words, console);
+  std::string why = "cancelled";
+  const int status = runAlone(words, console, why);
   if (status != kExitDone && console.group != nullptr && !console.group->hasBegun)
-    failBefore(*console.group->ranks, fmt::format("rank {} could not begin", console.group->ranks->rank()));
+    failBefore(*console.group->ranks, fmt::format("rank {}: {}", console.group->ranks->rank(), why));
   // mpirun would end the other processes at once if one that is not the first failed.
   return console.group != nullptr && !console.group->isFirst() ? kExitDone : status;
 }

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -46,7 +49,11 @@ class CommunicatorRanks : public Ranks {
     MPI_Comm_rank(communicator_, &rank_);
     MPI_Comm_size(communicator_, &count_);
   }
-  ~CommunicatorRanks() override { MPI_Comm_free(&communicator_); }
+  ~CommunicatorRanks() override {
+    for (std::unique_ptr<Call>& call : left_)
+      if (!isDone(*call)) static_cast<void>(call.release());  // MPI may still write to it
+    MPI_Comm_free(&communicator_);
+  }
 
   int rank() const override { return rank_; }
   int count() const override { return count_; }
@@ -60,7 +67,8 @@ class CommunicatorRanks : public Ranks {
     call->heads.resize(std::size_t(count_));
     MPI_Iallgather(&call->head, sizeof(Head), MPI_BYTE, call->heads.data(), sizeof(Head), MPI_BYTE, communicator_,
                    &call->request);
-    wait(call, whileWaiting);
+    std::exception_ptr failure;
+    wait(call, whileWaiting, failure);
 
     std::vector<Message> messages{std::size_t(count_)};
     std::vector<std::size_t> rest(std::size_t(count_), 0);
@@ -71,7 +79,8 @@ class CommunicatorRanks : public Ranks {
       rest[from] = received.size - size;
     }
     if (std::ranges::any_of(rest, [](std::size_t size) { return size > 0; }))
-      appendRest(std::move(call), inHead, rest, messages, whileWaiting);
+      appendRest(std::move(call), inHead, rest, messages, whileWaiting, failure);
+    if (failure) std::rethrow_exception(failure);
     return messages;
   }
 
@@ -109,24 +118,40 @@ class CommunicatorRanks : public Ranks {
       f(std::span(message).subspan(begin, std::min(kMostBytes, message.size() - begin)), part++);
   }
 
-  /// Waits for a call. If `whileWaiting` throws, the call goes on, and its memory is kept for it.
-  void wait(std::unique_ptr<Call>& call, const std::function<void()>& whileWaiting) {
-    int isDone = 0;
-    try {
-      for (MPI_Test(&call->request, &isDone, MPI_STATUS_IGNORE); isDone == 0;
-           MPI_Test(&call->request, &isDone, MPI_STATUS_IGNORE)) {
-        if (whileWaiting) whileWaiting();
-        std::this_thread::yield();  // to other processes, where there are more of them than processors
+  static bool isDone(Call& call) {
+    int done = 0;
+    MPI_Test(&call.request, &done, MPI_STATUS_IGNORE);
+    return done != 0;
+  }
+
+  /// Waits for a call. What `whileWaiting` throws becomes `failure` and is thrown when all calls for these messages are
+  /// done, because the other processes make all of them. If it is `Cancelled`, the others may have been killed: it is
+  /// thrown after a while in any case, and the memory of the call is kept for it.
+  void wait(std::unique_ptr<Call>& call, const std::function<void()>& whileWaiting, std::exception_ptr& failure) {
+    using Clock = std::chrono::steady_clock;
+    constexpr auto kPatience = std::chrono::milliseconds(300);
+    std::optional<Clock::time_point> end;
+    while (!isDone(*call)) {
+      if (end && Clock::now() > *end) {
+        left_.push_back(std::move(call));
+        std::rethrow_exception(failure);
       }
-    } catch (...) {
-      left_.push_back(std::move(call));
-      throw;
+      try {
+        if (whileWaiting && !failure) whileWaiting();
+      } catch (const Cancelled&) {
+        failure = std::current_exception();
+        end = Clock::now() + kPatience;
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      std::this_thread::yield();  // to other processes, where there are more of them than processors
     }
   }
 
   /// Sends what the heads had no room for, and appends it to the messages.
   void appendRest(std::unique_ptr<Call> call, std::size_t inHead, const std::vector<std::size_t>& sizes,
-                  std::vector<Message>& messages, const std::function<void()>& whileWaiting) {
+                  std::vector<Message>& messages, const std::function<void()>& whileWaiting,
+                  std::exception_ptr& failure) {
     const std::size_t all = std::accumulate(sizes.begin(), sizes.end(), std::size_t{0});
     if (all > kMostBytes) throw Error("messages of " + std::to_string(all) + " bytes to all processes are too long");
     std::size_t begin = 0;
@@ -138,7 +163,7 @@ class CommunicatorRanks : public Ranks {
     call->rest.resize(all);
     MPI_Iallgatherv(call->own.data() + inHead, number(call->own.size() - inHead), MPI_BYTE, call->rest.data(),
                     call->counts.data(), call->begins.data(), MPI_BYTE, communicator_, &call->request);
-    wait(call, whileWaiting);
+    wait(call, whileWaiting, failure);
     for (std::size_t from = 0; from < messages.size(); ++from) {
       const auto part = std::span(call->rest).subspan(std::size_t(call->begins[from]), sizes[from]);
       messages[from].insert(messages[from].end(), part.begin(), part.end());

@@ -235,6 +235,16 @@ TEST(ExactSums, AreExact) {
   EXPECT_EQ(sum.value(), std::numeric_limits<double>::max());
   sum.add(std::numeric_limits<double>::max());
   EXPECT_TRUE(std::isinf(sum.value()));
+
+  ExactSum special;
+  special.add(1);
+  special.add(-HUGE_VAL);
+  EXPECT_EQ(special.value(), -HUGE_VAL);
+  special.add(HUGE_VAL);
+  EXPECT_TRUE(std::isnan(special.value()));
+  special.add(HUGE_VAL, -1);
+  special.add(-HUGE_VAL, -1);
+  EXPECT_EQ(special.value(), 1);
 }
 
 TEST(MortonOrder, KeepsCellsTogether) {

@@ -40,7 +40,11 @@ void installInterruptHandlers() {
 }
 
 void removeInterruptHandlers() {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_DFL);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction now = {};
+    sigaction(signal, nullptr, &now);
+    if (now.sa_handler == onInterrupt) std::signal(signal, SIG_DFL);
+  }
 }
 
 InterruptGuard::InterruptGuard() {

@@ -43,10 +43,10 @@ struct ErrorTotals {
   double nearSquared = 0, nearVolume = 0;
   double farSquared = 0, farVolume = 0;
 
-  void add(const CellError& cell, int times = 1) {
-    weighted += times * cell.weighted;
-    (cell.near ? nearSquared : farSquared) += times * cell.squared;
-    (cell.near ? nearVolume : farVolume) += times * cell.volume;
+  void add(const CellError& cell) {
+    weighted += cell.weighted;
+    (cell.near ? nearSquared : farSquared) += cell.squared;
+    (cell.near ? nearVolume : farVolume) += cell.volume;
   }
 };
 

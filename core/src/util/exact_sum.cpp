@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdlib>
+#include <limits>
 
 namespace hpsdf::detail {
 namespace {
@@ -16,7 +18,7 @@ void ExactSum::add(double value, int times) {
   constexpr int kMantissaBits = 52, kExponentMask = 0x7ff;
   if (value == 0 || times == 0) return;
   if (!std::isfinite(value)) {
-    special_ += times * value;
+    special_[std::isnan(value) ? 2 : value > 0 ? 0 : 1] += times;
     return;
   }
   const auto bits = std::bit_cast<std::uint64_t>(value);
@@ -46,11 +48,12 @@ void ExactSum::add(const ExactSum& other) {
   for (std::size_t i = second.first_; i < second.end_; ++i) digits_[i] += second.digits_[i];
   first_ = std::min(first_, second.first_);
   end_ = std::max(end_, second.end_);
-  special_ += second.special_;
+  for (std::size_t i = 0; i < special_.size(); ++i) special_[i] += second.special_[i];
   adds_ = 1;
 }
 
 std::size_t ExactSum::normalize(Digits& digits) const {
+  if (first_ >= end_) return end_;
   std::int64_t carry = 0;
   std::size_t i = first_;
   for (; i + 1 < digits.size() && (i < end_ || (carry != 0 && carry != -1)); ++i) {
@@ -69,7 +72,9 @@ void ExactSum::normalize() {
 }
 
 double ExactSum::value() const {
-  if (special_ != 0) return special_;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (special_[2] != 0 || (special_[0] != 0 && special_[1] != 0)) return std::numeric_limits<double>::quiet_NaN();
+  if (special_[0] != 0 || special_[1] != 0) return special_[0] != 0 ? kInfinity : -kInfinity;
   if (first_ >= end_) return 0;
   ExactSum sum;
   sum.first_ = first_, sum.end_ = end_;
@@ -98,14 +103,14 @@ std::array<std::int64_t, ExactSum::kNumbers> ExactSum::numbers() const {
   sum.normalize();
   std::array<std::int64_t, kNumbers> result{};
   for (std::size_t i = 0; i < digits_.size(); ++i) result[i] = sum.digits_[i];
-  result.back() = std::bit_cast<std::int64_t>(special_);
+  std::copy(special_.begin(), special_.end(), result.end() - std::ptrdiff_t(special_.size()));
   return result;
 }
 
 ExactSum ExactSum::fromNumbers(std::span<const std::int64_t, kNumbers> numbers) {
   ExactSum sum;
   for (std::size_t i = 0; i < sum.digits_.size(); ++i) sum.digits_[i] = numbers[i];
-  sum.special_ = std::bit_cast<double>(numbers.back());
+  std::copy(numbers.end() - std::ptrdiff_t(sum.special_.size()), numbers.end(), sum.special_.begin());
   sum.first_ = 0, sum.end_ = kDigits;
   return sum;
 }

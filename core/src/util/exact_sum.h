@@ -21,13 +21,13 @@ class ExactSum {
   double value() const;
 
   /// The state of the sum as numbers, by which a process can send it to another one.
-  static constexpr std::size_t kNumbers = 70;
+  static constexpr std::size_t kNumbers = 72;
   std::array<std::int64_t, kNumbers> numbers() const;
   static ExactSum fromNumbers(std::span<const std::int64_t, kNumbers> numbers);
 
  private:
   static constexpr int kBits = 32;                      // of a digit
-  static constexpr int kDigits = kNumbers - 1;          // 2^-1074 … 2^1023, and room for carries
+  static constexpr int kDigits = kNumbers - 3;          // 2^-1074 … 2^1023, and room for carries
   static constexpr std::uint32_t kMostAdds = 1U << 28;  // so often numbers may be added before carries are moved on
 
   using Digits = std::array<std::int64_t, kDigits>;
@@ -41,7 +41,7 @@ class ExactSum {
   Digits digits_{};
   std::size_t first_ = kDigits, end_ = 0;  ///< the range of digits that may differ from 0
   std::uint32_t adds_ = 0;                 ///< additions since the digits were last within 32 bits
-  double special_ = 0;                     ///< sum of the numbers that are not finite
+  std::array<std::int64_t, 3> special_{};  ///< how often +infinity, -infinity and NaN were added
 };
 
 }  // namespace hpsdf::detail

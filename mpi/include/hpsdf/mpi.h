@@ -2,7 +2,6 @@
 // Fields that the processes of an MPI program build together.
 
 #include <memory>
-#include <optional>
 
 #include "hpsdf/parallel/ranks.h"
 

@@ -30,7 +30,8 @@ class Ranks {
   virtual int count() const = 0;
 
   /// Sends a message to all ranks and returns those of all ranks, by rank. Calls `whileWaiting`, if it is not empty,
-  /// again and again until the messages are there.
+  /// again and again until the messages are there. Rethrows what it throws, once this call matches those of the other
+  /// ranks; if it is `Cancelled`, after a short while in any case.
   virtual std::vector<Message> gatherAll(std::span<const std::byte> own, const std::function<void()>& whileWaiting) = 0;
 
   /// Sends message number r to rank r, and returns the messages to this rank, by sender.
@@ -45,8 +46,9 @@ class Ranks {
 /// construction and continues from it as `buildResumably` does, also from a state that was saved by another number of
 /// processes.
 ///
-/// Throws as `build` and `buildResumably` do, then on all ranks: those where nothing failed throw an `Error` with the
-/// message of the first that did. Also throws `Error` for a tolerance and for a limit of bytes.
+/// Throws as `build` and `buildResumably` do. Ranks where nothing failed throw an `Error` with the message of the first
+/// that did, unless they have done their part and returned. Also throws `Error` for a tolerance and for a limit of
+/// bytes.
 std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance, const Box& domain,
                                   const BuildOptions& options, const Checkpoint* checkpoint = nullptr,
                                   const Progress& progress = {});

@@ -93,6 +93,9 @@ std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance
   } catch (const std::exception& error) {
     shares.fail(error.what());  // the other ranks need not wait for this one
     throw;
+  } catch (...) {
+    shares.fail("a function that was passed to the construction has thrown");
+    throw;
   }
 }
 

@@ -77,7 +77,7 @@ struct KeptSteps {
 /// floats already are stored as floats in any case. Sets `roundingRms` and `measuredError` in the field's metadata.
 /// Quantized coefficients take no more than `mostBytes`, at the price of a greater change, and have the steps that are
 /// given by `kept`; not both can be asked for. If `field` is a part of a field without exact leaves, `parts` are all of
-/// its parts, whose coefficients are rounded at the same time as those of the whole would be.
+/// its parts, which are rounded at the same time, as the whole field would be.
 void roundCoefficients(CoefficientType type, FieldData& field,
                        double mostBytes = std::numeric_limits<double>::infinity(), const KeptSteps& kept = {},
                        const AcrossParts& parts = {});

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -52,6 +51,8 @@ class Assembly {
           place(to, nodes[0]);
           continue;
         }
+        if (whole_.nodes.size() > 0xffffffffu - 8)
+          throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
         const auto first = static_cast<std::uint32_t>(whole_.nodes.size());
         whole_.nodes[to] = node::internal(first);
         whole_.nodes.resize(first + 8);

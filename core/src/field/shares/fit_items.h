@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <type_traits>
 #include <vector>
 
 #include "field/cells/cell_fit.h"

@@ -1,7 +1,6 @@
 #pragma once
 // The leaves that a construction may refine, in order, with the refinements that were tried already.
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <map>

@@ -63,13 +63,12 @@ std::vector<Message> Shares::gatherAll(Message own, const std::function<void()>&
 
 void Shares::fail(const std::string& why, double seconds) {
   if (!std::exchange(isOpen_, false)) return;
-  struct WaitedLong {};
   const auto start = std::chrono::steady_clock::now();
   try {
     ranks_.gatherAll(failureMessage(why), [&] {
-      if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) throw WaitedLong();
+      if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) throw Cancelled();
     });
-  } catch (const WaitedLong&) {
+  } catch (const Cancelled&) {
     return;  // the others may have been killed
   }
 }

@@ -21,8 +21,8 @@ class SharedFailure : public Error {
   using Error::Error;
 };
 
-/// All members but `rank` and `count` are called by all ranks in the same order. They throw `SharedFailure` once a rank
-/// has called `fail`.
+/// The members that send messages are called by all ranks in the same order. They throw `SharedFailure` once a rank has
+/// called `fail`.
 class Shares {
  public:
   explicit Shares(Ranks& ranks) : ranks_(ranks) {}

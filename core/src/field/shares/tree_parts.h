@@ -5,7 +5,6 @@
 #include <compare>
 #include <cstdint>
 #include <functional>
-#include <span>
 #include <vector>
 
 #include "field/cells/build_tree.h"
