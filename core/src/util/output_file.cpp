@@ -197,13 +197,15 @@ OutputFile::OutputFile(const std::filesystem::path& file) : file_(resolved(file)
   if (!file_.has_filename()) throw Error(ErrorKind::file, file.string(), "names a folder; give a file name");
   // Try names until the temporary file can be created. A killed process with the same process id may have left a file
   // with one of these names.
-  for (int tries = 100; tries > 0 && stream_ == nullptr; --tries) {
+  for (int tries = 100; tries > 0; --tries) {
     temporary_ = temporaryBeside(file_);
+    remember(temporary_.c_str());  // before the file is there, because a signal may end the process at any time
     stream_ = std::fopen(temporary_.c_str(), "wbx");
-    if (stream_ == nullptr && errno != EEXIST) break;
+    if (stream_ != nullptr) return;
+    const int why = errno;
+    forget(temporary_.c_str());
+    if (why != EEXIST || tries == 1) refuse(why);
   }
-  if (stream_ == nullptr) refuse(errno);
-  remember(temporary_.c_str());
 }
 
 OutputFile::~OutputFile() {
