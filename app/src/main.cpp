@@ -38,7 +38,7 @@ bool showsColors() {
 }
 
 int runWith(const std::vector<std::string>& words, hpsdf::app::ProcessGroup* group) {
-  // Of several processes that build a field together, the first alone writes.
+  // If several processes build a field together, the first alone writes.
   const bool writes = group == nullptr || group->isFirst();
   if (!writes) hpsdf::app::removeInterruptHandlers();
   std::ostream nowhere(nullptr);

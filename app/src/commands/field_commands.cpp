@@ -194,7 +194,8 @@ processes share a list. docs/batch.md shows how, with Slurm, Snakemake, Dask and
 a finished folder.
 
 Started by MPI's mpirun, as in 'mpirun -n 8 hpsdf build …', several processes build one field together, which is the same
-to the byte: each holds a part of the cells. All of them need the mesh. --tolerance and --max-bytes are for one process. docs/scale.md tells what it gains.)"),
+to the byte: each holds a part of the cells. All of them need the mesh. --tolerance and --max-bytes are for one process.
+docs/scale.md tells what it gains.)"),
       .examples = {"hpsdf build part.stl -o part.hpsdf --tolerance 0.02%", "hpsdf build bunny.obj -o bunny.hpsdf",
                    "hpsdf build bunny.obj -o paper.hpsdf --paper --target-error 1e-6 --grid 6",
                    "hpsdf build builtin:torus,major=0.7,minor=0.2 -o torus.hpsdf --target-error 1e-8",

@@ -7,7 +7,7 @@ namespace hpsdf::app {
 /// a flag. Signals that the parent process ignores stay ignored.
 void installInterruptHandlers();
 
-/// Undoes it: the signals end this process without a message.
+/// Undoes `installInterruptHandlers`: the signals end this process without a message.
 void removeInterruptHandlers();
 
 /// While a guard exists, the first SIGINT, SIGTERM or SIGHUP does not end the process, so that the work can stop in an

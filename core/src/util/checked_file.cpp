@@ -71,13 +71,6 @@ std::optional<std::uint32_t> CheckedReader::begin(const Magic& magic) {
   return version;
 }
 
-void CheckedReader::flag(bool& value) {
-  std::uint8_t stored = 0;
-  item(stored);
-  require(stored <= 1, "a flag is neither 0 nor 1");
-  value = stored == 1;
-}
-
 void CheckedReader::text(std::string& value) {
   std::uint32_t length = 0;
   item(length);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "hpsdf/detail/output_file.h"
+#include "util/number_stream.h"
 
 struct XXH3_state_s;
 
@@ -49,9 +50,8 @@ class Checksum {
 /// The first bytes of a file. They identify the type of the file.
 using Magic = std::array<char, 8>;
 
-/// Writes numbers to a file and then the checksum of these numbers. `CheckedReader` has members of the same names, so
-/// that the same function template can write and read a file.
-class CheckedWriter {
+/// Writes numbers to a file and then the checksum of these numbers.
+class CheckedWriter : public NumberWriter<CheckedWriter> {
  public:
   /// All members of this class throw the same errors as `OutputFile`.
   explicit CheckedWriter(const std::filesystem::path& file) : output_(file) {}
@@ -60,26 +60,13 @@ class CheckedWriter {
   void item(const T& value) {
     put(bytesOf(value));
   }
-  void flag(bool value) { item(std::uint8_t{value}); }
   void text(std::string_view value);
-  /// Writes an array without its size. The reader derives the size from other items of the file.
-  template <typename T>
-  void array(const std::vector<T>& values, std::uint64_t) {
-    put(std::as_bytes(std::span(values)));
-  }
-  /// Writes the size of an array and the array.
-  template <typename T>
-  void list(const std::vector<T>& values) {
-    item(std::uint64_t{values.size()});
-    array(values, values.size());
-  }
   void begin(const Magic& magic, std::uint32_t version);
-  /// Does nothing, because only values that are read can be invalid (see `CheckedReader::require`).
-  void require(bool, const char*) const {}
   /// Writes the checksum and commits the file.
   void finish();
 
  private:
+  friend NumberWriter;
   void put(std::span<const std::byte> bytes);
 
   OutputFile output_;
@@ -95,7 +82,7 @@ struct FileKind {
 
 /// Reads a file that `CheckedWriter` wrote. Every member throws `Error` (of the kind `file`) if the file
 /// ends too early or contains an impossible value.
-class CheckedReader {
+class CheckedReader : public NumberReader<CheckedReader> {
  public:
   /// Opens a file. Throws `Error` (of the kind `file`) for a file that is missing, not a regular file, or cannot be
   /// opened.
@@ -105,22 +92,7 @@ class CheckedReader {
   void item(T& value) {
     get(std::as_writable_bytes(std::span(&value, 1)));
   }
-  void flag(bool& value);
   void text(std::string& value);
-  /// Reads an array of `count` elements. Throws, before memory is allocated, if the elements need more bytes than
-  /// remain in the file.
-  template <typename T>
-  void array(std::vector<T>& values, std::uint64_t count) {
-    require(count <= remaining() / sizeof(T), "it ends too early");
-    values.resize(count);
-    get(std::as_writable_bytes(std::span(values)));
-  }
-  template <typename T>
-  void list(std::vector<T>& values) {
-    std::uint64_t count = 0;
-    item(count);
-    array(values, count);
-  }
   /// Reads the first bytes of the file and its version. Returns the version, or std::nullopt if the first
   /// bytes differ from `magic`.
   std::optional<std::uint32_t> begin(const Magic& magic);
@@ -135,6 +107,7 @@ class CheckedReader {
   [[noreturn]] void refuse(const std::string& why) const;
 
  private:
+  friend NumberReader;
   void get(std::span<std::byte> bytes);
 
   std::filesystem::path file_;

@@ -52,23 +52,18 @@ void ExactSum::add(const ExactSum& other) {
   adds_ = 1;
 }
 
-std::size_t ExactSum::normalize(Digits& digits) const {
-  if (first_ >= end_) return end_;
+void ExactSum::normalize() {
+  adds_ = 0;
+  if (first_ >= end_) return;
   std::int64_t carry = 0;
   std::size_t i = first_;
-  for (; i + 1 < digits.size() && (i < end_ || (carry != 0 && carry != -1)); ++i) {
-    const std::int64_t digit = (i < end_ ? digits[i] : 0) + carry;
+  for (; i + 1 < digits_.size() && (i < end_ || (carry != 0 && carry != -1)); ++i) {
+    const std::int64_t digit = digits_[i] + carry;
     carry = digit >> kBits;  // rounds down, so that no digit but the last is negative
-    digits[i] = digit - (carry << kBits);
+    digits_[i] = digit - (carry << kBits);
   }
-  if (carry == 0) return std::max(i, end_);
-  digits[i] = (i < end_ ? digits[i] : 0) + carry;
-  return std::max(i + 1, end_);
-}
-
-void ExactSum::normalize() {
-  end_ = normalize(digits_);
-  adds_ = 0;
+  digits_[i] += carry;
+  end_ = std::max(carry != 0 ? i + 1 : i, end_);
 }
 
 double ExactSum::value() const {
@@ -76,10 +71,7 @@ double ExactSum::value() const {
   if (special_[2] != 0 || (special_[0] != 0 && special_[1] != 0)) return std::numeric_limits<double>::quiet_NaN();
   if (special_[0] != 0 || special_[1] != 0) return special_[0] != 0 ? kInfinity : -kInfinity;
   if (first_ >= end_) return 0;
-  ExactSum sum;
-  sum.first_ = first_, sum.end_ = end_;
-  std::copy(digits_.begin() + std::ptrdiff_t(first_), digits_.begin() + std::ptrdiff_t(end_),
-            sum.digits_.begin() + std::ptrdiff_t(first_));
+  ExactSum sum = *this;
   sum.normalize();
   const bool isNegative = sum.digits_[sum.end_ - 1] < 0;
   if (isNegative) {  // the digits of the magnitude tell its leading bits

@@ -16,7 +16,7 @@ class ExactSum {
   void add(double value, int times = 1);
   void add(const ExactSum& other);
 
-  /// Returns the sum, rounded to a double with an error of at most one unit in the last place. Infinity or NaN if such
+  /// Returns the sum, rounded to a double with an error of at most one unit in the last place; infinity or NaN if such
   /// a number was added. Equal sums return equal numbers.
   double value() const;
 
@@ -30,15 +30,12 @@ class ExactSum {
   static constexpr int kDigits = kNumbers - 3;          // 2^-1074 … 2^1023, and room for carries
   static constexpr std::uint32_t kMostAdds = 1U << 28;  // so often numbers may be added before carries are moved on
 
-  using Digits = std::array<std::int64_t, kDigits>;
-
-  /// Moves carries on in `digits`, so that the digits from `first_` on are not negative and have 32 bits, except that
-  /// the last one has the sign of the sum. Returns the end of the digits that are not 0.
-  std::size_t normalize(Digits& digits) const;
+  /// Moves carries on, so that the digits are not negative and have 32 bits, except that the last one has the sign of
+  /// the sum.
   void normalize();
 
   /// Digits with signs: the sum is Σ digits_[i] · 2^(32·i - 1074).
-  Digits digits_{};
+  std::array<std::int64_t, kDigits> digits_{};
   std::size_t first_ = kDigits, end_ = 0;  ///< the range of digits that may differ from 0
   std::uint32_t adds_ = 0;                 ///< additions since the digits were last within 32 bits
   std::array<std::int64_t, 3> special_{};  ///< how often +infinity, -infinity and NaN were added

@@ -117,8 +117,8 @@ void Construction::spread() {
     for (BuildNode& node : state_.tree.nodes) node.fit = fitElsewhere();
   }
   if (state_.stage == Stage::probe) return;
-  shares.divide({state_.tree, state_.deferred}, setup_.options.maxDepth,
-                [](const BuildNode& node) { return node.fit.isFinal ? 0 : 1; });
+  const auto one = [](const BuildNode& node) { return node.fit.isFinal ? 0 : 1; };
+  shares.divide({state_.tree, state_.deferred}, setup_.options.maxDepth, one, shares.weights(state_.tree, one));
   if (state_.stage == Stage::refine) refiner_.countAll();
 }
 

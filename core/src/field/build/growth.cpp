@@ -364,9 +364,11 @@ class Growth {
     const auto work = [&](const BuildNode& node) {
       return refiner_.allowed(node) ? std::sqrt(node.fit.error.weighted) : 0;
     };
-    if (!shares()->isUneven(state_.tree, kMostUneven, work)) return;
+    const std::vector<double> weights = shares()->weights(state_.tree, work);
+    const double share = std::accumulate(weights.begin(), weights.end(), 0.0) / double(weights.size());
+    if (*std::ranges::max_element(weights) <= kMostUneven * share) return;
     std::map<LeafRank, Trial> tried = queue_.takeAll();
-    shares()->divide({state_.tree, state_.deferred}, setup_.options.maxDepth, work);
+    shares()->divide({state_.tree, state_.deferred}, setup_.options.maxDepth, work, weights);
     enqueueLeaves();
     for (std::uint32_t n = 0; n < state_.tree.nodes.size(); ++n) {
       const auto found = state_.tree.nodes[n].firstChild == 0 ? tried.find(queue_.rankOf(n)) : tried.end();

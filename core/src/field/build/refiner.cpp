@@ -137,9 +137,6 @@ void Refiner::makeExact(std::uint32_t leaf, Fit&& fit) {
 
 void Refiner::apply(std::uint32_t leaf, Trial&& trial, bool raises) {
   BuildTree& tree = state.tree;
-  if (tree.nodes.size() > 0xffffffffu - 8)
-    throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
-
   const StepErrors errors = errorsOf(leaf, trial, raises);
   if (trial.exact) {
     makeExact(leaf, std::move(*trial.exact));

@@ -41,7 +41,13 @@ void BuildTree::setChildIndices(std::uint32_t parent) {
   }
 }
 
+void requireRoomForChildren(std::size_t nodes) {
+  if (nodes > 0xffffffffu - 8)
+    throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
+}
+
 void BuildTree::split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own) {
+  requireRoomForChildren(nodes.size());
   const auto first = static_cast<std::uint32_t>(nodes.size());
   nodes[leaf].firstChild = first;
   nodes[leaf].fit = std::move(own);

@@ -32,6 +32,9 @@ struct BuildNode {
   Fit fit;
 };
 
+/// Throws `Error` if an octree of so many nodes cannot have eight more, because nodes have numbers of 32 bits.
+void requireRoomForChildren(std::size_t nodes);
+
 /// The octree of a construction. Its array of nodes holds the base cells, x fastest, followed by groups of
 /// eight children.
 struct BuildTree {
@@ -49,7 +52,8 @@ struct BuildTree {
   /// Sets the depths and the cell indices of the eight children of `parent`.
   void setChildIndices(std::uint32_t parent);
 
-  /// Splits a leaf: adds eight children with the fits `children`, and replaces the leaf's own fit by `own`.
+  /// Splits a leaf: adds eight children with the fits `children`, and replaces the leaf's own fit by `own`. Throws
+  /// `Error` as `requireRoomForChildren` does.
   void split(std::uint32_t leaf, std::array<Fit, 8>&& children, Fit own = {});
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 #include <variant>
 
+#include "field/cells/build_tree.h"
 #include "field/query/quantized.h"
 #include "hpsdf/error.h"
 
@@ -51,8 +52,7 @@ class Assembly {
           place(to, nodes[0]);
           continue;
         }
-        if (whole_.nodes.size() > 0xffffffffu - 8)
-          throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
+        requireRoomForChildren(whole_.nodes.size());
         const auto first = static_cast<std::uint32_t>(whole_.nodes.size());
         whole_.nodes[to] = node::internal(first);
         whole_.nodes.resize(first + 8);

@@ -134,14 +134,8 @@ std::vector<double> Shares::weights(const BuildTree& tree, const WeightOf& weigh
   return all;
 }
 
-bool Shares::isUneven(const BuildTree& tree, double most, const WeightOf& weightOf) {
-  const std::vector<double> byRank = weights(tree, weightOf);
-  const double all = std::accumulate(byRank.begin(), byRank.end(), 0.0);
-  return *std::ranges::max_element(byRank) > most * all / count();
-}
-
-void Shares::divide(const Part& part, int maxDepth, const WeightOf& weightOf) {
-  const std::vector<MortonPlace> starts = boundaries(part.tree, maxDepth, weightOf);
+void Shares::divide(const Part& part, int maxDepth, const WeightOf& weightOf, const std::vector<double>& weights) {
+  const std::vector<MortonPlace> starts = boundaries(part.tree, maxDepth, weightOf, weights);
   move(part, [&](const BuildNode& node) {
     const MortonPlace place = mortonPlaceOf({node.depth, node.cellIndex}, maxDepth);
     return int(std::ranges::upper_bound(starts, place) - starts.begin());
@@ -149,10 +143,10 @@ void Shares::divide(const Part& part, int maxDepth, const WeightOf& weightOf) {
   dropEmpty(part.tree, part.deferred);
 }
 
-std::vector<MortonPlace> Shares::boundaries(const BuildTree& tree, int maxDepth, const WeightOf& weightOf) {
-  const std::vector<double> byRank = weights(tree, weightOf);
-  const double all = std::accumulate(byRank.begin(), byRank.end(), 0.0);
-  const double before = std::accumulate(byRank.begin(), byRank.begin() + rank(), 0.0);
+std::vector<MortonPlace> Shares::boundaries(const BuildTree& tree, int maxDepth, const WeightOf& weightOf,
+                                            const std::vector<double>& weights) {
+  const double all = std::accumulate(weights.begin(), weights.end(), 0.0);
+  const double before = std::accumulate(weights.begin(), weights.begin() + rank(), 0.0);
 
   struct Weighted {
     MortonPlace place;

@@ -67,22 +67,21 @@ class Shares {
   /// Tells the weight of a leaf, which is 0 for leaves that other ranks hold.
   using WeightOf = std::function<double(const BuildNode&)>;
 
-  /// Returns true if the leaves of a rank have more than `most` times its share of the weight of all leaves.
-  bool isUneven(const BuildTree& tree, double most, const WeightOf& weightOf);
+  /// Returns the weight of the leaves of each rank.
+  std::vector<double> weights(const BuildTree& tree, const WeightOf& weightOf);
 
-  /// Divides the leaves anew. Each rank gets an interval of the Morton curve, and all of them get about the same
-  /// weight. The ranks must hold successive intervals already.
-  void divide(const Part& part, int maxDepth, const WeightOf& weightOf);
+  /// Divides the leaves, whose weights by rank are `weights`, anew. Each rank gets an interval of the Morton curve, and
+  /// all of them get about the same weight. The ranks must hold successive intervals already.
+  void divide(const Part& part, int maxDepth, const WeightOf& weightOf, const std::vector<double>& weights);
 
   /// Takes the octree from all ranks to rank 0.
   void gatherAtFirst(const Part& part);
 
  private:
   std::vector<Message> exchange(std::vector<Message> toEach);
-  /// Returns the weight of the leaves of each rank.
-  std::vector<double> weights(const BuildTree& tree, const WeightOf& weightOf);
   /// Returns the first places of the parts of ranks 1, 2, …
-  std::vector<MortonPlace> boundaries(const BuildTree& tree, int maxDepth, const WeightOf& weightOf);
+  std::vector<MortonPlace> boundaries(const BuildTree& tree, int maxDepth, const WeightOf& weightOf,
+                                      const std::vector<double>& weights);
   /// Gives each node that a rank holds to another one, or leaves it where it is.
   void move(const Part& part, const std::function<int(const BuildNode&)>& rankOf);
 

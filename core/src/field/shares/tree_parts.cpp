@@ -1,22 +1,19 @@
 #include "field/shares/tree_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "field/shares/fit_items.h"
-#include "hpsdf/error.h"
 
 namespace hpsdf::detail {
 namespace {
 
 /// Splits a leaf of the octree into children that other processes hold.
 void splitElsewhere(BuildTree& tree, std::uint32_t leaf) {
-  if (tree.nodes.size() > 0xffffffffu - 8)
-    throw Error("the field needs more than 2^32 cells; raise the target error or lower the maximum depth");
-  tree.nodes[leaf].firstChild = static_cast<std::uint32_t>(tree.nodes.size());
-  tree.nodes[leaf].fit = {};
-  for (int child = 0; child < 8; ++child) tree.nodes.emplace_back().fit.isFinal = true;
-  tree.setChildIndices(leaf);
+  std::array<Fit, 8> children;
+  children.fill(fitElsewhere());
+  tree.split(leaf, std::move(children));
 }
 
 /// Returns the node of a cell. Splits leaves on the way to it.
