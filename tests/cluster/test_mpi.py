@@ -50,6 +50,28 @@ def test_fields_are_those_of_one_process(tmp_path: pathlib.Path, options: tuple[
     assert {file.suffix for file in tmp_path.iterdir()} == {".hpsdf"}
 
 
+def test_ranks_share_the_parts_of_a_mesh_on_the_disk(tmp_path: pathlib.Path) -> None:
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    options = ("--target-error", "1e-5", "--out-of-core", str(parts))
+    for count in (3, 2):
+        field = tmp_path / f"{count}.hpsdf"
+        subprocess.run(by_ranks(count, build(BOWL, field, *options)), check=True, env=environment())
+    subprocess.run(build(BOWL, tmp_path / "alone.hpsdf", *options), check=True)
+    for field in (tmp_path / "3.hpsdf", tmp_path / "2.hpsdf"):
+        assert field.read_bytes() == (tmp_path / "alone.hpsdf").read_bytes()
+    assert len(list(parts.iterdir())) == 1
+
+
+def test_a_mesh_that_cannot_be_divided_ends_all_ranks(tmp_path: pathlib.Path) -> None:
+    options = ("--out-of-core", str(tmp_path / "missing"))
+    command = by_ranks(3, build(BOWL, tmp_path / "field.hpsdf", *options))
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True)
+    assert done.returncode != 0
+    assert done.stderr.count("is not a folder") == 1
+    assert not (tmp_path / "field.hpsdf").exists()
+
+
 def test_a_killed_rank_ends_all_and_the_checkpoint_goes_on(tmp_path: pathlib.Path) -> None:
     options = ("--target-error", "1e-8", "--checkpoint", "--checkpoint-seconds", "0.1")
     subprocess.run(build(BOWL, tmp_path / "alone.hpsdf", *options), check=True)

@@ -49,16 +49,19 @@ void checkBuildArguments(const Arguments& arguments) {
   checkBatch(arguments);
   if (!arguments.has("batch") && !arguments.has("mesh"))
     throw Error("build: mesh is missing: give one, or a list of them as batch; 'hpsdf help build' explains");
+  if (arguments.has("batch") && arguments.has("out-of-core"))
+    throw Error("out-of-core: belongs to one mesh; leave it out of a batch");
   checkCheckpoint(arguments);
 }
 
 void runBuild(Session& session, const Arguments& arguments) {
   if (arguments.has("batch")) return buildBatch(session, arguments);
   const std::string surface = arguments.text("mesh");
-  buildAndReport(session, arguments, {.name = surface, .surface = surface},
-                 [&](const std::filesystem::path& checkpoint) {
-                   return buildField(session.console(), surface, arguments, checkpoint);
-                 });
+  buildAndReport(
+      session, arguments, {.name = surface, .surface = surface}, [&](const std::filesystem::path& checkpoint) {
+        BuildInput input = buildInput(session.console(), surface, arguments, arguments.textOr("out-of-core", ""));
+        return buildField(session.console(), std::move(input), surface, arguments, checkpoint);
+      });
 }
 
 void runLoad(Session& session, const Arguments& arguments) {
@@ -151,6 +154,7 @@ const std::vector<Parameter> kBuildFiles = {
      "Script that runs for every field of the list, with the field as its current one: it writes samples, a contour or "
      "pictures. Its variables are $mesh, $field (the field's file), $name (that file without its ending) and $threads. "
      "It runs again where a file that it writes is missing, or where the script has changed."},
+    outOfCoreParameter(),
     compressParameter()};
 
 void addBuildCommand(Registry& registry) {

@@ -168,6 +168,17 @@ std::vector<Parameter> checkpointParameters() {
   };
 }
 
+Parameter outOfCoreParameter() {
+  return {"out-of-core", file("DIR").under(kFiles),
+          "Divides a mesh that does not fit into memory into parts, in this folder, some 150 bytes a face, and reads "
+          "those that distances ask for: at most half of memory-limit at once. The parts stay there for the next field "
+          "of the mesh. A binary PLY file of triangles is never loaded as a whole. There are no exact "
+          "leaves, and the estimator checks no points of the surface; with --strategy hp --estimator embedded the "
+          "octree is that of the mesh in memory, to the bit. The mesh must be clean, closed and in one piece, or its "
+          "normals "
+          "be trusted by --sign pseudonormal."};
+}
+
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings) {
   std::vector<std::string> names;
   for (const BuildSetting& setting : buildSettings())

@@ -22,6 +22,9 @@ std::vector<Parameter> buildParameters();
 /// Returns the parameters that choose whether and how often a running construction saves a checkpoint.
 std::vector<Parameter> checkpointParameters();
 
+/// Returns the parameter that names the folder for the parts of a mesh that need not fit into memory.
+Parameter outOfCoreParameter();
+
 /// Returns the names of the parameters that set a stopping criterion of one of the kinds `endings`.
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings);
 /// Returns these names, and those of the parameters that have an effect only with one of them.

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,9 @@
 #include "construction/operands.h"
 #include "construction/surface.h"
 #include "hpsdf/combine/combined_distance.h"
+#include "hpsdf/detail/memory.h"
+#include "hpsdf/input/distance_on_disk.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/verify.h"
 #include "ranks/process_group.h"
 #include "text/text.h"
@@ -55,6 +60,57 @@ void noteOtherPrecision(const Console& console, CoefficientType asked, const Fie
          fmt::format("the coefficients are {}: integers would need too many bits for the error that is asked for, or "
                      "the field has no error to compare with",
                      precisionName(field)));
+}
+
+/// Throws `Error` for arguments that need the mesh in memory.
+void refuseOptionsOfMeshesInMemory(const Arguments& arguments, InsideTest insideTest) {
+  if (insideTest != InsideTest::automatic && insideTest != InsideTest::pseudonormal)
+    throw Error("sign: out of core, a mesh has its sign from pseudonormals: choose auto or pseudonormal");
+  if (wantsNormalized(arguments))
+    throw Error("normalize: out of core, a mesh keeps its units; leave it out, and errors are in units of the mesh");
+  if (arguments.flag("certified") || arguments.flag("bounds"))
+    throw Error("certified, bounds: out of core, nothing is proven; leave them out");
+}
+
+/// Divides a mesh into parts on the disk (`DistanceOnDisk`), in this folder. Of several processes the first one does
+/// so, while the others wait. Returns the mesh as a surface that is known by its distance alone. Throws `Error` as
+/// `DistanceOnDisk` does and for arguments that need the mesh in memory, and `Cancelled` after Ctrl-C.
+PreparedSurface surfaceOnDisk(const Console& console, const std::string& surface, const Arguments& arguments,
+                              const std::filesystem::path& folder) {
+  requireMesh(surface);
+  const InsideTest insideTest = distanceOptions(arguments).insideTest;
+  refuseOptionsOfMeshesInMemory(arguments, insideTest);
+  const DistanceOnDiskOptions options{
+      .insideTest = insideTest,
+      .memory = arguments.given("memory-limit") ? std::size_t(arguments.number("memory-limit") / 2) : 0,
+      .threads = distanceOptions(arguments).threads};
+
+  const auto divided = [&] {
+    if (isMeshFileName(surface) && DistanceOnDisk::isMappable(surface))
+      return withProgress(console, [&](const Progress& progress) {
+        return std::make_shared<const DistanceOnDisk>(std::filesystem::path(surface), folder, options, progress);
+      });
+    const ImportedMesh imported = importSurface(console, surface);
+    return withProgress(console, [&](const Progress& progress) {
+      return std::make_shared<const DistanceOnDisk>(imported.mesh, folder, options, progress);
+    });
+  };
+  std::shared_ptr<const DistanceOnDisk> distance;
+  if (console.group == nullptr) {
+    distance = divided();
+  } else {
+    if (console.group->isFirst()) distance = divided();
+    console.group->hasBegun = true;  // If this process has not failed, but another one has, all of them know it.
+    waitForAll(*console.group->ranks);
+    console.group->hasBegun = false;
+    if (!distance) distance = divided();
+  }
+  note(console, fmt::format("{}: {} faces in {} parts, {} in {}", surface, grouped(distance->source().faces),
+                            grouped(distance->parts()), bytesText(double(distance->bytesOnDisk())),
+                            distance->folder().string()));
+  PreparedSurface prepared;
+  prepared.function = DistanceFunction(std::move(distance));
+  return prepared;
 }
 
 /// Throws `Error` for an option that has a meaning for meshes only, if the surface has none.
@@ -128,16 +184,20 @@ Field constructed(const Console& console, const BuildInput& input, const Checkpo
 
 std::filesystem::path checkpointOf(const std::filesystem::path& output) { return output.string() + ".checkpoint"; }
 
-BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments) {
+BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::filesystem::path& partsFolder) {
   return namingSurface(surface, [&]() -> BuildInput {
     // Convert the arguments to options first, to find mistakes in the arguments before the long work starts.
     buildOptions(arguments, 1);
     const DistanceOptions insideOptions = distanceOptions(arguments);
     refuseOptionsOfMeshes(surface, arguments);
 
-    // Load the surface, check its domain, and warn if the domain cuts the surface off.
+    // Load the surface, check its domain, and warn if the domain cuts the surface off. The division of a mesh into
+    // parts sets up its distance.
+    auto start = std::chrono::steady_clock::now();
     const PreparedSurface prepared =
-        prepareSurface(console, surface, wantsNormalized(arguments), gridPlacement(arguments));
+        !partsFolder.empty() ? surfaceOnDisk(console, surface, arguments, partsFolder)
+                             : prepareSurface(console, surface, wantsNormalized(arguments), gridPlacement(arguments));
     const Box box = prepared.box(), domain = domainFrom(arguments, box);
     BuildOptions options = buildOptions(arguments, box.sizes().maxCoeff());
     withinMemory(arguments, [&] { checkBuild(domain, options); });
@@ -149,7 +209,7 @@ BuildInput buildInput(const Console& console, const std::string& surface, const 
     if (console.listener != nullptr && !prepared.function) console.listener->showMesh(prepared.mesh, domain);
 
     // Set up the exact distance function and measure how long this takes.
-    const auto start = std::chrono::steady_clock::now();
+    if (partsFolder.empty()) start = std::chrono::steady_clock::now();
     auto exact = distanceTo(console, surface, prepared, insideOptions);
     allowDistance(options, *exact, arguments);
     return {std::move(exact), prepared.report, domain, options, secondsSince(start)};

@@ -22,8 +22,11 @@ struct BuildInput {
   double setUpSeconds = 0;  ///< time to set up the distance function
 };
 
-/// Loads a surface, warns about its flaws and sets up its exact distance function. Throws `Error` naming `surface`.
-BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments);
+/// Loads a surface, warns about its flaws and sets up its exact distance function. If `partsFolder` is not empty, the
+/// surface is a mesh that need not fit into memory, whose parts are in this folder (`DistanceOnDisk`). Throws `Error`
+/// naming `surface`.
+BuildInput buildInput(const Console& console, const std::string& surface, const Arguments& arguments,
+                      const std::filesystem::path& partsFolder = {});
 
 /// Reads an expression of solids, loads its operands, warns about a domain that cuts the surface, and sets up the
 /// expression's distance function. Throws `Error` naming "expression".

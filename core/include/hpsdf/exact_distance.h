@@ -18,9 +18,6 @@ namespace hpsdf {
 
 class TriangleSearch;
 
-/// The part of a triangle on which the closest point to a query lies.
-enum class Feature : std::uint8_t { face, edge, vertex };
-
 struct ClosestPoint {
   Vector3 point;           ///< on the surface
   double signedDistance;   ///< negative inside

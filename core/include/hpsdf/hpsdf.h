@@ -14,6 +14,7 @@
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field.h"
 #include "hpsdf/field_file.h"
+#include "hpsdf/input/distance_on_disk.h"
 #include "hpsdf/input/grid_distance.h"
 #include "hpsdf/jumps.h"
 #include "hpsdf/mesh_file.h"

@@ -18,6 +18,9 @@ constexpr double kLargestCoordinate = 1e100;
 /// The indices of a triangle's three vertices, counter-clockwise as seen from outside.
 using Triangle = std::array<std::uint32_t, 3>;
 
+/// The part of a triangle on which the closest point to a query lies.
+enum class Feature : std::uint8_t { face, edge, vertex };
+
 /// A mesh: vertices in mesh units, and triangles that refer to the vertices by index.
 struct TriangleMesh {
   std::vector<Vector3> vertices;

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "util/refuse.h"
 
@@ -70,7 +71,7 @@ OrientedBox boxFrom(const Eigen::Matrix3f& axes, const FloatBox& extents) {
 class BoxFitter {
  public:
   /// `points` are the vertices in local coordinates. Their fourth component is 0.
-  BoxFitter(const std::vector<Corners>& triangles, const std::vector<Eigen::Array4f>& points)
+  BoxFitter(std::span<const Corners> triangles, std::span<const Eigen::Array4f> points)
       : triangles_(triangles), points_(points) {}
 
   void fit(Node& node, const Branch& branch) const {
@@ -136,11 +137,11 @@ class BoxFitter {
     return axes;
   }
 
-  const std::vector<Corners>& triangles_;
-  const std::vector<Eigen::Array4f>& points_;
+  std::span<const Corners> triangles_;
+  std::span<const Eigen::Array4f> points_;
 };
 
-std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, const std::vector<Vector3>& vertices) {
+std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, std::span<const Vector3> vertices) {
   std::vector<Eigen::Array4f> points(vertices.size());
   tbb::parallel_for(std::size_t{0}, points.size(),
                     [&](std::size_t v) { points[v] << hierarchy.local(vertices[v]).cast<float>().array(), 0; });
@@ -169,38 +170,40 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {
   scale_ = half >= std::numeric_limits<double>::min() ? 1 / half : 1;
 
   TriangleTree tree = makeTriangleTree(localPoints(*this, mesh.vertices), mesh.triangles);
-  numbers_ = std::move(tree.order);
+  numbers_ = detail::SharedArray<std::uint32_t>(std::move(tree.order));
   Numbered numbered;
   tbb::parallel_invoke([&] { sortSurface(mesh); }, [&] { numbered.add(*tree.root); });
 
   const std::vector<Eigen::Array4f> points = localPoints(*this, vertices_);
   const BoxFitter fitter(triangles_, points);
-  nodes_ = Array<Node>(numbered.nodes.size());
+  nodes_ = detail::SharedArray<Node>(numbered.nodes.size());
   tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t n) {
     fitter.fit(nodes_[n], *numbered.nodes[n]);
     std::copy(numbered.children[n].begin(), numbered.children[n].end(), nodes_[n].child);
   });
-  blocks_ = Array<Block>((triangles_.size() + kWidth - 1) / kWidth);
+  blocks_ = detail::SharedArray<Block>((triangles_.size() + kWidth - 1) / kWidth);
   tbb::parallel_for(std::size_t{0}, blocks_.size(), [&](std::size_t b) { fill(blocks_[b], b); });
 }
 
 void Hierarchy::sortSurface(const TriangleMesh& mesh) {
   constexpr std::uint32_t kUnused = ~std::uint32_t{0};
   std::vector<std::uint32_t> numbers(mesh.vertices.size(), kUnused);
-  vertices_.reserve(mesh.vertices.size());
-  triangles_.reserve(numbers_.size());
-  for (const std::uint32_t triangle : numbers_) {
-    Corners corners = mesh.triangles[triangle];
+  std::vector<Vector3> vertices;
+  vertices.reserve(mesh.vertices.size());
+  triangles_ = detail::SharedArray<Triangle>(numbers_.size());
+  for (std::size_t slot = 0; slot < numbers_.size(); ++slot) {
+    Corners corners = mesh.triangles[numbers_[slot]];
     for (std::uint32_t& corner : corners) {
       std::uint32_t& number = numbers[corner];
       if (number == kUnused) {
-        number = static_cast<std::uint32_t>(vertices_.size());
-        vertices_.push_back(mesh.vertices[corner]);
+        number = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(mesh.vertices[corner]);
       }
       corner = number;
     }
-    triangles_.push_back(corners);
+    triangles_[slot] = corners;
   }
+  vertices_ = detail::SharedArray<Vector3>(std::move(vertices));
 }
 
 void Hierarchy::fill(Block& block, std::size_t index) const {

@@ -4,14 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
-#include <vector>
 
 #include "bvh/triangle_frame.h"
 #include "bvh/triangle_tree.h"
 #include "hpsdf/triangle_mesh.h"
 #include "hpsdf/types.h"
+#include "util/shared_array.h"
 
 namespace hpsdf::bvh {
 
@@ -21,7 +20,10 @@ void requireSurface(const TriangleMesh& mesh);
 
 /// The triangle of a mesh that is nearest to a query point.
 struct Nearest {
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};  ///< the slot where no triangle is near enough
+
   std::uint32_t slot = 0;     ///< position of the triangle in the order of the hierarchy
+  double squared;             ///< squared distance to the triangle
   FramePoint point;           ///< the query point's position relative to the triangle
   Vector3 normal;             ///< `TriangleFrame::normal` of the triangle
   double length;              ///< `TriangleFrame::length` of the triangle
@@ -63,24 +65,6 @@ struct alignas(32) Block {
     fields
   };
   float field[fields][kWidth];
-};
-
-/// An array with uninitialised elements. The threads that fill it are the first to touch its memory pages. The
-/// operating system therefore places each page in the memory closest to its thread. The array is not cleared first.
-template <typename T>
-class Array {
- public:
-  Array() = default;
-  explicit Array(std::size_t size) : elements_(std::make_unique_for_overwrite<T[]>(size)), size_(size) {}
-
-  std::size_t size() const { return size_; }
-  T& operator[](std::size_t i) { return elements_[i]; }
-  const T& operator[](std::size_t i) const { return elements_[i]; }
-  operator std::span<const T>() const { return {elements_.get(), size_}; }
-
- private:
-  std::unique_ptr<T[]> elements_;
-  std::size_t size_ = 0;
 };
 
 /// Bounding-volume hierarchy of oriented boxes (Gottschalk et al. 1996) over triangles, with four children per node.
@@ -126,6 +110,19 @@ class Hierarchy {
 
   std::size_t bytes() const;
 
+  /// Calls visit(array) for each array of a hierarchy, and then visit(number) for the numbers of its local coordinates.
+  /// A hierarchy into which they are copied is equal to the original.
+  template <typename Self, typename Visit>
+  static void forEachMember(Self& self, const Visit& visit) {
+    visit(self.nodes_);
+    visit(self.blocks_);
+    visit(self.numbers_);
+    visit(self.triangles_);
+    visit(self.vertices_);
+    for (int axis = 0; axis < 3; ++axis) visit(self.center_[axis]);
+    visit(self.scale_);
+  }
+
   /// Converts x to the local coordinates that nodes and blocks use.
   Vector3 local(const Vector3& x) const { return (x - center_) * scale_; }
   double scale() const { return scale_; }
@@ -135,11 +132,11 @@ class Hierarchy {
   void sortSurface(const TriangleMesh& mesh);
   void fill(Block& block, std::size_t index) const;
 
-  Array<Node> nodes_;
-  Array<Block> blocks_;
-  std::vector<std::uint32_t> numbers_;
-  std::vector<Triangle> triangles_;
-  std::vector<Vector3> vertices_;
+  detail::SharedArray<Node> nodes_;
+  detail::SharedArray<Block> blocks_;
+  detail::SharedArray<std::uint32_t> numbers_;
+  detail::SharedArray<Triangle> triangles_;
+  detail::SharedArray<Vector3> vertices_;
   Vector3 center_;    ///< local coordinates = (x - center_)·scale_
   double scale_ = 1;  ///< 2 / longest side of the mesh's bounding box
 };

@@ -636,21 +636,25 @@ double distanceTo(const Hierarchy& hierarchy, const Vector3& x) {
 namespace {
 
 template <int Lanes>
-void findNearest(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest) {
+void findNearest(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest,
+                 std::span<const double> within) {
   Search<Lanes> search(hierarchy, points);
-  for (const Nearest& start : nearest) search.addSeed(start.slot);
+  if (!within.empty()) search.restrictTo(within);
+  for (const Nearest& start : nearest)
+    if (start.slot != Nearest::kNone) search.addSeed(start.slot);
   run(search);
   for (std::size_t lane = 0; lane < points.size(); ++lane) nearest[lane] = search.result(int(lane));
 }
 
 }  // namespace
 
-void nearestTriangles(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest) {
+void nearestTriangles(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest,
+                      std::span<const double> within) {
   assert(points.size() == nearest.size() && !points.empty() && points.size() <= kPacket);
   if (points.size() <= kSmallPacket)
-    findNearest<kSmallPacket>(hierarchy, points, nearest);
+    findNearest<kSmallPacket>(hierarchy, points, nearest, within);
   else
-    findNearest<kPacket>(hierarchy, points, nearest);
+    findNearest<kPacket>(hierarchy, points, nearest, within);
 }
 
 std::string_view instructionSet() {
@@ -684,6 +688,16 @@ Search<Lanes>::Search(const Hierarchy& tree, std::span<const Vector3> points) : 
 }
 
 template <int Lanes>
+void Search<Lanes>::restrictTo(std::span<const double> within) {
+  isRestricted = true;
+  for (int lane = 0; lane < Lanes; ++lane) {
+    const double bound = within[std::min(std::size_t(lane), within.size() - 1)];
+    const double distance = std::sqrt(bound) * hierarchy.scale() + double(delta);
+    limit[lane] = static_cast<float>(std::min(distance * distance * 1.000001, double(kOutOfReach)));
+  }
+}
+
+template <int Lanes>
 void Search<Lanes>::addSeed(std::uint32_t triangleSlot) {
   const std::uint32_t block = triangleSlot / kWidth;
   if (std::find(seed.begin(), seed.begin() + seeds, block) == seed.begin() + seeds) seed[seeds++] = block;
@@ -691,15 +705,25 @@ void Search<Lanes>::addSeed(std::uint32_t triangleSlot) {
 
 template <int Lanes>
 Nearest Search<Lanes>::result(int lane) const {
-  if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {  // The query point is not finite.
+  if (!(triangle[lane] < std::numeric_limits<double>::infinity())) {
+    if (isRestricted)
+      return {.slot = Nearest::kNone,
+              .squared = std::numeric_limits<double>::infinity(),
+              .point = {},
+              .normal = Vector3::Zero(),
+              .length = 0,
+              .firstCorner = 0};
+    // The query point is not finite.
     const TriangleFrame frame = hierarchy.frame(0);
     return {.slot = 0,
+            .squared = std::numeric_limits<double>::quiet_NaN(),
             .point = locate(frame, Vector3(exact[0][lane], exact[1][lane], exact[2][lane])),
             .normal = frame.normal,
             .length = frame.length,
             .firstCorner = frame.firstCorner};
   }
   return {.slot = static_cast<std::uint32_t>(slot[lane]),
+          .squared = squared[lane],
           .point = {height[lane], {side[0][lane], side[1][lane], side[2][lane]}, inside[lane] != 0},
           .normal = {normal[0][lane], normal[1][lane], normal[2][lane]},
           .length = length[lane],

@@ -25,10 +25,16 @@ struct Search {
   /// the search has a tight distance bound from the start.
   void addSeed(std::uint32_t triangleSlot);
 
-  /// Returns the triangle nearest to the point in this lane. `run` must have finished.
+  /// Makes the search leave out triangles of which the squared distances to all points are certainly above `within`,
+  /// which has one entry for each point.
+  void restrictTo(std::span<const double> within);
+
+  /// Returns the triangle nearest to the point in this lane. Its slot is `Nearest::kNone` if the search is restricted
+  /// and has found none. `run` must have finished.
   Nearest result(int lane) const;
 
   const Hierarchy& hierarchy;
+  bool isRestricted = false;
   bool tooFar = false;  ///< a point is so far away that floats would overflow: all triangles are candidates
 
   alignas(64) float point[3][Lanes];      ///< the points in local coordinates
@@ -72,7 +78,11 @@ double distanceTo(const Hierarchy& hierarchy, const Vector3& x);
 /// Finds the nearest triangle of each point of a packet, of 1 to kPacket points, in one search. The points should be
 /// close to each other. On entry, `nearest` holds triangles from which the search starts, such as those found for
 /// nearby points. On return, it holds the nearest triangles. Both spans must have the same length.
-void nearestTriangles(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest);
+///
+/// If `within` is not empty, it holds for each point the greatest squared distance at which a triangle matters. Where
+/// all triangles are farther away, the search may return any triangle, or the slot `Nearest::kNone`.
+void nearestTriangles(const Hierarchy& hierarchy, std::span<const Vector3> points, std::span<Nearest> nearest,
+                      std::span<const double> within = {});
 
 /// Returns the name of the SIMD instruction set in use, such as "AVX2".
 std::string_view instructionSet();

@@ -18,6 +18,7 @@
 #include "distance/candidate_search.h"
 #include "distance/exact_leaf_signs.h"
 #include "distance/far_points.h"
+#include "distance/foot.h"
 #include "hpsdf/detail/threads.h"
 #include "hpsdf/error.h"
 #include "mesh/connectivity.h"
@@ -44,6 +45,7 @@ namespace {
 using bvh::Hierarchy;
 using distance::ChosenInsideTest;
 using distance::FarPoints;
+using distance::Foot;
 using distance::kTooNear;
 using sign::BoundaryEdges;
 using sign::Pseudonormals;
@@ -219,46 +221,10 @@ struct ExactDistance::Data {
     for (std::uint32_t& slot : hullSlots) slot = slotOf[slot];  // until now, the number of the mesh's triangle
   }
 
-  /// The closest point on the nearest triangle.
-  struct Foot {
-    Vector3 point;
-    double signedDistance;
-    std::uint32_t slot;  ///< the triangle, in the order of its hierarchy
-    Feature feature;
-    std::uint8_t index = 0;  ///< as in `ClosestPoint::featureIndex`
-    double along = 0;        ///< on an edge, the weight of its second end
-  };
-
-  /// Returns the closest point on the nearest triangle. The point is computed from the vertices of the mesh, so
-  /// that a query point on a vertex has distance 0. If the inside test is by pseudonormals, the distance has the
-  /// pseudonormal's sign.
+  /// Returns the closest point on the nearest triangle, as `distance::footOf` does.
   Foot resolve(const Hierarchy& triangles, const Vector3& x, const bvh::Nearest& nearest) const {
-    const std::uint32_t slot = nearest.slot;
-    const bvh::FramePoint& point = nearest.point;
-    std::uint32_t side = point.side[1] < point.side[0] ? 1 : 0;
-    if (point.side[2] < point.side[side]) side = 2;
-    // If the point projects onto an edge up to rounding errors, the closest point is not in the interior of the
-    // face.
-    const double rounding = bvh::kFlat * bvh::kFlat * (nearest.length * nearest.length + point.height * point.height);
-    if (point.inside && point.side[side] > rounding)  // adding 0 turns -0 into 0
-      return {x - nearest.normal * point.height, point.height + 0.0, slot, Feature::face};
-
-    const std::uint32_t from = (nearest.firstCorner + side) % 3, to = (from + 1) % 3;
-    const std::uint32_t va = triangles.triangles()[slot][from], vb = triangles.triangles()[slot][to];
-    const Vector3& a = triangles.vertices()[va];
-    const Vector3& b = triangles.vertices()[vb];
-    const double t = bvh::closestParameter(x, a, b);
-    const auto footAt = [&](const Vector3& foot, const Vector3& difference, const Vector3& normal, Feature feature,
-                            std::uint32_t index) {
-      // `difference` is x − foot, computed without the rounding error of the foot, which is large far from the origin.
-      const double length = difference.norm();
-      return Foot{
-          foot, (difference.dot(normal) < 0 ? -length : length) + 0.0, slot, feature, static_cast<std::uint8_t>(index),
-          t};
-    };
-    if (t <= 0) return footAt(a, x - a, normalOfVertex(va), Feature::vertex, from);
-    if (t >= 1) return footAt(b, x - b, normalOfVertex(vb), Feature::vertex, to);
-    return footAt(a + (b - a) * t, x - a - (b - a) * t, normalOfEdge(slot, from), Feature::edge, from);
+    const bool bySurface = inside.choice.insideTest == InsideTest::pseudonormal;
+    return distance::footOf(triangles, bySurface ? &inside.normals : nullptr, x, nearest);
   }
 
   /// Returns the barycentric coordinates of the projection of x onto a triangle's plane, in the order of the corners of
@@ -310,16 +276,6 @@ struct ExactDistance::Data {
     closest.featureIndex = static_cast<std::uint8_t>(zeros == 1 ? (corner + 1) % 3 : corner);
   }
 
-  /// Returns the unit vector from the closest point on the nearest triangle to x. If x is so close to the triangle that
-  /// rounding decides about this direction, returns the triangle's normal, on the side of x.
-  static Vector3 directionFrom(const Foot& closest, const Vector3& x, const bvh::Nearest& nearest) {
-    constexpr double kRounding = 1e-8;  // far more than the relative rounding error of a closest point
-    const Vector3 difference = x - closest.point;
-    const double length = difference.norm();
-    if (closest.feature != Feature::face && length > kRounding * x.cwiseAbs().maxCoeff()) return difference / length;
-    return nearest.point.height < 0 ? Vector3(-nearest.normal) : nearest.normal;
-  }
-
   /// Finds the nearest triangles of points in a hierarchy, packet by packet, and calls visit(index of the point,
   /// nearest triangle) for each point.
   template <typename Visit>
@@ -340,7 +296,7 @@ struct ExactDistance::Data {
     forEachNearest(triangles, points, [&](std::size_t i, const bvh::Nearest& nearest) {
       const Foot closest = resolve(triangles, points[i], nearest);
       out[i] = closest.signedDistance;
-      if (!directions.empty()) directions[i] = directionFrom(closest, points[i], nearest);
+      if (!directions.empty()) directions[i] = distance::directionFrom(closest, points[i], nearest);
     });
   }
 
@@ -389,9 +345,8 @@ struct ExactDistance::Data {
 
   /// Returns the signed distance of a far point x from that of its nearer point.
   double continued(double distance, const Vector3& x, const Vector3& nearer) const {
-    const double more = (x - nearer).stableNorm();
     const bool isInside = distance < 0 && inside.choice.insideTest != InsideTest::shell;
-    return isInside ? distance - more : distance + more;
+    return FarPoints::continued(distance, isInside, x, nearer);
   }
 
   /// Returns the unit vector to a far point x from the triangle nearest to it. Its nearer point has this signed
@@ -399,8 +354,7 @@ struct ExactDistance::Data {
   Vector3 continuedDirection(const Vector3& direction, double distance, const Vector3& x, const Vector3& nearer) const {
     const double toTriangle =
         inside.choice.insideTest == InsideTest::shell ? distance + source.thickness / 2 : std::abs(distance);
-    const Vector3 away = (x - nearer) + toTriangle * direction;
-    return (away / away.cwiseAbs().maxCoeff()).normalized();
+    return FarPoints::continuedDirection(direction, toTriangle, x, nearer);
   }
 
   /// Finds the closest points of points, none of which is far.
@@ -443,14 +397,6 @@ struct ExactDistance::Data {
   mutable std::atomic<const WindingSign*> winding = nullptr;  ///< is `preparedWinding_` once this is complete
 
  private:
-  Vector3 normalOfVertex(std::uint32_t vertex) const {
-    return inside.choice.insideTest == InsideTest::pseudonormal ? inside.normals.ofVertex(vertex) : Vector3::Zero();
-  }
-  Vector3 normalOfEdge(std::uint32_t slot, std::uint32_t from) const {
-    return inside.choice.insideTest == InsideTest::pseudonormal ? inside.normals.ofEdge(hierarchy, slot, from)
-                                                                : Vector3::Zero();
-  }
-
   mutable tbb::collaborative_once_flag preparesWinding_;
   mutable std::unique_ptr<const WindingSign> preparedWinding_;
 };

@@ -45,6 +45,19 @@ class FarPoints {
     return result;
   }
 
+  /// Returns the signed distance of a far point x from that of its nearer point.
+  static double continued(double distance, bool isInside, const Vector3& x, const Vector3& nearer) {
+    const double more = (x - nearer).stableNorm();
+    return isInside ? distance - more : distance + more;
+  }
+  /// Returns the unit vector to a far point x from the triangle nearest to it. Its nearer point has the distance
+  /// `toTriangle` from this triangle, in this direction.
+  static Vector3 continuedDirection(const Vector3& direction, double toTriangle, const Vector3& x,
+                                    const Vector3& nearer) {
+    const Vector3 away = (x - nearer) + toTriangle * direction;
+    return (away / away.cwiseAbs().maxCoeff()).normalized();
+  }
+
   /// Returns true for a point at least as far outside of the mesh's box as the box is wide.
   bool isAround(const Vector3& x) const { return !aroundMesh_.contains(x); }
   /// Returns a point that is around the mesh.

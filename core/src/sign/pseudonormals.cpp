@@ -57,7 +57,7 @@ std::vector<Vector3> unitNormalsOf(const bvh::Hierarchy& hierarchy) {
 class VertexVisitor {
  public:
   VertexVisitor(const bvh::Hierarchy& hierarchy, std::span<const Vector3> unitNormals,
-                std::vector<std::uint32_t>& nextSide)
+                std::span<std::uint32_t> nextSide)
       : unitNormals_(unitNormals),
         triangles_(hierarchy.triangles()),
         vertices_(hierarchy.vertices()),
@@ -102,7 +102,7 @@ class VertexVisitor {
   std::span<const Vector3> unitNormals_;  ///< by slot
   std::span<const Triangle> triangles_;
   std::span<const Vector3> vertices_;
-  std::vector<std::uint32_t>& nextSide_;
+  std::span<std::uint32_t> nextSide_;
   /// Sort keys that group the triangle sides at the current vertex by edge. The high half of a key is the other vertex
   /// of the side, the low half is the side's index in `numbers_`.
   std::vector<std::uint64_t> sides_;

@@ -2,9 +2,9 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "bvh/hierarchy.h"
+#include "util/shared_array.h"
 
 namespace hpsdf::sign {
 
@@ -28,11 +28,18 @@ class Pseudonormals {
 
   std::size_t bytes() const;
 
+  /// Calls visit(array) for each array of pseudonormals. Those into which they are copied are equal to the original.
+  template <typename Self, typename Visit>
+  static void forEachMember(Self& self, const Visit& visit) {
+    visit(self.vertices_);
+    visit(self.nextSide_);
+  }
+
  private:
-  std::vector<Vector3> vertices_;
+  detail::SharedArray<Vector3> vertices_;
   /// For each triangle side, with the number 3·slot + k, the number of the next side at the same edge. The sides at an
   /// edge form a cycle in the order of the mesh's triangles.
-  std::vector<std::uint32_t> nextSide_;
+  detail::SharedArray<std::uint32_t> nextSide_;
 };
 
 /// Returns true if the pseudonormal of a vertex or edge of the triangle in `slot` is dominated by rounding errors.

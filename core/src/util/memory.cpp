@@ -1,5 +1,6 @@
 #include "hpsdf/detail/memory.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -56,6 +57,11 @@ double memoryOfControlGroups(const fs::path& root) {
   return least;
 }
 
+double addressLimit() {
+  rlimit limit{};
+  return getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY ? double(limit.rlim_cur) : kNoLimit;
+}
+
 double machineMemory() {
   static const double bytes =
       std::min(double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE)), memoryOfControlGroups());
@@ -64,7 +70,7 @@ double machineMemory() {
 
 }  // namespace detail
 
-double allowedMemory() { return 0.75 * detail::machineMemory(); }
+double allowedMemory() { return 0.75 * std::min(detail::machineMemory(), detail::addressLimit()); }
 
 std::string bytesText(double bytes) {
   struct Unit {
@@ -84,7 +90,8 @@ void requireMemory(const std::string& what, double bytes, std::string_view advic
   if (bytes <= most) return;
   throw Error(ErrorKind::limit, "",
               what + " would take some " + bytesText(bytes) + " of memory, more than the " + bytesText(most) +
-                  " that are three quarters of what the machine or its control group has: " + std::string(advice));
+                  " that are three quarters of what the machine, its control group or 'ulimit -v' allows: " +
+                  std::string(advice));
 }
 
 }  // namespace hpsdf

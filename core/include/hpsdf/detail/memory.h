@@ -13,6 +13,9 @@ namespace detail {
 /// contains proc and sys.
 double memoryOfControlGroups(const std::filesystem::path& root = "/");
 
+/// Returns the greatest number of bytes of this process's address space (`ulimit -v`), or infinity without a limit.
+double addressLimit();
+
 /// Returns the size of the machine's memory in bytes or, if it is lower, the limit that Linux control groups set for
 /// this process. The size is determined at the first call.
 double machineMemory();
@@ -20,7 +23,7 @@ double machineMemory();
 }  // namespace detail
 
 /// Returns the bytes that this process may take: three quarters of the machine's memory or, if it is lower, of the
-/// limit that Linux control groups set.
+/// limit that Linux control groups or the limit of the address space (`ulimit -v`) set.
 double allowedMemory();
 
 /// Returns a number of bytes as text with a suitable unit, such as "8.40 MB".

@@ -53,8 +53,12 @@ std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance
                                   const BuildOptions& options, const Checkpoint* checkpoint = nullptr,
                                   const Progress& progress = {});
 
-/// Tells the other ranks that this one fails before it calls `buildByRanks`. They call that function, which throws, or
-/// this one.
+/// Waits until all ranks have called this function. Throws `Error` on all of them if one has called `failBefore`
+/// instead; none of them calls another function of ranks then.
+void waitForAll(Ranks& ranks);
+
+/// Tells the other ranks that this one fails before it calls `buildByRanks`. They call that function or `waitForAll`,
+/// which throw, or this one.
 void failBefore(Ranks& ranks, const std::string& why);
 
 }  // namespace hpsdf

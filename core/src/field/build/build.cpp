@@ -99,6 +99,8 @@ std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance
   }
 }
 
+void waitForAll(Ranks& ranks) { Shares(ranks).gatherAll({}); }
+
 void failBefore(Ranks& ranks, const std::string& why) { Shares(ranks).fail(why); }
 
 void buildStages(const DistanceFunction& distance, const Box& domain, const BuildOptions& options,

@@ -201,9 +201,10 @@ void requireRoom(const detail::CheckedReader& reader, const FieldSizes& sizes) {
       sizeof(CellBound) * double(sizes.bounds) + 3.0 * sizes.vertexBytes * double(sizes.vertices) +
       3.0 * sizeof(std::uint32_t) * double(sizes.triangles) + sizeof(std::uint32_t) * double(sizes.lists);
   if (bytes <= allowedMemory()) return;
-  reader.refuse("its arrays would take " + bytesText(bytes) + " of memory, more than the " +
-                bytesText(allowedMemory()) +
-                " that are three quarters of what the machine or its control group has; load it on a larger machine");
+  reader.refuse(
+      "its arrays would take " + bytesText(bytes) + " of memory, more than the " + bytesText(allowedMemory()) +
+      " that are three quarters of what the machine, its control group or 'ulimit -v' allows; load it on a larger "
+      "machine");
 }
 
 /// Throws `Error` unless the numbers of nodes, base cells and bounds fit each other.
