@@ -140,6 +140,22 @@ TEST(DistanceOnDisk, ReadsBinaryPlyFilesWithoutLoadingThem) {
   EXPECT_TRUE(onDisk.source().box.isApprox(inMemory.source().box, 0));
 }
 
+TEST(DistanceOnDisk, DividesMeshesThatAreFlatToRounding) {
+  const support::TemporaryDirectory folder;
+  TriangleMesh mesh{{{0, 0, 0}, {1, 0, 0}, {1, 1, 1e-310}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, "flat"};
+  const DistanceOnDisk onDisk(mesh, folder.path(), {.insideTest = InsideTest::pseudonormal, .facesOfPart = 1});
+  const std::vector<Vector3> points = pointsAround(shapes::mesh("box"));
+  EXPECT_EQ(valuesOf(onDisk, points), valuesOf(ExactDistance(mesh, {.insideTest = InsideTest::pseudonormal}), points));
+}
+
+TEST(DistanceOnDisk, RefusesPlyFilesWithMoreThanTheirHeaderPromises) {
+  const support::TemporaryDirectory folder;
+  const fs::path file = folder.path() / "torus.ply";
+  saveMesh(shapes::mesh(kTorus), file);
+  std::ofstream(file, std::ios::binary | std::ios::app) << "more";
+  EXPECT_THAT(messageOf([&] { DistanceOnDisk(file, folder.path()); }), HasSubstr("than its header promises"));
+}
+
 TEST(DistanceOnDisk, UsesPartsThatAreThereAlready) {
   const support::TemporaryDirectory folder;
   const TriangleMesh mesh = shapes::mesh(kTorus);
@@ -150,6 +166,12 @@ TEST(DistanceOnDisk, UsesPartsThatAreThereAlready) {
   EXPECT_EQ(second.parts(), first.parts());
   EXPECT_EQ(fs::last_write_time(second.folder()), written);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
+
+  TriangleMesh other = mesh;
+  other.name = "the same under another name";
+  EXPECT_EQ(DistanceOnDisk(other, folder.path()).source().name, other.name);
+  const std::vector<Vector3> points = pointsAround(mesh);
+  EXPECT_EQ(valuesOf(DistanceOnDisk::open(first.folder()), points), valuesOf(first, points));
 }
 
 TEST(DistanceOnDisk, AnswersManyThreadsAtOnce) {
@@ -213,6 +235,11 @@ TEST(DistanceOnDisk, RefusesMeshesWhoseSignNormalsDoNotTell) {
   EXPECT_THAT(refusal(wrong), AllOf(HasSubstr("face 4"), HasSubstr("1000001")));
   EXPECT_TRUE(fs::is_empty(folder.path())) << "nothing half-made is left";
 
+  // The volume of an open mesh may be negative.
+  TriangleMesh inside = open;
+  for (Triangle& t : inside.triangles) std::swap(t[0], t[1]);
+  EXPECT_NO_THROW(DistanceOnDisk(inside, folder.path(), {.insideTest = InsideTest::pseudonormal, .facesOfPart = 100}));
+
   const DistanceOnDisk trusted(open, folder.path(), {.insideTest = InsideTest::pseudonormal, .facesOfPart = 100});
   const std::vector<Vector3> points = pointsAround(open);
   EXPECT_EQ(valuesOf(trusted, points), valuesOf(ExactDistance(open, {.insideTest = InsideTest::pseudonormal}), points));
@@ -229,7 +256,9 @@ TEST(DistanceOnDisk, RefusesDamagedParts) {
   }
   const std::vector<Vector3> points = pointsAround(mesh);
   std::vector<double> out(points.size());
-  EXPECT_THAT(messageOf([&] { DistanceOnDisk(mesh, folder.path())(points, out); }), HasSubstr("damaged"));
+  const DistanceOnDisk damaged(mesh, folder.path());
+  for (int i = 0; i < 2; ++i)  // A damaged part is not trusted the next time.
+    EXPECT_THAT(messageOf([&] { damaged(points, out); }), HasSubstr("damaged"));
   fs::resize_file(parts / "part-0", 64);
   EXPECT_THAT(messageOf([&] { DistanceOnDisk(mesh, folder.path())(points, out); }), HasSubstr("damaged"));
   fs::resize_file(parts / "index", 64);
@@ -239,8 +268,7 @@ TEST(DistanceOnDisk, RefusesDamagedParts) {
 TEST(DistanceOnDisk, LeavesNothingBehindWhenCancelled) {
   const support::TemporaryDirectory folder;
   const TriangleMesh mesh = shapes::mesh(kTorus);
-  const Progress progress{.report = {}, .cancelled = {}, .forecast = {}};
-  Progress cancelled = progress;
+  Progress cancelled;
   int reports = 0;
   cancelled.report = [&](std::string_view, double) { ++reports; };
   cancelled.cancelled = [&] { return reports > 4; };

@@ -101,9 +101,9 @@ PreparedSurface surfaceOnDisk(const Console& console, const std::string& surface
   } else {
     if (console.group->isFirst()) distance = divided();
     console.group->hasBegun = true;  // If this process has not failed, but another one has, all of them know it.
-    waitForAll(*console.group->ranks);
+    const std::string parts = textOfFirst(*console.group->ranks, distance ? distance->folder().string() : "");
     console.group->hasBegun = false;
-    if (!distance) distance = divided();
+    if (!distance) distance = std::make_shared<const DistanceOnDisk>(DistanceOnDisk::open(parts, options));
   }
   note(console, fmt::format("{}: {} faces in {} parts, {} in {}", surface, grouped(distance->source().faces),
                             grouped(distance->parts()), bytesText(double(distance->bytesOnDisk())),

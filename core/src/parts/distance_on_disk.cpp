@@ -8,6 +8,7 @@
 #include <limits>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -39,7 +40,8 @@ class MappedParts {
     entry.lastUse = ++uses_;
     if (entry.part) return entry.part;
     while (mapped_ + entry.stamp.bytes > memory_ && mapped_ > 0) unmapOldest();
-    entry.part = mapPart(partFile(folder_, index), entry.stamp, std::exchange(entry.isTrusted, true));
+    entry.part = mapPart(partFile(folder_, index), entry.stamp, entry.isTrusted);
+    entry.isTrusted = true;
     mapped_ += entry.stamp.bytes;
     ++mappings_;
     return entry.part;
@@ -95,17 +97,24 @@ using parts::FoundTriangle;
 using parts::MeshPart;
 
 struct DistanceOnDisk::Data {
-  Data(std::filesystem::path folderOfParts, const DistanceOnDiskOptions& options)
+  /// `name` is the mesh's name, or empty for the name under which it was divided.
+  Data(std::filesystem::path folderOfParts, const std::string& name, const DistanceOnDiskOptions& options)
       : folder(std::move(folderOfParts)),
         index(parts::readIndex(folder)),
-        memory(options.memory > 0 ? options.memory : std::size_t(allowedMemory() / 2)),
+        memory(memoryOf(options)),
         mapped(folder, index, memory),
         far(index.source.box) {
+    if (!name.empty()) index.source.name = name;
     if (options.insideTest != InsideTest::automatic) return;
     const Vector3 x = far.pointAround();
     double distance = 0;
     toTriangles({&x, 1}, {&distance, 1}, {});
     isInsideAround = distance < 0;
+  }
+
+  static std::size_t memoryOf(const DistanceOnDiskOptions& options) {
+    const auto most = static_cast<std::size_t>(allowedMemory() / 2);
+    return options.memory > 0 ? std::min(options.memory, most) : most;
   }
 
   /// Computes signed distances, as `ExactDistance` does, and the directions from the nearest triangles unless
@@ -228,7 +237,7 @@ DistanceOnDisk::DistanceOnDisk(const TriangleMesh& mesh, const std::filesystem::
   const auto made = withThreads(options.threads, [&] {
     return parts::makeParts(parts::FacesInMemory(mesh), folder, partOptions(options), progress);
   });
-  data_ = std::make_unique<const Data>(made, options);
+  data_ = std::make_unique<const Data>(made, mesh.name, options);
 }
 
 DistanceOnDisk::DistanceOnDisk(const std::filesystem::path& file, const std::filesystem::path& folder,
@@ -239,7 +248,13 @@ DistanceOnDisk::DistanceOnDisk(const std::filesystem::path& file, const std::fil
                 "is not a binary PLY file with nothing but vertex indices for its faces");
   const auto made =
       withThreads(options.threads, [&] { return parts::makeParts(*faces, folder, partOptions(options), progress); });
-  data_ = std::make_unique<const Data>(made, options);
+  data_ = std::make_unique<const Data>(made, faces->name(), options);
+}
+
+DistanceOnDisk::DistanceOnDisk(std::unique_ptr<const Data> data) : data_(std::move(data)) {}
+
+DistanceOnDisk DistanceOnDisk::open(const std::filesystem::path& parts, const DistanceOnDiskOptions& options) {
+  return DistanceOnDisk(std::make_unique<const Data>(parts, "", options));
 }
 
 DistanceOnDisk::~DistanceOnDisk() = default;

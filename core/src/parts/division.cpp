@@ -10,7 +10,8 @@ Division::Division(const Box& box)
     : box_(box), counts_(std::size_t{kCells} * kCells * kCells), partOf_(counts_.size()) {
   for (int axis = 0; axis < 3; ++axis) {
     const double size = box.sizes()[axis];
-    perUnit_[axis] = size > 0 ? kCells / size : 0;
+    constexpr double kThinnest = 1e-290;  // so that the quotient is finite
+    perUnit_[axis] = size > kThinnest ? kCells / size : 0;
   }
 }
 
@@ -73,7 +74,7 @@ void Division::setBoxes(std::vector<Box> boxes) {
   for (const Box& box : boxes_) forEachCell(box, [&](std::size_t cell) { ++firstOfCell_[cell + 1]; });
   std::partial_sum(firstOfCell_.begin(), firstOfCell_.end(), firstOfCell_.begin());
   partsOfCells_.resize(firstOfCell_.back());
-  std::vector<std::uint32_t> next(firstOfCell_.begin(), firstOfCell_.end() - 1);
+  std::vector<std::size_t> next(firstOfCell_.begin(), firstOfCell_.end() - 1);
   for (std::uint32_t part = 0; part < boxes_.size(); ++part)
     forEachCell(boxes_[part], [&](std::size_t cell) { partsOfCells_[next[cell]++] = part; });
 }

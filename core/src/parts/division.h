@@ -34,7 +34,7 @@ class Division {
   void forEachMeeting(const Box& box, const Visit& visit) {
     meeting_.clear();
     forEachCell(box, [&](std::size_t cell) {
-      for (std::uint32_t i = firstOfCell_[cell]; i < firstOfCell_[cell + 1]; ++i) {
+      for (std::size_t i = firstOfCell_[cell]; i < firstOfCell_[cell + 1]; ++i) {
         const std::uint32_t part = partsOfCells_[i];
         if (lastMet_[part] == meetings_ || !boxes_[part].intersects(box)) continue;
         lastMet_[part] = meetings_;
@@ -71,7 +71,8 @@ class Division {
   std::uint32_t parts_ = 0;
   std::vector<Box> boxes_;
   /// The parts whose boxes meet cell c are partsOfCells_[firstOfCell_[c]] to partsOfCells_[firstOfCell_[c + 1] - 1].
-  std::vector<std::uint32_t> firstOfCell_, partsOfCells_;
+  std::vector<std::size_t> firstOfCell_;
+  std::vector<std::uint32_t> partsOfCells_;
   std::vector<std::uint64_t> lastMet_;  ///< by part: the last call of `forEachMeeting` that met it
   std::uint64_t meetings_ = 1;
   std::vector<std::uint32_t> meeting_;

@@ -56,6 +56,9 @@ std::unique_ptr<const FacesOfPly> FacesOfPly::open(const std::filesystem::path& 
   const std::uint64_t left = list->file_.bytes().size() - list->firstVertex_;
   if (vertex.count > left / list->vertexBytes_ || face.count > (left - vertex.count * list->vertexBytes_) / kFaceBytes)
     input.refuse("holds less than its header promises, or has faces of fewer than three corners");
+  const std::uint64_t end = list->firstVertex_ + vertex.count * list->vertexBytes_ + face.count * kFaceBytes;
+  if (header.elements.size() == 2 && end != list->file_.bytes().size())
+    input.refuse("holds other faces than its header promises: more, or some that are not triangles");
   list->vertices_ = vertex.count;
   list->faces_ = face.count;
   list->firstFace_ = list->firstVertex_ + vertex.count * list->vertexBytes_;

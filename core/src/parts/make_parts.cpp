@@ -33,7 +33,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kFewestFaces = 1 << 16, kMostParts = 256;
-constexpr double kDiskBytesPerFace = 180;  ///< a fifth more than was measured, with the lists of the parts' triangles
+constexpr double kDiskBytesPerFace = 180;    ///< a fifth more than was measured, with the lists of the parts' triangles
+constexpr double kBytesPerFaceOfPart = 400;  ///< memory while a part is made, as for a mesh in memory
 constexpr std::size_t kFacesAtOnce = 1 << 20;  ///< between two reports of progress
 
 constexpr std::string_view kAdvice = "; 'hpsdf mesh --repair' writes a mesh without such faults";
@@ -58,6 +59,10 @@ std::array<Vector3, 3> cornersOf(const FaceList& mesh, const Triangle& face) {
   return {mesh.vertex(face[0]), mesh.vertex(face[1]), mesh.vertex(face[2])};
 }
 
+double largestCoordinate(const Box& box) {
+  return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+}
+
 Box boxOf(const std::array<Vector3, 3>& corners) {
   Box box(corners[0]);
   box.extend(corners[1]);
@@ -75,7 +80,7 @@ void forEachFace(const FaceList& mesh, const Progress& progress, std::string_vie
 }
 
 /// Reads the whole mesh once. Returns its description, and throws `Error` for faults that its numbers show.
-Source survey(const FaceList& mesh, const Progress& progress) {
+Source survey(const FaceList& mesh, bool isTested, const Progress& progress) {
   const std::size_t vertices = mesh.vertices(), faces = mesh.faces();
   if (faces == 0) detail::refuseMesh(mesh.name(), "no faces; a distance needs at least one triangle");
   if (faces > bvh::Hierarchy::kMaxTriangles)
@@ -113,7 +118,7 @@ Source survey(const FaceList& mesh, const Progress& progress) {
   source.fingerprint = checksum.value();
   if (const auto unused = std::ranges::find(isUsed, false); unused != isUsed.end())
     detail::refuseMesh(mesh.name(), "vertex ", unused - isUsed.begin() + 1, " belongs to no face", kAdvice);
-  if (volume < 0) detail::refuseMesh(mesh.name(), "the faces point inward", kAdvice);
+  if (isTested && volume < 0) detail::refuseMesh(mesh.name(), "the faces point inward", kAdvice);
   return source;
 }
 
@@ -163,7 +168,10 @@ class FaceLists {
   std::vector<ListedFace> take(std::size_t part) {
     flush(part);
     const fs::path file = fileOf(part);
-    std::vector<ListedFace> faces(fs::file_size(file) / sizeof(ListedFace));
+    const std::uintmax_t count = fs::file_size(file) / sizeof(ListedFace);
+    requireMemory("a part of " + std::to_string(count) + " faces", kBytesPerFaceOfPart * double(count),
+                  "the mesh has large faces or very small ones beside others, which the division keeps together");
+    std::vector<ListedFace> faces(count);
     std::ifstream stream(file, std::ios::binary);
     if (!stream.read(reinterpret_cast<char*>(faces.data()), std::streamsize(faces.size() * sizeof(ListedFace))))
       throw Error(ErrorKind::file, file.string(), "cannot be read");
@@ -193,7 +201,8 @@ class FaceLists {
 /// Tests, part by part, whether pseudonormals tell the sign of distances to a mesh.
 class SignTest {
  public:
-  explicit SignTest(const FaceList& mesh) : name_(mesh.name()), components_(mesh.faces()) {}
+  /// `largest` is the largest coordinate of the mesh.
+  SignTest(const FaceList& mesh, double largest) : name_(mesh.name()), largest_(largest), components_(mesh.faces()) {}
 
   /// Throws `Error` if one of the part's own triangles shows that they do not.
   void add(const MeshPart& part, const Progress& progress) {
@@ -210,7 +219,11 @@ class SignTest {
     for (std::uint32_t slot = 0; slot < part.faces.size(); ++slot)
       if (part.isOwn(slot) && sign::isSharp(part.hierarchy, part.normals, slot))
         refuse(part, slot, "has an edge or a corner that is too sharp for normals");
-    const Crossings crossings = surface::findCrossings(part.hierarchy, 1, distance::kTooNear, progress);
+    // What counts as too near is relative to the largest coordinate, here of the part, in the test to that of the mesh.
+    Box box;
+    for (const Vector3& vertex : part.hierarchy.vertices()) box.extend(vertex);
+    const double tooNear = distance::kTooNear * std::max(1.0, largest_ / largestCoordinate(box));
+    const Crossings crossings = surface::findCrossings(part.hierarchy, 1, tooNear, progress);
     if (crossings.found.empty()) return;
     const Vector3 x = crossings.found[0].position;
     detail::refuseMesh(name_, "the mesh intersects itself at (", x[0], ", ", x[1], ", ", x[2], ")", kHint);
@@ -232,6 +245,7 @@ class SignTest {
   }
 
   std::string name_;
+  double largest_;
   mesh::DisjointSets components_;
 };
 
@@ -293,7 +307,8 @@ void divideInto(const fs::path& into, const FaceList& mesh, const Source& source
   });
 
   // Triangles so close to a part that they may cross it to rounding count as meeting its box.
-  const Vector3 margin = Vector3::Constant(0x1p-40 * source.box.sizes().maxCoeff());
+  const double largest = largestCoordinate(source.box);
+  const Vector3 margin = Vector3::Constant(std::max(0x1p-40 * source.box.sizes().maxCoeff(), 0x1p-42 * largest));
   std::vector<Box> boxes;
   for (const PartIndex::Part& part : index.parts) boxes.emplace_back(part.box.min() - margin, part.box.max() + margin);
   division.setBoxes(std::move(boxes));
@@ -307,7 +322,7 @@ void divideInto(const fs::path& into, const FaceList& mesh, const Source& source
   });
 
   std::optional<SignTest> test;
-  if (options.insideTest == InsideTest::automatic) test.emplace(mesh);
+  if (options.insideTest == InsideTest::automatic) test.emplace(mesh, largest);
   for (std::size_t p = 0; p < index.parts.size(); ++p) {
     progress.update("making parts of the mesh", double(p) / double(index.parts.size()));
     const MeshPart part = makePart(mesh, lists.take(p));
@@ -320,13 +335,14 @@ void divideInto(const fs::path& into, const FaceList& mesh, const Source& source
 
 }  // namespace
 
-fs::path makeParts(const FaceList& mesh, const fs::path& folder, const PartOptions& options, const Progress& progress) {
+fs::path makeParts(const FaceList& mesh, const fs::path& folder, const PartOptions& options,
+                   const Progress& progress) try {
   if (options.insideTest != InsideTest::automatic && options.insideTest != InsideTest::pseudonormal)
     throw Error(ErrorKind::option, "inside test",
                 "a mesh that is not in memory has its sign from pseudonormals: choose automatic or pseudonormal");
   if (!fs::is_directory(folder)) throw Error(ErrorKind::file, folder.string(), "is not a folder; make it first");
-  const Source source = survey(mesh, progress);
   const bool isTested = options.insideTest == InsideTest::automatic;
+  const Source source = survey(mesh, isTested, progress);
   const fs::path parts = folder / (hexText(source.fingerprint) + (isTested ? "-tested" : "-trusted"));
   if (fs::exists(parts)) return parts;
 
@@ -339,6 +355,8 @@ fs::path makeParts(const FaceList& mesh, const fs::path& folder, const PartOptio
   divideInto(made.path(), mesh, source, options, progress);
   made.commit();
   return parts;
+} catch (const fs::filesystem_error& error) {
+  throw Error(ErrorKind::file, error.path1().string(), "cannot be used: " + error.code().message());
 }
 
 }  // namespace hpsdf::parts

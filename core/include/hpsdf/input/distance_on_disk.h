@@ -17,19 +17,24 @@ struct DistanceOnDiskOptions {
   /// `automatic`, which tests that pseudonormals tell the sign and refuses a mesh where they do not, or `pseudonormal`,
   /// which trusts them.
   InsideTest insideTest = InsideTest::automatic;
-  std::size_t facesOfPart = 0;  ///< most triangles of a part; 0 for a 256th of the mesh, or 65,536 if that is more
-  std::size_t memory = 0;       ///< most bytes of parts mapped into memory at once; 0 for half of `allowedMemory`
-  int threads = 0;              ///< greatest number of threads while parts are made, 0 for all
+  /// Most triangles of a part, unless they share a cell of a grid of 128³ cells around the mesh; 0 for a 256th of the
+  /// mesh, or 65,536 if that is more.
+  std::size_t facesOfPart = 0;
+  /// Bytes of parts that stay mapped into memory, at most half of `allowedMemory`; 0 for that. Each thread may use one
+  /// part more.
+  std::size_t memory = 0;
+  int threads = 0;  ///< greatest number of threads while parts are made, 0 for all
 };
 
-/// Exact signed distance to a triangle mesh that need not fit into memory. It equals `ExactDistance` to the bit, where
-/// that takes the sign from pseudonormals.
+/// Exact signed distance to a triangle mesh that need not fit into memory. At finite points it equals `ExactDistance`
+/// to the bit, where that takes the sign from pseudonormals.
 ///
 /// The mesh is divided by place into parts. Each part has a hierarchy of its own triangles and of those that meet their
 /// box, so that all connectivity around its own triangles is at hand. The parts are written to files, some 150 bytes
 /// for each triangle. A query maps into memory the parts that may hold the nearest triangle, nearest first; parts that
 /// no query has used for longest are unmapped where the parts exceed the memory. While parts are made, memory is needed
-/// for one part, four bytes a triangle and, for a mesh in memory, the mesh.
+/// for one part (some 300 bytes for each of its triangles), for 64 kB of each part's list, for four bytes a triangle
+/// and, for a mesh in memory, the mesh. A triangle that is large beside the parts makes its part large.
 ///
 /// The parts lie in a folder of their own within the given folder, named by the mesh's fingerprint. The folder of parts
 /// appears whole or not at all, and is used again for the same mesh: by another construction, or by several processes
@@ -39,21 +44,23 @@ struct DistanceOnDiskOptions {
 class DistanceOnDisk {
  public:
   /// Divides a mesh in memory, to which no reference is kept. Throws `Error` of the kind `mesh`
-  /// - for a mesh without triangles, with indices out of range, with coordinates that are not finite, with triangles
-  /// that
-  ///   have no area, with vertices of equal position or that no triangle uses, or with a negative volume: such a mesh
-  ///   must be cleaned first (`hpsdf::cleaned`, `hpsdf mesh --repair`);
-  /// - for the automatic inside test, if the mesh has holes, intersects itself, has several components, or edges too
-  ///   sharp for normals.
+  /// - for a mesh without triangles, with indices out of range or with coordinates that are not finite;
+  /// - for triangles that have no area, and vertices of equal position or that no triangle uses: such a mesh must be
+  ///   cleaned first (`hpsdf::cleaned`, `hpsdf mesh --repair`);
+  /// - for the automatic inside test, if the mesh has holes, intersects itself, has several components or a negative
+  ///   volume, or edges too sharp for normals.
   /// Throws `Error` of the kind `option` for another inside test, of the kind `limit` where the disk has not enough
-  /// free space, and of the kind `file` if a file cannot be written or read. Throws `Cancelled` when `progress` says
-  /// so.
+  /// free space or a part does not fit into memory, and of the kind `file` if a file cannot be written or read. Throws
+  /// `Cancelled` when `progress` says so.
   DistanceOnDisk(const TriangleMesh& mesh, const std::filesystem::path& folder,
                  const DistanceOnDiskOptions& options = {}, const Progress& progress = {});
   /// Divides the mesh of a PLY file of which `isMappable` is true, without reading it into memory. Throws as the other
   /// constructor does, also for faces that are not triangles.
   DistanceOnDisk(const std::filesystem::path& file, const std::filesystem::path& folder,
                  const DistanceOnDiskOptions& options = {}, const Progress& progress = {});
+  /// Opens the folder of parts that another object has made (`folder()`), with the same inside test. Throws `Error` (of
+  /// the kind `file`) if it is missing or damaged.
+  static DistanceOnDisk open(const std::filesystem::path& parts, const DistanceOnDiskOptions& options = {});
   ~DistanceOnDisk();
   DistanceOnDisk(DistanceOnDisk&&) noexcept;
   DistanceOnDisk& operator=(DistanceOnDisk&&) noexcept;
@@ -79,6 +86,7 @@ class DistanceOnDisk {
 
  private:
   struct Data;
+  explicit DistanceOnDisk(std::unique_ptr<const Data> data);
   std::unique_ptr<const Data> data_;
 };
 

@@ -53,11 +53,11 @@ std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance
                                   const BuildOptions& options, const Checkpoint* checkpoint = nullptr,
                                   const Progress& progress = {});
 
-/// Waits until all ranks have called this function. Throws `Error` on all of them if one has called `failBefore`
-/// instead; none of them calls another function of ranks then.
-void waitForAll(Ranks& ranks);
+/// Returns, on all ranks, the text that rank 0 passes. Waits until all ranks have called this function. Throws `Error`
+/// on all of them if one has called `failBefore` instead; none of them calls another function of ranks then.
+std::string textOfFirst(Ranks& ranks, const std::string& text);
 
-/// Tells the other ranks that this one fails before it calls `buildByRanks`. They call that function or `waitForAll`,
+/// Tells the other ranks that this one fails before it calls `buildByRanks`. They call that function or `textOfFirst`,
 /// which throw, or this one.
 void failBefore(Ranks& ranks, const std::string& why);
 

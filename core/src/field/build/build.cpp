@@ -1,12 +1,14 @@
 #include "hpsdf/build.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <exception>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "field/build/checkpoint_file.h"
 #include "field/build/construction.h"
@@ -99,7 +101,11 @@ std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance
   }
 }
 
-void waitForAll(Ranks& ranks) { Shares(ranks).gatherAll({}); }
+std::string textOfFirst(Ranks& ranks, const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  const std::vector<std::byte> first = Shares(ranks).fromFirst({bytes.begin(), bytes.end()});
+  return {reinterpret_cast<const char*>(first.data()), first.size()};
+}
 
 void failBefore(Ranks& ranks, const std::string& why) { Shares(ranks).fail(why); }
 
