@@ -10,7 +10,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <random>
@@ -22,12 +21,14 @@
 #include "hpsdf/field_file.h"
 #include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
+#include "support/message_of.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
 namespace {
 
 namespace fs = std::filesystem;
+using support::messageOf;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -67,15 +68,6 @@ std::vector<Vector3> pointsAround(const TriangleMesh& mesh) {
 std::string contentsOf(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-std::string messageOf(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(DistanceOnDisk, EqualsTheDistanceInMemory) {

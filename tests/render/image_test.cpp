@@ -8,11 +8,13 @@
 #include <string>
 
 #include "hpsdf/error.h"
+#include "support/message_of.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf::render {
 namespace image_test {
 
+using support::messageOf;
 using support::TemporaryDirectory;
 
 Image noise(int width, int height, unsigned seed) {
@@ -26,15 +28,6 @@ Image noise(int width, int height, unsigned seed) {
 std::string bytesOf(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-std::string messageOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
 }
 
 TEST(Image, returnsUnchangedFromPng) {

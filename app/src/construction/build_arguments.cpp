@@ -169,15 +169,14 @@ std::vector<Parameter> checkpointParameters() {
 }
 
 Parameter outOfCoreParameter() {
-  return {"out-of-core", file("DIR").under(kFiles),
-          "Divides a mesh that does not fit into memory into parts, in this folder, some 150 bytes a face, and reads "
-          "those that distances ask for: at most half of memory-limit at once. The parts stay there for the next field "
-          "of the mesh. A binary PLY file of triangles, without properties of faces, is never loaded as a whole. There "
-          "are no exact "
-          "leaves, and the estimator checks no points of the surface; with --strategy hp --estimator embedded the "
-          "octree is that of the mesh in memory, to the bit. The mesh must be clean, closed and in one piece, or its "
-          "normals "
-          "be trusted by --sign pseudonormal."};
+  return {
+      "out-of-core", file("DIR").under(kFiles),
+      "Divides a mesh that does not fit into memory into parts, in this folder, some 150 bytes a face, and reads "
+      "those that distances ask for: at most half of memory-limit at once. The parts stay there for the next field "
+      "of the mesh. A binary PLY file of triangles, without properties of faces, is never loaded as a whole. There "
+      "are no exact leaves, and the estimator checks no points of the surface; with --strategy hp --estimator "
+      "embedded the octree is that of the mesh in memory, to the bit. The mesh must be clean. It must also be closed "
+      "and in one piece, unless --sign pseudonormal trusts its normals."};
 }
 
 std::vector<std::string> endParameters(std::initializer_list<BuildSetting::Ending> endings) {

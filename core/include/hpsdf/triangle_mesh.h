@@ -42,6 +42,8 @@ inline std::array<Vector3, 3> cornersOf(const TriangleMesh& mesh, const Triangle
 /// Throws `Error` (of the kind `mesh`) if a triangle refers to a vertex that does not exist. The message names the
 /// first such triangle.
 void requireValidIndices(const TriangleMesh& mesh);
+/// Throws this `Error` for one triangle, with this index, of the mesh `name`, which has so many vertices.
+void requireValidIndices(const std::string& name, std::size_t index, const Triangle& triangle, std::size_t vertices);
 
 /// Returns the smallest box around the vertices that triangles use. The box is empty for a mesh without
 /// triangles.

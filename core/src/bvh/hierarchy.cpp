@@ -150,17 +150,24 @@ std::vector<Eigen::Array4f> localPoints(const Hierarchy& hierarchy, std::span<co
 
 }  // namespace
 
-void requireSurface(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) detail::refuseMesh(mesh.name, "no faces; a distance needs at least one triangle");
-  if (mesh.triangles.size() > Hierarchy::kMaxTriangles)
-    detail::refuseMesh(mesh.name, mesh.triangles.size(), " faces are more than the ", Hierarchy::kMaxTriangles,
+void requireFaceCount(const std::string& name, std::size_t faces) {
+  if (faces == 0) detail::refuseMesh(name, "no faces; a distance needs at least one triangle");
+  if (faces > Hierarchy::kMaxTriangles)
+    detail::refuseMesh(name, faces, " faces are more than the ", Hierarchy::kMaxTriangles,
                        " that a distance takes; simplify the mesh first");
+}
+
+void requireFinite(const std::string& name, std::size_t index, const Vector3& vertex) {
+  if (!(vertex.cwiseAbs().array() <= kLargestCoordinate).all())
+    detail::refuseMesh(
+        name, "vertex ", index + 1,
+        " has a coordinate that is not a finite number (or beyond 1e100); repair or export the mesh again");
+}
+
+void requireSurface(const TriangleMesh& mesh) {
+  requireFaceCount(mesh.name, mesh.triangles.size());
   requireValidIndices(mesh);
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    if (!(mesh.vertices[v].cwiseAbs().array() <= kLargestCoordinate).all())
-      detail::refuseMesh(
-          mesh.name, "vertex ", v + 1,
-          " has a coordinate that is not a finite number (or beyond 1e100); repair or export the mesh again");
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) requireFinite(mesh.name, v, mesh.vertices[v]);
 }
 
 Hierarchy::Hierarchy(const TriangleMesh& mesh, const Box& box) {

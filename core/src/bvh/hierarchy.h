@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include "bvh/triangle_frame.h"
 #include "bvh/triangle_tree.h"
@@ -17,6 +18,9 @@ namespace hpsdf::bvh {
 /// Throws `Error` of kind `mesh` unless the mesh has from 1 to `Hierarchy::kMaxTriangles` triangles, valid vertex
 /// indices, and finite coordinates up to `kLargestCoordinate`.
 void requireSurface(const TriangleMesh& mesh);
+/// Throw the same `Error` for the number of faces of the mesh `name`, and for its vertex with this index.
+void requireFaceCount(const std::string& name, std::size_t faces);
+void requireFinite(const std::string& name, std::size_t index, const Vector3& vertex);
 
 /// The triangle of a mesh that is nearest to a query point.
 struct Nearest {

@@ -200,11 +200,11 @@ struct ExactDistance::Data {
       reduceToOuterHull(mesh, progress);
     }
     source.insideTest = inside.choice.insideTest;
-    far = FarPoints(source.box);
+    far = FarPoints(source.box, source.thickness / 2);
     // Chosen pseudonormals tell the same sign all around the mesh.
     if (options.insideTest == InsideTest::automatic && source.insideTest == InsideTest::pseudonormal) {
       const Vector3 x = far.pointAround();
-      isInsideAround = resolve(hierarchy, x, nearestTriangle(hierarchy, x)).signedDistance < 0;
+      far.setSideAround(resolve(hierarchy, x, nearestTriangle(hierarchy, x)).signedDistance < 0);
     }
     signs.emplace(hierarchy, source.insideTest, inside.winding);
     candidates.emplace(hierarchy, *signs, source.thickness / 2);
@@ -300,17 +300,9 @@ struct ExactDistance::Data {
     });
   }
 
-  /// Gives all points around a mesh the same side. Pseudonormals do not tell it far away, where the triangles of two
-  /// walls are equally near to rounding.
-  void applySideAround(std::span<const Vector3> points, std::span<double> distances) const {
-    if (!isInsideAround) return;
-    for (std::size_t i = 0; i < points.size(); ++i)
-      if (far.isAround(points[i])) distances[i] = std::copysign(distances[i], *isInsideAround ? -1 : 1);
-  }
-
   /// Turns the distances from `toTriangles` into signed distances according to the chosen inside test.
   void applyInsideTest(std::span<const Vector3> points, std::span<double> distances) const {
-    if (inside.choice.insideTest == InsideTest::pseudonormal) return applySideAround(points, distances);
+    if (inside.choice.insideTest == InsideTest::pseudonormal) return far.applySideAround(points, distances);
     for (double& distance : distances) distance = std::abs(distance) - source.thickness / 2;
     if (inside.choice.insideTest == InsideTest::outerHull) {
       // Compute the distances to the whole mesh, which count for points outside. A triangle that is nearer than the
@@ -333,28 +325,10 @@ struct ExactDistance::Data {
 
   /// Evaluates the signed distances of any points, and the gradients of the unsigned ones unless `directions` is empty.
   void evaluate(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> directions = {}) const {
-    if (!far.areAnyFar(points)) return evaluateNear(points, out, directions);
-    const std::vector<Vector3> nearer = far.nearer(points);
-    evaluateNear(nearer, out, directions);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!far.isFar(points[i])) continue;
-      if (!directions.empty()) directions[i] = continuedDirection(directions[i], out[i], points[i], nearer[i]);
-      out[i] = continued(out[i], points[i], nearer[i]);
-    }
-  }
-
-  /// Returns the signed distance of a far point x from that of its nearer point.
-  double continued(double distance, const Vector3& x, const Vector3& nearer) const {
-    const bool isInside = distance < 0 && inside.choice.insideTest != InsideTest::shell;
-    return FarPoints::continued(distance, isInside, x, nearer);
-  }
-
-  /// Returns the unit vector to a far point x from the triangle nearest to it. Its nearer point has this signed
-  /// distance and this direction.
-  Vector3 continuedDirection(const Vector3& direction, double distance, const Vector3& x, const Vector3& nearer) const {
-    const double toTriangle =
-        inside.choice.insideTest == InsideTest::shell ? distance + source.thickness / 2 : std::abs(distance);
-    return FarPoints::continuedDirection(direction, toTriangle, x, nearer);
+    far.evaluate(points, out, directions,
+                 [&](std::span<const Vector3> some, std::span<double> distances, std::span<Vector3> theirs) {
+                   evaluateNear(some, distances, theirs);
+                 });
   }
 
   /// Finds the closest points of points, none of which is far.
@@ -391,7 +365,6 @@ struct ExactDistance::Data {
   std::vector<std::uint32_t> hullSlots;  ///< slot in `wholeMesh` of each hull triangle's source; only for an outer hull
   ChosenInsideTest inside;
   FarPoints far;
-  std::optional<bool> isInsideAround;  ///< the side of all points around the mesh; only for chosen pseudonormals
   std::optional<distance::ExactLeafSigns> signs;
   std::optional<distance::CandidateSearch> candidates;
   mutable std::atomic<const WindingSign*> winding = nullptr;  ///< is `preparedWinding_` once this is complete
@@ -452,7 +425,7 @@ ClosestPoint ExactDistance::closestPoint(const Vector3& x) const {
   const Vector3 nearer = data_->far.nearer(x);
   ClosestPoint closest = data_->closestOf(nearer, nearestTriangle(data_->hierarchy, nearer));
   data_->applyInsideTest({&nearer, 1}, {&closest.signedDistance, 1});
-  if (data_->far.isFar(x)) closest.signedDistance = data_->continued(closest.signedDistance, x, nearer);
+  if (data_->far.isFar(x)) closest.signedDistance = data_->far.continued(closest.signedDistance, x, nearer);
   return closest;
 }
 
@@ -463,7 +436,7 @@ void ExactDistance::closestPoints(std::span<const Vector3> points, std::span<Clo
     data_->closestPointsNear(nearer, out);
     for (std::size_t i = 0; i < points.size(); ++i)
       if (data_->far.isFar(points[i]))
-        out[i].signedDistance = data_->continued(out[i].signedDistance, points[i], nearer[i]);
+        out[i].signedDistance = data_->far.continued(out[i].signedDistance, points[i], nearer[i]);
   } else {
     data_->closestPointsNear(points, out);
   }

@@ -7,7 +7,7 @@
 #include <span>
 
 #include "hpsdf/error.h"
-#include "util/checked_file.h"
+#include "mesh/mesh_fingerprint.h"
 #include "util/refuse.h"
 
 namespace hpsdf {
@@ -25,12 +25,16 @@ double longestSide(const Box& surface, const std::string& subject) {
 
 }  // namespace
 
+void requireValidIndices(const std::string& name, std::size_t index, const Triangle& triangle, std::size_t vertices) {
+  for (const std::uint32_t v : triangle)
+    if (v >= vertices)
+      detail::refuseMesh(name, "face ", index + 1, " refers to vertex ", std::uint64_t{v} + 1, ", but there are only ",
+                         vertices, "; repair or export the mesh again");
+}
+
 void requireValidIndices(const TriangleMesh& mesh) {
   for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
-    for (const std::uint32_t v : mesh.triangles[f])
-      if (v >= mesh.vertices.size())
-        detail::refuseMesh(mesh.name, "face ", f + 1, " refers to vertex ", std::uint64_t{v} + 1,
-                           ", but there are only ", mesh.vertices.size(), "; repair or export the mesh again");
+    requireValidIndices(mesh.name, f, mesh.triangles[f], mesh.vertices.size());
 }
 
 Box boundingBox(const TriangleMesh& mesh) {
@@ -70,15 +74,10 @@ double surfaceArea(const TriangleMesh& mesh) {
 }
 
 std::uint64_t fingerprint(const TriangleMesh& mesh) {
-  detail::Checksum checksum;
-  checksum.add(detail::bytesOf(std::uint64_t{mesh.vertices.size()}));
-  checksum.add(detail::bytesOf(std::uint64_t{mesh.triangles.size()}));
-  for (const Vector3& vertex : mesh.vertices) {
-    const Vector3 v = vertex.array() + 0.0;  // Adding 0 turns -0 into 0, so that equal positions have equal bits.
-    checksum.add(std::as_bytes(std::span(v.data(), 3)));
-  }
-  checksum.add(std::as_bytes(std::span(mesh.triangles)));
-  return checksum.value();
+  mesh::MeshFingerprint fingerprint(mesh.vertices.size(), mesh.triangles.size());
+  for (const Vector3& vertex : mesh.vertices) fingerprint.add(vertex);
+  fingerprint.add(mesh.triangles);
+  return fingerprint.value();
 }
 
 Normalization normalizationOf(const Box& surface) { return {surface.center(), 2 / longestSide(surface, "")}; }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -109,7 +108,7 @@ struct DistanceOnDisk::Data {
     const Vector3 x = far.pointAround();
     double distance = 0;
     toTriangles({&x, 1}, {&distance, 1}, {});
-    isInsideAround = distance < 0;
+    far.setSideAround(distance < 0);
   }
 
   static std::size_t memoryOf(const DistanceOnDiskOptions& options) {
@@ -120,22 +119,11 @@ struct DistanceOnDisk::Data {
   /// Computes signed distances, as `ExactDistance` does, and the directions from the nearest triangles unless
   /// `directions` is empty.
   void evaluate(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> directions) const {
-    if (!far.areAnyFar(points)) return evaluateNear(points, out, directions);
-    const std::vector<Vector3> nearer = far.nearer(points);
-    evaluateNear(nearer, out, directions);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!far.isFar(points[i])) continue;
-      if (!directions.empty())
-        directions[i] = FarPoints::continuedDirection(directions[i], std::abs(out[i]), points[i], nearer[i]);
-      out[i] = FarPoints::continued(out[i], out[i] < 0, points[i], nearer[i]);
-    }
-  }
-
-  void evaluateNear(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> directions) const {
-    toTriangles(points, out, directions);
-    if (!isInsideAround) return;
-    for (std::size_t i = 0; i < points.size(); ++i)
-      if (far.isAround(points[i])) out[i] = std::copysign(out[i], *isInsideAround ? -1 : 1);
+    far.evaluate(points, out, directions,
+                 [&](std::span<const Vector3> some, std::span<double> distances, std::span<Vector3> theirs) {
+                   toTriangles(some, distances, theirs);
+                   far.applySideAround(some, distances);
+                 });
   }
 
   void toTriangles(std::span<const Vector3> points, std::span<double> out, std::span<Vector3> directions) const {
@@ -221,7 +209,6 @@ struct DistanceOnDisk::Data {
   std::size_t memory;
   mutable parts::MappedParts mapped;
   FarPoints far;
-  std::optional<bool> isInsideAround;  ///< the side of all points around the mesh, unless signs are trusted
 };
 
 namespace {

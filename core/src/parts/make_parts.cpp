@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <fstream>
 #include <optional>
 #include <span>
@@ -19,12 +18,13 @@
 #include "distance/exact_leaf_signs.h"
 #include "hpsdf/detail/memory.h"
 #include "mesh/connectivity.h"
+#include "mesh/mesh_fingerprint.h"
 #include "parts/division.h"
 #include "parts/mesh_part.h"
 #include "parts/part_index.h"
 #include "sign/pseudonormals.h"
 #include "surface/crossings.h"
-#include "util/checked_file.h"
+#include "util/number_text.h"
 #include "util/refuse.h"
 
 namespace hpsdf::parts {
@@ -44,14 +44,6 @@ struct ListedFace {
   std::uint32_t face;  ///< as in `MeshPart::faces`
   Triangle corners;    ///< indices of vertices of the whole mesh
 };
-
-/// Returns 16 hexadecimal digits.
-std::string hexText(std::uint64_t number) {
-  std::array<char, 16> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number, 16).ptr;
-  const std::string text(digits.data(), end);
-  return std::string(digits.size() - text.size(), '0') + text;
-}
 
 Vector3 centroidOf(const std::array<Vector3, 3>& corners) { return (corners[0] + corners[1] + corners[2]) / 3; }
 
@@ -82,40 +74,27 @@ void forEachFace(const FaceList& mesh, const Progress& progress, std::string_vie
 /// Reads the whole mesh once. Returns its description, and throws `Error` for faults that its numbers show.
 Source survey(const FaceList& mesh, bool isTested, const Progress& progress) {
   const std::size_t vertices = mesh.vertices(), faces = mesh.faces();
-  if (faces == 0) detail::refuseMesh(mesh.name(), "no faces; a distance needs at least one triangle");
-  if (faces > bvh::Hierarchy::kMaxTriangles)
-    detail::refuseMesh(mesh.name(), faces, " faces are more than the ", bvh::Hierarchy::kMaxTriangles,
-                       " that a distance takes; simplify the mesh first");
+  bvh::requireFaceCount(mesh.name(), faces);
   Source source{.name = mesh.name(), .vertices = vertices, .faces = faces, .insideTest = InsideTest::pseudonormal};
-  // The fingerprint of `hpsdf::fingerprint`.
-  detail::Checksum checksum;
-  checksum.add(detail::bytesOf(std::uint64_t{vertices}));
-  checksum.add(detail::bytesOf(std::uint64_t{faces}));
+  mesh::MeshFingerprint fingerprint(vertices, faces);
   for (std::size_t v = 0; v < vertices; ++v) {
     if (v % kFacesAtOnce == 0) progress.throwIfCancelled();
-    const Vector3 x = mesh.vertex(v).array() + 0.0;
-    if (!(x.cwiseAbs().array() <= kLargestCoordinate).all())
-      detail::refuseMesh(mesh.name(), "vertex ", v + 1,
-                         " has a coordinate that is not a finite number (or beyond 1e100); repair or export the mesh "
-                         "again");
-    checksum.add(std::as_bytes(std::span(x.data(), 3)));
+    const Vector3 x = mesh.vertex(v);
+    bvh::requireFinite(mesh.name(), v, x);
+    fingerprint.add(x);
     source.box.extend(x);
   }
   std::vector<bool> isUsed(vertices);
   const Vector3 center = source.box.center();
   double volume = 0;
   forEachFace(mesh, progress, "reading the mesh", [&](std::size_t f, const Triangle& face) {
-    for (const std::uint32_t corner : face) {
-      if (corner >= vertices)
-        detail::refuseMesh(mesh.name(), "face ", f + 1, " refers to vertex ", std::uint64_t{corner} + 1, ", but only ",
-                           vertices, " exist");
-      isUsed[corner] = true;
-    }
+    requireValidIndices(mesh.name(), f, face, vertices);
+    for (const std::uint32_t corner : face) isUsed[corner] = true;
     const auto [a, b, c] = cornersOf(mesh, face);
     volume += (a - center).dot((b - center).cross(c - center));
-    checksum.add(std::as_bytes(std::span(face)));
+    fingerprint.add(std::span(&face, 1));
   });
-  source.fingerprint = checksum.value();
+  source.fingerprint = fingerprint.value();
   if (const auto unused = std::ranges::find(isUsed, false); unused != isUsed.end())
     detail::refuseMesh(mesh.name(), "vertex ", unused - isUsed.begin() + 1, " belongs to no face", kAdvice);
   if (isTested && volume < 0) detail::refuseMesh(mesh.name(), "the faces point inward", kAdvice);
@@ -219,7 +198,8 @@ class SignTest {
     for (std::uint32_t slot = 0; slot < part.faces.size(); ++slot)
       if (part.isOwn(slot) && sign::isSharp(part.hierarchy, part.normals, slot))
         refuse(part, slot, "has an edge or a corner that is too sharp for normals");
-    // What counts as too near is relative to the largest coordinate, here of the part, in the test to that of the mesh.
+    // `findCrossings` takes a distance relative to the largest coordinate of its triangles, which are those of the
+    // part.
     Box box;
     for (const Vector3& vertex : part.hierarchy.vertices()) box.extend(vertex);
     const double tooNear = distance::kTooNear * std::max(1.0, largest_ / largestCoordinate(box));
@@ -343,7 +323,7 @@ fs::path makeParts(const FaceList& mesh, const fs::path& folder, const PartOptio
   if (!fs::is_directory(folder)) throw Error(ErrorKind::file, folder.string(), "is not a folder; make it first");
   const bool isTested = options.insideTest == InsideTest::automatic;
   const Source source = survey(mesh, isTested, progress);
-  const fs::path parts = folder / (hexText(source.fingerprint) + (isTested ? "-tested" : "-trusted"));
+  const fs::path parts = folder / (detail::hexText(source.fingerprint) + (isTested ? "-tested" : "-trusted"));
   if (fs::exists(parts)) return parts;
 
   const double needed = kDiskBytesPerFace * double(mesh.faces()), free = double(fs::space(folder).available);

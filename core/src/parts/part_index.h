@@ -9,7 +9,7 @@
 
 namespace hpsdf::parts {
 
-/// What is known of a mesh in parts without reading them.
+/// The description of a mesh in parts, which tells where they lie without reading them.
 struct PartIndex {
   struct Part {
     Box box;  ///< of the part's own triangles

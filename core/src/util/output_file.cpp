@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "hpsdf/error.h"
+#include "util/number_text.h"
 
 namespace hpsdf {
 namespace {
@@ -53,10 +54,7 @@ const std::string& thisMachine() {
     std::error_code ignored;
     const std::string machine =
         std::string(name.data()) + std::filesystem::read_symlink("/proc/self/ns/pid", ignored).string();
-    std::array<char, 17> digits{};
-    std::snprintf(digits.data(), digits.size(), "%016llx",
-                  static_cast<unsigned long long>(XXH3_64bits(machine.data(), machine.size())));
-    return std::string(digits.data(), 8);
+    return detail::hexText(XXH3_64bits(machine.data(), machine.size())).substr(0, 8);
   }();
   return hash;
 }
