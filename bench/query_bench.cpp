@@ -106,10 +106,10 @@ class Reads {
     const auto [first, bytes] = std::visit(
         [&](const auto& c) -> std::pair<const char*, std::size_t> {
           if constexpr (requires { c.bytes; })
-            return {reinterpret_cast<const char*>(&c.bytes[node::offset(leaf)]), 1};
+            return {reinterpret_cast<const char*>(c.bytes.at(node::offset(leaf), 1)), 1};
           else
-            return {reinterpret_cast<const char*>(&c[node::offset(leaf)]),
-                    coefficientCount(node::degree(leaf)) * sizeof(c[0])};
+            return {reinterpret_cast<const char*>(c.at(node::offset(leaf), 1)),
+                    coefficientCount(node::degree(leaf)) * sizeof(*c.data())};
         },
         field.data().coefficients);
     for (std::size_t n = 0; n < read.lines.size(); ++n) read.lines[n] = first + std::min(64 * n, bytes - 1);

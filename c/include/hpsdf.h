@@ -183,6 +183,11 @@ HPSDF_API hpsdf_status hpsdf_build_function(hpsdf_function function, void* user,
 /* Reads a field from a .hpsdf file, which is not needed afterwards. */
 HPSDF_API hpsdf_status hpsdf_field_load(const char* file, hpsdf_field** field);
 
+/* Like hpsdf_field_load, but the field stays in the file, and its coefficients are read and checked only where they are
+ * needed: for fields that are larger than the memory. The file must be uncompressed, and must not be changed while the
+ * field exists. Functions that work on the field fail with HPSDF_FILE_ERROR where the file is damaged. */
+HPSDF_API hpsdf_status hpsdf_field_map(const char* file, hpsdf_field** field);
+
 /* Writes a field as a .hpsdf file, whole or not at all. If compress is not 0, the file is smaller, and writing takes
  * longer. */
 HPSDF_API hpsdf_status hpsdf_field_save(const hpsdf_field* field, const char* file, int compress);

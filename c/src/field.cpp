@@ -16,6 +16,13 @@ hpsdf_status hpsdf_field_load(const char* file, hpsdf_field** field) {
   });
 }
 
+hpsdf_status hpsdf_field_map(const char* file, hpsdf_field** field) {
+  return c::create(field, "field", [&] {
+    c::requirePointer(file, "file");
+    return load(file, Loading::mapped);
+  });
+}
+
 hpsdf_status hpsdf_field_save(const hpsdf_field* field, const char* file, int compress) {
   return c::guarded([&] {
     c::requirePointer(field, "field");

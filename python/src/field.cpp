@@ -127,19 +127,19 @@ py::array domain(const Field& field) {
 
 /// Returns a read-only array that refers to the memory of `owner`.
 template <typename Number>
-py::array viewOf(const std::vector<Number>& numbers, const py::object& owner) {
+py::array viewOf(std::span<const Number> numbers, const py::object& owner) {
   py::array_t<Number> view(static_cast<py::ssize_t>(numbers.size()), numbers.data(), owner);
   view.attr("flags").attr("writeable") = false;
   return view;
 }
 
-py::array nodes(const py::object& self) { return viewOf(self.cast<const Field&>().data().nodes, self); }
+py::array nodes(const py::object& self) { return viewOf(std::span(self.cast<const Field&>().data().nodes), self); }
 
 py::array coefficients(const py::object& self) {
   const auto& stored = self.cast<const Field&>().data().coefficients;
-  if (const auto* doubles = std::get_if<std::vector<double>>(&stored)) return viewOf(*doubles, self);
-  if (const auto* floats = std::get_if<std::vector<float>>(&stored)) return viewOf(*floats, self);
-  return viewOf(std::get<QuantizedCoefficients>(stored).bytes, self);
+  if (const auto* doubles = std::get_if<FieldArray<double>>(&stored)) return viewOf(doubles->all(), self);
+  if (const auto* floats = std::get_if<FieldArray<float>>(&stored)) return viewOf(floats->all(), self);
+  return viewOf(std::get<QuantizedCoefficients>(stored).bytes.all(), self);
 }
 
 std::string description(const Field& field) {
@@ -152,8 +152,9 @@ void saved(const Field& field, const std::filesystem::path& path, bool compress)
   save(field, path, {.compress = compress});
 }
 
-std::shared_ptr<Field> loadedField(const std::filesystem::path& path) {
-  return std::make_shared<Field>(resultOf(py::none(), [&](const Progress&) { return load(path); }));
+std::shared_ptr<Field> loadedField(const std::filesystem::path& path, bool mapped) {
+  const Loading loading = mapped ? Loading::mapped : Loading::resident;
+  return std::make_shared<Field>(resultOf(py::none(), [&](const Progress&) { return load(path, loading); }));
 }
 
 }  // namespace
@@ -199,8 +200,11 @@ FieldClass addField(py::module_& module) {
       .def_property_readonly("domain", &domain, "The lower and the upper corner of the domain: float64, shape (2, 3).")
       .def_property_readonly("nbytes", &Field::bytes, "The bytes of memory that the field takes.")
       .def("__repr__", &description);
-  module.def("load", &loadedField, "path"_a,
-             "Reads a field from a .hpsdf file. The file is not needed afterwards. Raises FileError (an OSError).");
+  module.def("load", &loadedField, "path"_a, py::kw_only(), "mapped"_a = false,
+             "Reads a field from a .hpsdf file. The file is not needed afterwards. With mapped, the field stays in the "
+             "file, which must be uncompressed and must not be changed: its coefficients are read and checked only "
+             "where they are needed, so that it may be larger than the memory. Raises FileError (an OSError), for a "
+             "mapped field also where it is used.");
   return fields;
 }
 

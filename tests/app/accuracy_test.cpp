@@ -45,7 +45,7 @@ void writeField(const fs::path& file, double offset) {
   const ExactDistance exact(mesh);
   const BuildOptions options{.targetError = 1e-4, .strategy = Strategy::hp, .coefficients = CoefficientType::float64};
   FieldData data = build(exact, domainAround(mesh), options).data();
-  auto& coefficients = std::get<std::vector<double>>(data.coefficients);
+  auto& coefficients = std::get<FieldArray<double>>(data.coefficients).values();
   for (const std::uint64_t node : data.nodes)
     if (node::isLeaf(node)) coefficients[node::offset(node)] += offset;
   save(Field(std::move(data)), file);

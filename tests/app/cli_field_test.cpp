@@ -360,7 +360,7 @@ TEST_F(FieldFile, badFieldFilesAreRefused) {
     variant("altered" + std::to_string(byte) + ".hpsdf", altered);
   }
   std::string version = good;
-  version[8] = 12;  // docs/file-format.md: the version follows 8 bytes of magic, and 11 is the greatest
+  version[8] = 13;  // docs/file-format.md: the version follows 8 bytes of magic, and 12 is the greatest
   variant("newer.hpsdf", version);
   fs::create_directory(at("folder.hpsdf"));
   const auto before = namesIn(folder_.path());
@@ -369,7 +369,7 @@ TEST_F(FieldFile, badFieldFilesAreRefused) {
     expectRefused({{"slice", at(name), "-o", at("s.png"), "--cpu"}}, name, before);
     expectRefused({{"query", at(name), "-o", at("q.csv")}, "0 0 0\n"}, name, before);
   }
-  expectRefused({{"info", at("newer.hpsdf")}}, "version 12", before);
+  expectRefused({{"info", at("newer.hpsdf")}}, "version 13", before);
   expectRefused({{"info", at("missing.hpsdf")}}, "missing.hpsdf", before);
 }
 

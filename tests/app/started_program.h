@@ -40,6 +40,7 @@ struct Call {
   bool stdoutClosed = false;       ///< true if the reading end of the standard output pipe is closed
   bool keepInputOpen = false;      ///< true if standard input stays open for `Process::type`
   std::size_t stackKilobytes = 0;  ///< limit of the stack's size; if 0, that of the caller
+  std::size_t addressKilobytes = 0;  ///< limit of the address space's size; if 0, that of the caller
 };
 
 inline std::size_t lineCount(const std::string& text) {
@@ -167,8 +168,11 @@ class Process {
  private:
   int spawn(const Call& call, const posix_spawn_file_actions_t& actions, const posix_spawnattr_t& attributes) {
     std::vector<std::string> words = {HPSDF_PROGRAM};
-    if (call.stackKilobytes > 0)  // a shell sets the limit and then becomes the program
-      words = {"/bin/sh", "-c", "ulimit -s \"$0\" && exec \"$@\"", std::to_string(call.stackKilobytes), HPSDF_PROGRAM};
+    std::string limits;
+    if (call.stackKilobytes > 0) limits += "ulimit -s " + std::to_string(call.stackKilobytes) + " && ";
+    if (call.addressKilobytes > 0) limits += "ulimit -v " + std::to_string(call.addressKilobytes) + " && ";
+    if (!limits.empty())  // a shell sets the limits and then becomes the program
+      words = {"/bin/sh", "-c", limits + "exec \"$@\"", "sh", HPSDF_PROGRAM};
     const std::string program = words.front();
     words.insert(words.end(), call.words.begin(), call.words.end());
     std::vector<std::string> variables;

@@ -123,11 +123,12 @@ TEST(CInterface, fieldsOfMeshesAndFilesAreThoseOfCpp) {
   const std::string file = folder / "torus.hpsdf", smallFile = folder / "small.hpsdf";
   const MeshHandle mesh = torus();
   const OptionsHandle options = optionsWith({{"tolerance", "2%"}, {"threads", "1"}});
-  hpsdf_field *field = nullptr, *loaded = nullptr;
+  hpsdf_field *field = nullptr, *loaded = nullptr, *mapped = nullptr;
   expectOk(hpsdf_build_mesh(mesh.get(), nullptr, options.get(), nullptr, &field));
   expectOk(hpsdf_field_save(field, file.c_str(), 0));
   expectOk(hpsdf_field_save(field, smallFile.c_str(), 1));
   expectOk(hpsdf_field_load(smallFile.c_str(), &loaded));
+  expectOk(hpsdf_field_map(file.c_str(), &mapped));
 
   const TriangleMesh same = loadMesh("builtin:torus");
   const ExactDistance distance(same);
@@ -147,9 +148,18 @@ TEST(CInterface, fieldsOfMeshesAndFilesAreThoseOfCpp) {
     EXPECT_EQ(value, expected.value(x));
     EXPECT_EQ(valueToo, value);
     EXPECT_EQ(gradient, expected.valueAndGradient(x).gradient);
+    expectOk(hpsdf_field_values(mapped, x.data(), 1, &value));
+    EXPECT_EQ(value, expected.value(x));
   }
   hpsdf_field_free(field);
   hpsdf_field_free(loaded);
+  hpsdf_field_free(mapped);
+
+  EXPECT_EQ(hpsdf_field_map(smallFile.c_str(), &mapped), HPSDF_FILE_ERROR);
+  EXPECT_THAT(hpsdf_last_error(), HasSubstr("because it is compressed"));
+  std::fstream(file, std::ios::in | std::ios::out | std::ios::binary).seekp(-200, std::ios::end).write("damage", 6);
+  EXPECT_EQ(hpsdf_field_map(file.c_str(), &mapped), HPSDF_FILE_ERROR);
+  EXPECT_THAT(hpsdf_last_error(), HasSubstr("damaged"));
 }
 
 TEST(CInterface, insideTestsAreThoseOfCpp) {

@@ -230,7 +230,7 @@ TEST(Blend, reproducesFunctionsThatAllLeavesShare) {
   const Vector3 slope(0.3, -2, 1.5);
   const auto with = [&](const Vector3& gradient) {
     FieldData data = field.data();
-    std::vector<double> coefficients(std::get<std::vector<double>>(data.coefficients).size(), 0.0);
+    std::vector<double> coefficients(std::get<FieldArray<double>>(data.coefficients).size(), 0.0);
     for (const Cell& cell : cellsOf(field)) {
       double* c = &coefficients[node::offset(data.nodes[cell.id])];
       const Vector3 half = cell.box.sizes() / 2;

@@ -131,8 +131,7 @@ TEST(Build, totalErrorIsTheWeightedSumOverTheCells) {
   const Field field = build(torus, cube(), options);
   double sum = 0;
   field.forEachCell([&](const Cell& cell) {
-    const auto& c = std::get<0>(field.data().coefficients);
-    const double mean = c[node::offset(field.data().nodes[cell.id])];
+    const double mean = *std::get<0>(field.data().coefficients).at(node::offset(field.data().nodes[cell.id]), 1);
     sum += std::pow(1 - std::abs(mean) / cube().diagonal().norm(), 3) * cell.error;
   });
   EXPECT_NEAR(sum, field.metadata().totalError, 1e-12);
@@ -173,7 +172,7 @@ Counts countsOf(const Field& field) {
 /// Maps the box of each leaf to the leaf's coefficients.
 std::map<std::vector<double>, std::vector<double>> leavesOf(const Field& field) {
   std::map<std::vector<double>, std::vector<double>> leaves;
-  const auto& coefficients = std::get<std::vector<double>>(field.data().coefficients);
+  const auto& coefficients = std::get<FieldArray<double>>(field.data().coefficients).all();
   field.forEachCell([&](const Cell& cell) {
     const Vector3 lo = cell.box.min(), hi = cell.box.max();
     const auto first = coefficients.begin() + node::offset(field.data().nodes[cell.id]);

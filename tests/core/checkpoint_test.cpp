@@ -4,7 +4,6 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <atomic>
 #include <chrono>
@@ -26,6 +25,7 @@
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/shapes.h"
+#include "support/file_checksums.h"
 #include "support/short_files.h"
 #include "support/temporary_directory.h"
 #include "support/ways_to_build.h"
@@ -256,8 +256,7 @@ TEST_F(Refused, forgedStatesDoNoHarm) {
     const std::size_t from = n < kForged / 2 ? 80 : bytes.size() - 300;  // settings and first cells, or lists of cells
     for (int changes = 1 + static_cast<int>(random() % 3); changes-- > 0;)
       bytes[from + random() % 200] = char(random() % 2 == 0 ? random() : random() % 9);
-    const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
-    std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
+    support::mendChecksum(bytes);
     writeAll(file(), bytes);
     std::atomic<int> questions = 60;
     try {
@@ -294,8 +293,7 @@ TEST(Checkpoint, forgedExactLeavesDoNoHarm) {
     std::string bytes = state;
     for (int changes = 1 + static_cast<int>(random() % 3); changes-- > 0;)
       bytes[80 + random() % (bytes.size() - 88)] = char(random() % 2 == 0 ? random() : random() % 64);
-    const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
-    std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
+    support::mendChecksum(bytes);
     writeAll(file, bytes);
     Checkpoint checkpoint = alwaysAt(file);
     checkpoint.seconds = 1000;

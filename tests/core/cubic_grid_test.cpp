@@ -141,7 +141,7 @@ TEST(CubicGrid, measuresAKnownDifference) {
 
   const Field far([&] {
     FieldData data = field.data();
-    std::get<std::vector<double>>(data.coefficients)[0] += 100;
+    std::get<FieldArray<double>>(data.coefficients).values()[0] += 100;
     return data;
   }());
   const GridDifference none = measureCubicGrid(sampleCubicGrid(far, {3, 3, 3}), far, 5000).nearSurface;

@@ -114,7 +114,7 @@ double squaredDistance(const Field& field, const Field& other) {
   field.forEachCell([&](const Cell& cell) {
     if (cell.degree == kExactDegree) return;
     const auto at = [&](const Field& one) {
-      return &std::get<std::vector<double>>(one.data().coefficients)[node::offset(one.data().nodes[cell.id])];
+      return &std::get<FieldArray<double>>(one.data().coefficients).all()[node::offset(one.data().nodes[cell.id])];
     };
     basis::forEachCoefficient(cell.degree, [&](int i, int j, int k, int index) {
       const double d = at(field)[index] - at(other)[index];
@@ -137,10 +137,10 @@ TEST(ExactLeafContinuity, isAMinimumOfTheFunctional) {
   const Field made = weaklyContinuous(field, {.weight = kWeight, .tolerance = 1e-13}).field;
   const double least = functional(made);
   EXPECT_LT(least, 0.9 * functional(field));
-  const auto& c = std::get<std::vector<double>>(made.data().coefficients);
+  const auto& c = std::get<FieldArray<double>>(made.data().coefficients).all();
   const auto moved = [&](std::size_t n, double by) {
     FieldData data = made.data();
-    std::get<std::vector<double>>(data.coefficients)[n] += by;
+    std::get<FieldArray<double>>(data.coefficients).values()[n] += by;
     return functional(Field(std::move(data)));
   };
   for (std::size_t n = 0; n < c.size(); n += 1 + c.size() / 40) {  // central differences of a quadratic are exact

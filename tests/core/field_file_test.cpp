@@ -1,7 +1,6 @@
 #include "hpsdf/field_file.h"
 
 #include <gtest/gtest.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,10 +16,14 @@
 #include "hpsdf/detail/output_file.h"
 #include "hpsdf/error.h"
 #include "hpsdf/verify.h"
+#include "support/file_checksums.h"
 #include "support/temporary_directory.h"
 
 namespace hpsdf {
 namespace field_file_test {
+
+using support::withBlockChecksums;
+using support::withChecksum;
 
 double torus(const Vector3& x) { return std::hypot(std::hypot(x.x(), x.y()) - 0.7, x.z()) - 0.3; }
 
@@ -88,6 +91,10 @@ TEST(FieldFile, everyTruncationIsRefused) {
     ASSERT_NE(message.find("cut.hpsdf"), std::string::npos) << message;
   }
   writeAll(file, whole + "x");
+  EXPECT_NE(refusal(file).find("its length is wrong"), std::string::npos);
+  std::string longer = whole;
+  longer.insert(longer.size() - 16, 8, '\0');
+  writeAll(file, withBlockChecksums(longer));
   EXPECT_NE(refusal(file).find("too long"), std::string::npos);
 }
 
@@ -174,11 +181,33 @@ TEST(FieldFile, otherFilesAreNamedForWhatTheyAre) {
   EXPECT_NE(refusal(file).find("version 99"), std::string::npos);
 }
 
-/// Returns `bytes` with a corrected checksum at the end.
-std::string withChecksum(std::string bytes) {
-  const XXH64_hash_t checksum = XXH3_64bits(bytes.data(), bytes.size() - 8);
-  std::memcpy(&bytes[bytes.size() - 8], &checksum, 8);
-  return bytes;
+/// Where the parts of a file of version 12 are.
+struct Layout {
+  explicit Layout(const FieldData& data) : settings(277 + data.metadata.source.name.size()) {
+    const bool isQuantized = std::holds_alternative<QuantizedCoefficients>(data.coefficients);
+    exactness = settings + 44 + 9 + 91;
+    nodes = aligned(exactness + 1 + (isQuantized ? 12 : 0));
+    coefficients = aligned(nodes + 8 * data.nodes.size());
+    bounds = aligned(coefficients + coefficientBytes(data));
+  }
+
+  static std::size_t aligned(std::size_t position) { return (position + 63) / 64 * 64; }
+
+  std::size_t settings;   ///< those since version 3
+  std::size_t exactness;  ///< that tells whether there is an exactness
+  std::size_t nodes, coefficients, bounds;
+};
+
+/// Returns the bytes of a file as version 10 has them: arrays without padding, and one checksum at the end.
+std::string asVersion10(const FieldData& data, const std::string& bytes) {
+  const Layout layout(data);
+  const bool isQuantized = std::holds_alternative<QuantizedCoefficients>(data.coefficients);
+  std::string old = bytes.substr(0, layout.exactness);
+  old[8] = 10;
+  old += bytes.substr(layout.exactness + 1, isQuantized ? 12 : 0);
+  old += bytes.substr(layout.nodes, 8 * data.nodes.size());
+  old += bytes.substr(layout.coefficients, coefficientBytes(data));
+  return withChecksum(old + std::string(8, '\0'));
 }
 
 constexpr std::size_t kSinceVersion3 = 4 * 1 + 4 * 8 + 8, kSinceVersion4 = 1 + 8,
@@ -194,8 +223,9 @@ TEST(FieldFile, quantizedFilesOfVersion9AreRead) {
             {.targetError = 1e-4, .grid = {2, 2, 2}, .coefficients = CoefficientType::quantized});
   ASSERT_EQ(precisionName(field), "quantized");
   save(field, file);
-  std::string bytes = readAll(file);
-  ASSERT_EQ(bytes[8], 10);
+  std::string bytes = asVersion10(field.data(), readAll(file));
+  writeAll(file, bytes);
+  EXPECT_EQ(load(file).data().coefficients, field.data().coefficients);
   bytes[8] = 9;
   writeAll(file, withChecksum(bytes));
   EXPECT_EQ(load(file).data().coefficients, field.data().coefficients);
@@ -212,8 +242,10 @@ TEST(FieldFile, filesOfOlderVersionsAreRead) {
   ASSERT_GT(field.metadata().steps.value(), 0u);
   save(field, file);
   EXPECT_EQ(load(file).metadata().steps, field.metadata().steps);
-  std::string bytes = readAll(file);
-  const std::size_t coefficients = std::get<std::vector<double>>(field.data().coefficients).size();
+  std::string bytes = asVersion10(field.data(), readAll(file));
+  writeAll(file, bytes);
+  EXPECT_EQ(load(file).data().coefficients, field.data().coefficients);
+  const std::size_t coefficients = std::get<FieldArray<double>>(field.data().coefficients).size();
   const std::size_t nodes = bytes.size() - 8 - 8 * (coefficients + field.data().nodes.size());
   bytes[8] = 8;
   writeAll(file, withChecksum(bytes));
@@ -339,13 +371,12 @@ TEST(FieldFile, forgedContinuityAndBoundsAreRefused) {
   data.bounds.assign(data.nodes.size(), CellBound{0.25f, 1.5f});
   save(Field(data), file);
   const std::string bytes = readAll(file);
-  const std::size_t coefficients = std::get<std::vector<double>>(data.coefficients).size(), count = data.nodes.size();
-  const std::size_t bounds = bytes.size() - 8 - 8 * count,
-                    since = bounds - 8 * (coefficients + count) - kSinceVersion3 - kSinceVersion4 - kSinceVersion8;
+  const Layout layout(data);
+  const std::size_t count = data.nodes.size(), bounds = layout.bounds, since = layout.settings;
   const auto refused = [&](std::size_t at, auto value) {
     std::string forged = bytes;
     std::memcpy(&forged[at], &value, sizeof(value));
-    writeAll(file, withChecksum(forged));
+    writeAll(file, withBlockChecksums(forged));
     return !refusal(file).empty();
   };
   EXPECT_FALSE(refused(since + 28, 0.25)) << "the greatest width";
@@ -369,7 +400,7 @@ TEST(FieldFile, forgedFilesAreRefused) {
   const auto forge = [&](std::size_t position, auto value) {
     std::string bytes = whole;
     std::memcpy(&bytes[position], &value, sizeof(value));
-    writeAll(file, withChecksum(bytes));
+    writeAll(file, withBlockChecksums(bytes));
     return refusal(file);
   };
   EXPECT_EQ(forge(0, whole[0]), "");  // an unchanged file with its checksum recomputed is valid
@@ -379,6 +410,9 @@ TEST(FieldFile, forgedFilesAreRefused) {
   EXPECT_NE(forge(32, std::uint32_t{0xffffffff}), "");
   const std::size_t header = 12 + 4 + 16 + 12 + 48;
   EXPECT_NE(forge(header, std::uint32_t{0xffffffff}), "");  // length of the name
+  const Layout layout(small().data());
+  ASSERT_GT(layout.nodes - 1, layout.exactness);
+  EXPECT_NE(forge(layout.nodes - 1, '\1').find("its padding is not 0"), std::string::npos);
 }
 
 TEST(Error, showsZeroBytesAsBlanks) {

@@ -357,7 +357,7 @@ TEST(Field, refusesInvalidArrays) {
   refuses([](FieldData& d) { d.nodes[1] = node::leaf(0, 0); });   // The group of children has no parent.
   refuses([](FieldData& d) { d.nodes[2] = node::leaf(0, 9); });   // The coefficient lies beyond the end.
   refuses([](FieldData& d) { d.nodes[2] = node::leaf(31, 0); });
-  refuses([](FieldData& d) { std::get<0>(d.coefficients)[3] = std::nan(""); });
+  refuses([](FieldData& d) { std::get<0>(d.coefficients).values()[3] = std::nan(""); });
 }
 
 }  // namespace field_test

@@ -239,7 +239,7 @@ Field steppedField() {
   FieldData data =
       randomField(10, {.domain = Box(corner, corner + Vector3(0.7, 1.1, 0.9)), .grid = {3, 5, 7}, .maxDepth = 3})
           .data();
-  auto& coefficients = std::get<std::vector<double>>(data.coefficients);
+  auto& coefficients = std::get<FieldArray<double>>(data.coefficients).values();
   std::fill(coefficients.begin(), coefficients.end(), 0.0);
   double number = 0;
   for (const std::uint64_t bits : data.nodes)

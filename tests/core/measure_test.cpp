@@ -80,7 +80,7 @@ TEST(Measure, doesNotDependOnThreads) {
 TEST(Measure, countsWrongSigns) {
   const Torus torus;
   FieldData data = torus.field.data();
-  for (float& c : std::get<std::vector<float>>(data.coefficients)) c = -c;
+  for (float& c : std::get<FieldArray<float>>(data.coefficients).values()) c = -c;
   const Measurement found = measure(Field(std::move(data)), torus.exact);
   EXPECT_GT(found.wrongSigns, found.points / 10);
 }

@@ -75,7 +75,7 @@ TEST(Quantized, roundsToTheNearestMultiples) {
   constexpr double kStep = 0.01;
   for (int degree = 0; degree <= kMaxDegree; ++degree) {
     const Field field = oneLeafField(unsigned(degree), degree);
-    const auto& before = std::get<std::vector<double>>(field.data().coefficients);
+    const auto& before = std::get<FieldArray<double>>(field.data().coefficients).all();
     const FieldData data = quantizedData(field, kStep);
     std::vector<double> after(before.size());
     decodeLeaf(std::get<QuantizedCoefficients>(data.coefficients), data.nodes[0], after.data());
@@ -352,9 +352,9 @@ TEST(Quantized, refusesInvalidArrays) {
   refuses([](QuantizedCoefficients& c) { c.step = 1e300; });
   refuses([](QuantizedCoefficients& c) { c.meanBits = 0; });
   refuses([](QuantizedCoefficients& c) { c.meanBits = 33; });
-  refuses([](QuantizedCoefficients& c) { c.bytes.clear(); });
-  refuses([](QuantizedCoefficients& c) { c.bytes.pop_back(); });  // The last leaf reaches into the padding.
-  refuses([](QuantizedCoefficients& c) { std::fill(c.bytes.begin(), c.bytes.end(), 0xff); });  // Widths are 31.
+  refuses([](QuantizedCoefficients& c) { c.bytes.values().clear(); });
+  refuses([](QuantizedCoefficients& c) { c.bytes.values().pop_back(); });  // The last leaf reaches into the padding.
+  refuses([](QuantizedCoefficients& c) { std::ranges::fill(c.bytes.values(), 0xff); });  // Widths are 31.
 }
 
 }  // namespace quantized_test

@@ -116,7 +116,7 @@ TEST(Range, containsEveryValueOfPolynomials) {
 TEST(Range, containsHugeValues) {
   for (const double scale : {1e20, 1e38, 1e60, 1e290}) {
     FieldData data = dataOf(oneLeafField(21, 3));
-    for (double& c : std::get<std::vector<double>>(data.coefficients)) c *= scale;
+    for (double& c : std::get<FieldArray<double>>(data.coefficients).values()) c *= scale;
     EXPECT_EQ(countOutside(Field(std::move(data))), 0) << scale;
   }
 }

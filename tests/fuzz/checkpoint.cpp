@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "hpsdf/error.h"
+#include "support/file_checksums.h"
 #include "target.h"
 
 namespace {
@@ -35,7 +36,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::string bytes = kBeginnings[which];
   bytes += fuzz::textOf(data, size).substr(1);
   bytes.append(8, '\0');
-  fuzz::mendChecksum(reinterpret_cast<std::uint8_t*>(bytes.data()), bytes.size());
+  support::mendChecksum(bytes);
   Checkpoint checkpoint = at(fuzz::fileOf("state", bytes));
   checkpoint.seconds = 1000;  // no further checkpoint is written
   fuzz::reads([&] { buildResumably(fuzz::distanceOf(which), fuzz::domain(), kConstructions[which], checkpoint); });

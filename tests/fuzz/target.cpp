@@ -1,7 +1,5 @@
 #include "target.h"
 
-#include <xxhash.h>
-
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -42,12 +40,6 @@ std::filesystem::path fileOf(std::string_view name, std::string_view bytes) {
 std::string bytesOf(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-void mendChecksum(std::uint8_t* data, std::size_t size) {
-  if (size < sizeof(XXH64_hash_t)) return;
-  const XXH64_hash_t checksum = XXH3_64bits(data, size - sizeof checksum);
-  std::memcpy(data + size - sizeof checksum, &checksum, sizeof checksum);
 }
 
 }  // namespace hpsdf::fuzz

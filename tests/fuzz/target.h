@@ -32,7 +32,4 @@ bool reads(const std::function<void()>& read);
 std::filesystem::path fileOf(std::string_view name, std::string_view bytes);
 std::string bytesOf(const std::filesystem::path& file);
 
-/// Sets the last 8 bytes to the checksum of all bytes before, as in files that end with a checksum.
-void mendChecksum(std::uint8_t* data, std::size_t size);
-
 }  // namespace hpsdf::fuzz

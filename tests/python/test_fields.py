@@ -49,6 +49,19 @@ def test_files(field: hpsdf.Field, points: Array, tmp_path: pathlib.Path) -> Non
     assert numpy.array_equal(again(points), field(points)) and numpy.array_equal(small(points), field(points))
 
 
+def test_mapped_files(field: hpsdf.Field, points: Array, tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "torus.hpsdf"
+    field.save(file)
+    mapped = hpsdf.load(file, mapped=True)
+    assert numpy.array_equal(mapped(points), field(points))
+    assert numpy.array_equal(mapped.coefficients, field.coefficients)
+    mapped.save(tmp_path / "small.hpsdf", compress=True)
+    with pytest.raises(hpsdf.FileError, match="cannot be mapped, because it is compressed"):
+        hpsdf.load(tmp_path / "small.hpsdf", mapped=True)
+    with pytest.raises(TypeError):
+        hpsdf.load(file, True)  # type: ignore[misc]
+
+
 def test_files_that_cannot_be_read(field: hpsdf.Field, tmp_path: pathlib.Path) -> None:
     (tmp_path / "wrong.hpsdf").write_bytes(b"no field")
     for wrong in (tmp_path / "none.hpsdf", tmp_path / "wrong.hpsdf", tmp_path):

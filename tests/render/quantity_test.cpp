@@ -133,7 +133,7 @@ TEST(Quantity, ofASliceIsThatOfItsPoints) {
 TEST(Difference, ofTwoFieldsIsThatOfTheirValues) {
   const Field field = randomField(3, {.radius = 0.5, .roughness = 0.1});
   FieldData data = field.data();
-  auto& coefficients = std::get<std::vector<double>>(data.coefficients);
+  auto& coefficients = std::get<FieldArray<double>>(data.coefficients).values();
   for (const std::uint64_t bits : data.nodes)
     if (node::isLeaf(bits)) coefficients[node::offset(bits)] -= 0.25;
   const Field offset(std::move(data));

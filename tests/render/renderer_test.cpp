@@ -743,7 +743,7 @@ TEST_F(Gl, drawsFieldsOfAnySizeAlike) {
   for (const double size : {0x1p-120, 0x1p-70, 0x1p70, 0x1p120}) {
     FieldData data = field.data();
     data.domain = Box(size * data.domain.min(), size * data.domain.max());
-    for (double& c : std::get<std::vector<double>>(data.coefficients)) c *= size;
+    for (double& c : std::get<FieldArray<double>>(data.coefficients).values()) c *= size;
     const Field sized(std::move(data));
     const auto one = makeGlRenderer(field, support::testedGl()), other = makeGlRenderer(sized, support::testedGl());
     const auto expectSame = [&](const ViewBuffers& expected, const ViewBuffers& found) {
@@ -926,7 +926,7 @@ TEST_F(Gl, differsForAWrongField) {
   const ViewBuffers expectedSurface = makeCpuRenderer(field)->surface({camera, 0}, kWidth, kHeight);
   const auto rendered = [&](std::uint32_t cell, double change) {
     FieldData data = field.data();
-    std::get<std::vector<double>>(data.coefficients)[node::offset(data.nodes[cell])] += change;
+    std::get<FieldArray<double>>(data.coefficients).values()[node::offset(data.nodes[cell])] += change;
     const Field changed(std::move(data));
     const auto gl = makeGlRenderer(changed, support::testedGl());
     return std::pair(gl->slice(slice, kWidth, kHeight), gl->surface({camera, 0}, kWidth, kHeight));

@@ -102,7 +102,7 @@ float evaluateSingle(const double* c, int degree, const Eigen::Vector3f& local) 
 // up: there the bounds are reached.
 Field withoutNegatives(const Field& field) {
   FieldData data = field.data();
-  for (double& c : std::get<std::vector<double>>(data.coefficients)) c = std::abs(c);
+  for (double& c : std::get<FieldArray<double>>(data.coefficients).values()) c = std::abs(c);
   return Field(std::move(data));
 }
 
@@ -110,7 +110,7 @@ template <typename Visit>
 void forEachLeaf(const Field& field, const Visit& visit) {
   const std::vector<SurfaceBounds> bounds = surfaceBounds(field.data());
   ASSERT_EQ(bounds.size(), field.data().nodes.size());
-  const auto& coefficients = std::get<std::vector<double>>(field.data().coefficients);
+  const auto& coefficients = std::get<FieldArray<double>>(field.data().coefficients).all();
   for (std::size_t n = 0; n < bounds.size(); ++n) {
     const std::uint64_t bits = field.data().nodes[n];
     if (node::isLeaf(bits)) visit(bounds[n], coefficients.data() + node::offset(bits), node::degree(bits));

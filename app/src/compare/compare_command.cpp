@@ -31,7 +31,7 @@ constexpr std::size_t kMostFields = 8;
 
 std::vector<CurrentField> loadFields(const std::vector<std::string>& files) {
   std::vector<CurrentField> fields;
-  for (const std::string& file : files) fields.push_back({load(file), file, fs::file_size(file)});
+  for (const std::string& file : files) fields.push_back({loadOrMap(file), file, fs::file_size(file)});
   return fields;
 }
 

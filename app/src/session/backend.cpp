@@ -7,7 +7,9 @@
 namespace hpsdf::app {
 
 std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend) {
-  return backend.cpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
+  // OpenGL would need all coefficients in memory.
+  const bool onCpu = backend.cpu || (field.isMapped() && backend.gl == render::GlChoice::automatic);
+  return onCpu ? render::makeCpuRenderer(field) : render::makeGlRenderer(field, backend.gl);
 }
 
 std::vector<Parameter> backendParameters() {

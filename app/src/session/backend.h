@@ -16,7 +16,8 @@ struct Backend {
   bool operator==(const Backend&) const = default;
 };
 
-/// Makes a renderer of the field, which must outlive it.
+/// Makes a renderer of the field, which must outlive it. A mapped field is drawn on the CPU, unless an OpenGL device is
+/// chosen.
 std::unique_ptr<render::Renderer> makeRenderer(const Field& field, const Backend& backend);
 
 /// Returns the parameters `cpu` and `gl`, which choose the renderer.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -18,5 +19,9 @@ struct CurrentField {
   /// Returns the mesh file or shape from which the field can be built again, or "" if the surface is unknown.
   const std::string& madeFrom() const { return surface.empty() ? field.metadata().source.name : surface; }
 };
+
+/// Loads a field file. A file that would take more than half of the memory that the process may take is mapped, if it
+/// can be (`Loading::mapped`). Throws `Error` naming the file.
+Field loadOrMap(const std::filesystem::path& file);
 
 }  // namespace hpsdf::app

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "construction/file_kind.h"
-#include "hpsdf/field_file.h"
 #include "session/field_surface.h"
 
 namespace hpsdf::app {
@@ -17,7 +16,7 @@ Parameter fieldParameter() {
 }
 
 void loadField(Session& session, const std::string& file) {
-  Field field = load(file);
+  Field field = loadOrMap(file);
   session.setField({std::move(field), file, std::filesystem::file_size(file)});
 }
 

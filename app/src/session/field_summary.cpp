@@ -246,6 +246,9 @@ std::string exactTrianglesText(const ExactLeafStatistics& exact) {
 std::string memoryText(const Field& field) {
   const FieldBytes bytes = field.bytesOfParts();
   std::string text = bytesText(double(bytes.total()));
+  if (field.isMapped())
+    return bytesText(double(bytes.total() - bytes.coefficients)) +
+           fmt::format(", and {} of the file mapped", bytesText(double(bytes.coefficients)));
   if (bytes.exactTriangles == 0) return text;
   text += " (";
   const auto part = [&](std::string_view name, std::size_t size) {

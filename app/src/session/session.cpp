@@ -168,7 +168,7 @@ Session::Other& Session::other(const std::string& file) {
     std::error_code unknown;
     const auto written =
         std::filesystem::last_write_time(file, unknown);  // read before loading, so that later changes are noticed
-    others_.insert(others_.begin(), std::make_unique<Other>(Other{file, load(file), written}));
+    others_.insert(others_.begin(), std::make_unique<Other>(Other{file, loadOrMap(file), written}));
     if (others_.size() > 2) others_.pop_back();
   }
   return *others_.front();

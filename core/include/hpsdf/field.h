@@ -90,6 +90,8 @@ class Field {
   const Box& domain() const { return data_.domain; }
   const std::array<std::uint32_t, 3>& grid() const { return data_.grid; }
   const FieldMetadata& metadata() const { return data_.metadata; }
+  /// Returns true if the field's coefficients lie in a mapped file (`Loading::mapped`).
+  bool isMapped() const { return hpsdf::isMapped(data_); }
   bool singlePrecision() const { return data_.coefficients.index() == 1; }
 
   /// Returns the arrays that make up the field, for files, uploads to a GPU and tests.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 
 #include "hpsdf/field.h"
@@ -20,11 +21,26 @@ struct SaveOptions {
 /// the file and the reason.
 void save(const Field& field, const std::filesystem::path& file, const SaveOptions& options = {});
 
+/// The memory into which `load` puts the coefficients of a field, which take most of its bytes.
+enum class Loading : std::uint8_t {
+  resident,  ///< memory of the process; the whole file is read and checked
+  /// Pages of the file that the operating system reads when they are needed and drops when memory is short, so that
+  /// fields can be larger than the memory. Coefficients are checked when they are first needed, in blocks of 64 KiB
+  /// with a checksum each: queries and all else that reads them can throw `Error` (of the kind `file`). The octree,
+  /// bounds and triangles are read and checked at once. The file must not be changed as long as the field or a copy of
+  /// it exists; saving to it is safe, because `save` makes a new file. Compressed files and those of versions before 12
+  /// cannot be mapped.
+  mapped,
+};
+
 /// Reads the field from a file that `save` wrote. Compressed files need no option. Sizes are checked before
 /// memory is allocated: against the file's length or, of compressed arrays, against what so many bytes can hold and
 /// the memory that the process may take. Throws `Error` if the file is missing, is truncated, is altered, has an
-/// unknown version or is not a `.hpsdf` file.
-Field load(const std::filesystem::path& file);
+/// unknown version, is not a `.hpsdf` file, or cannot be loaded in the asked way.
+Field load(const std::filesystem::path& file, Loading loading = Loading::resident);
+
+/// Tells whether `Loading::mapped` can load a file. Returns false for a file that cannot be read.
+bool canBeMapped(const std::filesystem::path& file);
 
 /// Tells whether a file begins as files that `save` wrote do. Returns false for a file that cannot be read.
 bool isFieldFile(const std::filesystem::path& file);

@@ -11,10 +11,14 @@
 namespace hpsdf::detail {
 namespace {
 
-constexpr std::uint32_t kLongestText = 4096;
 constexpr std::size_t kChecksumBytes = 8;
 
 }  // namespace
+
+void throwDamaged(const std::filesystem::path& file, const FileKind& kind, const std::string& how) {
+  throw Error(ErrorKind::file, file.string(),
+              "the " + std::string(kind.name) + " is damaged: " + how + "; " + std::string(kind.remedy));
+}
 
 void Checksum::Free::operator()(XXH3_state_s* state) const { XXH3_freeState(state); }
 
@@ -26,17 +30,6 @@ Checksum::Checksum() : state_(XXH3_createState()) {
 void Checksum::add(std::span<const std::byte> bytes) { XXH3_64bits_update(state_.get(), bytes.data(), bytes.size()); }
 
 std::uint64_t Checksum::value() const { return XXH3_64bits_digest(state_.get()); }
-
-void CheckedWriter::text(std::string_view value) {
-  const auto length = static_cast<std::uint32_t>(std::min<std::size_t>(value.size(), kLongestText));
-  item(length);
-  put(std::as_bytes(std::span(value.data(), length)));
-}
-
-void CheckedWriter::begin(const Magic& magic, std::uint32_t version) {
-  for (const char c : magic) item(c);
-  item(version);
-}
 
 void CheckedWriter::put(std::span<const std::byte> bytes) {
   checksum_.add(bytes);
@@ -71,14 +64,6 @@ std::optional<std::uint32_t> CheckedReader::begin(const Magic& magic) {
   return version;
 }
 
-void CheckedReader::text(std::string& value) {
-  std::uint32_t length = 0;
-  item(length);
-  require(length <= kLongestText, "its name is too long");
-  value.resize(length);
-  get(std::as_writable_bytes(std::span(value)));
-}
-
 void CheckedReader::get(std::span<std::byte> bytes) {
   require(bytes.size() <= remaining(), "it ends too early");
   stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -100,9 +85,7 @@ void CheckedReader::require(bool holds, const char* how) const {
   if (!holds) damaged(how);
 }
 
-void CheckedReader::damaged(const std::string& how) const {
-  refuse("the " + std::string(kind_.name) + " is damaged: " + how + "; " + std::string(kind_.remedy));
-}
+void CheckedReader::damaged(const std::string& how) const { throwDamaged(file_, kind_, how); }
 
 void CheckedReader::refuse(const std::string& why) const { throw Error(ErrorKind::file, file_.string(), why); }
 

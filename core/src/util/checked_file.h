@@ -47,9 +47,6 @@ class Checksum {
   std::unique_ptr<XXH3_state_s, Free> state_;
 };
 
-/// The first bytes of a file. They identify the type of the file.
-using Magic = std::array<char, 8>;
-
 /// Writes numbers to a file and then the checksum of these numbers.
 class CheckedWriter : public NumberWriter<CheckedWriter> {
  public:
@@ -60,8 +57,6 @@ class CheckedWriter : public NumberWriter<CheckedWriter> {
   void item(const T& value) {
     put(bytesOf(value));
   }
-  void text(std::string_view value);
-  void begin(const Magic& magic, std::uint32_t version);
   /// Writes the checksum and commits the file.
   void finish();
 
@@ -80,6 +75,9 @@ struct FileKind {
   std::string_view remedy;  ///< the advice for a damaged file, such as "build or copy it again"
 };
 
+/// Throws `Error` (of the kind `file`) with a message that tells how a file is damaged.
+[[noreturn]] void throwDamaged(const std::filesystem::path& file, const FileKind& kind, const std::string& how);
+
 /// Reads a file that `CheckedWriter` wrote. Every member throws `Error` (of the kind `file`) if the file
 /// ends too early or contains an impossible value.
 class CheckedReader : public NumberReader<CheckedReader> {
@@ -92,7 +90,6 @@ class CheckedReader : public NumberReader<CheckedReader> {
   void item(T& value) {
     get(std::as_writable_bytes(std::span(&value, 1)));
   }
-  void text(std::string& value);
   /// Reads the first bytes of the file and its version. Returns the version, or std::nullopt if the first
   /// bytes differ from `magic`.
   std::optional<std::uint32_t> begin(const Magic& magic);

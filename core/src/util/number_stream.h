@@ -1,12 +1,21 @@
 #pragma once
 // Members that all streams of numbers share, whether these go into files or into messages.
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace hpsdf::detail {
+
+/// The first bytes of a file. They identify the type of the file.
+using Magic = std::array<char, 8>;
+
+constexpr std::uint32_t kLongestText = 4096;  ///< bytes
 
 /// Base of a class `Stream` that writes numbers. `NumberReader` has members of the same names, so that the same
 /// function template can write and read. `Stream` has the members item(number) and put(bytes), of which the latter may
@@ -14,17 +23,27 @@ namespace hpsdf::detail {
 template <typename Stream>
 class NumberWriter {
  public:
+  void begin(const Magic& magic, std::uint32_t version) {
+    for (const char c : magic) stream().item(c);
+    stream().item(version);
+  }
   void flag(bool value) { stream().item(std::uint8_t{value}); }
   /// Writes an array without its size. The reader derives the size from other items.
-  template <typename T>
-  void array(const std::vector<T>& values, std::uint64_t) {
+  template <typename Array>
+  void array(const Array& values, std::uint64_t) {
     stream().put(std::as_bytes(std::span(values)));
   }
   /// Writes the size of an array and the array.
-  template <typename T>
-  void list(const std::vector<T>& values) {
+  template <typename Array>
+  void list(const Array& values) {
     stream().item(std::uint64_t{values.size()});
     array(values, values.size());
+  }
+  /// Writes the length of a text and the text, up to `kLongestText`.
+  void text(std::string_view value) {
+    const auto length = static_cast<std::uint32_t>(std::min<std::size_t>(value.size(), kLongestText));
+    stream().item(length);
+    stream().put(std::as_bytes(std::span(value.data(), length)));
   }
   /// Does nothing, because only values that are read can be invalid.
   void require(bool, const char*) const {}
@@ -57,6 +76,13 @@ class NumberReader {
     std::uint64_t count = 0;
     stream().item(count);
     array(values, count);
+  }
+  void text(std::string& value) {
+    std::uint32_t length = 0;
+    stream().item(length);
+    stream().require(length <= kLongestText, "its name is too long");
+    value.resize(length);
+    stream().get(std::as_writable_bytes(std::span(value)));
   }
 
  private:

@@ -35,7 +35,8 @@ Field scaled(const Field& field, double factor) {
         if constexpr (requires { coefficients.step; })
           coefficients.step *= factor;
         else
-          for (auto& c : coefficients) c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
+          for (auto& c : coefficients.values())
+            c = static_cast<std::remove_reference_t<decltype(c)>>(factor * double(c));
       },
       data.coefficients);
   std::visit(

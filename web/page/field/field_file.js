@@ -37,8 +37,9 @@
 export class FieldError extends Error {}
 
 const MAGIC = [0x68, 0x70, 0x73, 0x64, 0x66, 0x0d, 0x0a, 0x1a];
-const OLDEST_VERSION = 10;
-const NEWEST_VERSION = 11;
+const VERSION = 12;
+const ALIGNMENT = 64; // of arrays
+const BLOCK_BYTES = 65536; // that have a checksum
 const MOST_DEGREES = 30;
 const MOST_LEVELS = 20;
 const MOST_BLEND = 0.25;
@@ -95,6 +96,10 @@ class Cursor {
     return this.at - count;
   }
 
+  align() {
+    this.skip((ALIGNMENT - (this.at % ALIGNMENT)) % ALIGNMENT);
+  }
+
   u8() {
     return this.view.getUint8(this.skip(1));
   }
@@ -116,7 +121,7 @@ class Cursor {
   }
 
   /**
-   * Reads the bytes of an array.
+   * Reads bytes.
    * @param {number} size
    * @returns {ArrayBuffer}
    */
@@ -126,19 +131,28 @@ class Cursor {
   }
 
   /**
+   * Reads the bytes of an array, which begins at a multiple of the alignment.
+   * @param {number} size
+   */
+  array(size) {
+    this.align();
+    return this.block(size);
+  }
+
+  /**
    * Reads floats of 4 or of 8 bytes.
    * @param {number} count
    * @param {number} size  bytes of one
    */
   floats(count, size) {
-    return size === 8 ? new Float64Array(this.block(8 * count)) : new Float32Array(this.block(4 * count));
+    return size === 8 ? new Float64Array(this.array(8 * count)) : new Float32Array(this.array(4 * count));
   }
 
   /**
    * @param {number} count
    */
   words(count) {
-    return new Uint32Array(this.block(4 * count));
+    return new Uint32Array(this.array(4 * count));
   }
 }
 
@@ -156,8 +170,9 @@ export function readField(bytes) {
     high[n] = nodes[2 * n + 1];
   }
   const isQuantized = header.coefficientBytes === 1;
-  const quantized = new Uint8Array(cursor.block(isQuantized ? header.coefficients : 0));
+  const quantized = new Uint8Array(cursor.array(isQuantized ? header.coefficients : 0));
   const plain = cursor.floats(isQuantized ? 0 : header.coefficients, header.coefficientBytes);
+  cursor.align();
   cursor.skip(header.bounds * 8);
   const exact = {
     vertices: cursor.floats(3 * header.vertices, header.vertexBytes),
@@ -165,7 +180,7 @@ export function readField(bytes) {
     lists: cursor.words(header.lists),
     offset: header.offset,
   };
-  cursor.skip(8); // checksum, in place of which the zlib stream has its own
+  cursor.skip(8 * Math.ceil(cursor.at / BLOCK_BYTES) + 8); // checksums, in place of which the zlib stream has its own
   const bytesOfFile = cursor.at;
   const zones = header.blend > 0 ? readZones(cursor, header) : null;
   const first = new Uint32Array(low.length);
@@ -212,7 +227,7 @@ function readZones(cursor, { nodes, blend }) {
 function readHeader(cursor) {
   if (MAGIC.some((byte) => cursor.u8() !== byte)) throw new FieldError("this is no field");
   const version = cursor.u32();
-  if (version < OLDEST_VERSION || version > NEWEST_VERSION) throw new FieldError(`the field has the unknown version ${version}`);
+  if (version !== VERSION) throw new FieldError(`the field has the unknown version ${version}`);
   const coefficientBytes = cursor.u32();
   const nodes = cursor.u64();
   const coefficients = cursor.u64();
@@ -245,7 +260,7 @@ function readHeader(cursor) {
     measured = { near, nearRms, nearMax, rms, max };
     cursor.skip(8 + 2 * 8 + 3 * 8 + 8 + 8);
   }
-  if (version > 10) cursor.skip(1);
+  if (cursor.u8() > 0) cursor.skip(1); // exactness
   const isQuantized = coefficientBytes === 1;
   const step = isQuantized ? cursor.f64() : 0;
   const meanBits = isQuantized ? cursor.u32() : 0;

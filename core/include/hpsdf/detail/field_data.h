@@ -1,11 +1,15 @@
 #pragma once
 // The arrays of a field, and the record of how it was built.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -15,6 +19,58 @@
 #include "hpsdf/types.h"
 
 namespace hpsdf {
+
+namespace detail {
+
+class CheckedBlocks;
+
+/// Checks those blocks of a mapped file that hold the given bytes of it, unless they were checked before. Throws
+/// `Error` (of the kind `file`) if a block does not match its checksum.
+void requireBlocks(const CheckedBlocks& blocks, const void* first, std::size_t bytes);
+
+}  // namespace detail
+
+/// An array of numbers that a field owns, or that lies in a mapped file (`Loading::mapped`). Numbers in a file are
+/// checked when they are first read, block by block, so that all members that give access to them can throw `Error`.
+/// Copies of an array in a file refer to the same file.
+template <typename T>
+class FieldArray {
+ public:
+  FieldArray() = default;
+  FieldArray(std::vector<T> values) : own_(std::move(values)) {}
+  /// Refers to `size` numbers in the mapped file of `blocks`.
+  FieldArray(std::shared_ptr<const detail::CheckedBlocks> blocks, const T* first, std::size_t size)
+      : blocks_(std::move(blocks)), mapped_(first, size) {}
+
+  std::size_t size() const { return isMapped() ? mapped_.size() : own_.size(); }
+  bool isMapped() const { return blocks_ != nullptr; }
+
+  /// Returns a pointer to the number at `first`, from which `count` numbers may be read.
+  const T* at(std::size_t first, std::size_t count) const {
+    if (isMapped()) [[unlikely]] {
+      detail::requireBlocks(*blocks_, mapped_.data() + first, count * sizeof(T));
+      return mapped_.data() + first;
+    }
+    return own_.data() + first;
+  }
+  /// Returns all numbers. Those in a file are all read and checked.
+  std::span<const T> all() const { return {at(0, size()), size()}; }
+  /// Returns all numbers so that they can be changed. Those in a file are first copied into memory.
+  std::vector<T>& values() {
+    if (isMapped()) *this = FieldArray(std::vector<T>(all().begin(), all().end()));
+    return own_;
+  }
+  /// Returns a pointer to the first number. Only numbers to which `at` has given access may be read through it, and any
+  /// may be prefetched.
+  const T* data() const { return isMapped() ? mapped_.data() : own_.data(); }
+
+  friend bool operator==(const FieldArray& a, const FieldArray& b) { return std::ranges::equal(a.all(), b.all()); }
+
+ private:
+  std::vector<T> own_;
+  std::shared_ptr<const detail::CheckedBlocks> blocks_;
+  std::span<const T> mapped_;
+};
 
 /// The errors |f − Φ| of a finished field f, measured at random points (`measure` in verify.h). Lengths are in the
 /// field's own units.
@@ -104,7 +160,7 @@ struct QuantizedCoefficients {
 
   double step = 0;  ///< from `kLeastStep` to `kGreatestStep`
   std::uint32_t meanBits = 0;
-  std::vector<std::uint8_t> bytes;  ///< the leaves, and `kPadding` zero bytes
+  FieldArray<std::uint8_t> bytes;  ///< the leaves, and `kPadding` zero bytes
 
   /// Returns the step of a leaf. `leaf` is the packed node.
   double stepOf(std::uint64_t leaf) const {
@@ -132,7 +188,7 @@ struct FieldData {
   Box domain;
   std::array<std::uint32_t, 3> grid = {1, 1, 1};  ///< number of base cells along each axis
   std::vector<std::uint64_t> nodes;
-  std::variant<std::vector<double>, std::vector<float>, QuantizedCoefficients> coefficients;
+  std::variant<FieldArray<double>, FieldArray<float>, QuantizedCoefficients> coefficients;
   ExactTriangles exact = {};  ///< the triangles of exact leaves; empty if the field has none
   /// Width of the zones along the faces of a leaf in which the leaf is blended with its neighbours, as a fraction of
   /// the leaf's edge: from 0 (no blending) to `kMaxBlend`.
@@ -172,6 +228,9 @@ constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; 
 /// Returns the bytes that the coefficients of a field take.
 std::size_t coefficientBytes(const FieldData& field);
 
+/// Returns true if the coefficients lie in a mapped file.
+bool isMapped(const FieldData& field);
+
 /// Computes the n(p) coefficients of a leaf of degree p, in the order of `FieldData`.
 void decodeLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out);
 
@@ -181,8 +240,8 @@ template <typename F>
 decltype(auto) withCoefficients(const FieldData& field, std::uint64_t leaf, F&& f) {
   return std::visit(
       [&](const auto& coefficients) -> decltype(auto) {
-        if constexpr (requires { coefficients.data(); }) {
-          return f(coefficients.data() + node::offset(leaf));
+        if constexpr (requires { coefficients.at(0, 0); }) {
+          return f(coefficients.at(node::offset(leaf), coefficientCount(node::degree(leaf))));
         } else {
           std::array<double, std::size_t(coefficientCount(kMaxDegree))> decoded;
           decodeLeaf(coefficients, leaf, decoded.data());

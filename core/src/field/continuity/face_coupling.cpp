@@ -168,7 +168,7 @@ bool isDistanceToPlane(const FieldData& field, const query::OctreeNode& leaf) {
   constexpr double kRounding = 1e-6;  // of coefficients that were rounded to float once
   const std::uint64_t bits = field.nodes[leaf.node];
   if (field.metadata.settings.strategy != Strategy::hpx || node::degree(bits) != 1) return false;
-  const double* c = &std::get<std::vector<double>>(field.coefficients)[node::offset(bits)];
+  const double* c = query::leafOf(std::get<FieldArray<double>>(field.coefficients), bits);
   const Vector3 slope = 2 * Vector3(c[3], c[2], c[1]).cwiseQuotient(query::cellSize(field, leaf.depth));
   return std::abs(slope.norm() - 1) <= kRounding;
 }
@@ -278,7 +278,7 @@ void FaceCoupling::groupLinksByLeaf() {
 }
 
 std::vector<double> FaceCoupling::toUnknowns(const FieldData& field) const {
-  const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  const std::span<const double> coefficients = std::get<FieldArray<double>>(field.coefficients).all();
   std::vector<double> x(start_.back());
   for (std::size_t n = 0; n < leaves_.size(); ++n) {
     if (degree_[n] == kExactDegree) continue;

@@ -47,8 +47,10 @@ class StreamsWriter {
 
   /// Adds an array as its byte planes: for k = 0, 1, … a stream of the bytes number k of all values. Bytes of the same
   /// significance resemble each other more than the bytes of one number do.
-  template <typename T>
-  void addPlanes(const std::vector<T>& values) {
+  template <typename Array>
+  void addPlanes(const Array& array) {
+    const std::span values(array);
+    using T = typename decltype(values)::value_type;
     static_assert(std::is_trivially_copyable_v<T>);
     const auto* from = reinterpret_cast<const std::uint8_t*>(values.data());
     Bytes plane(values.size());

@@ -11,7 +11,6 @@
 #include "field/io/quantized_streams.h"
 #include "field/io/triangle_streams.h"
 #include "field/query/quantized.h"
-#include "hpsdf/detail/memory.h"
 
 namespace hpsdf::io {
 namespace {
@@ -167,19 +166,19 @@ void addCoefficients(StreamsWriter& streams, const QuantizedCoefficients& coeffi
   if (areIntegers)
     streams.append(integers);
   else
-    streams.add(coefficients.bytes);
+    streams.add(coefficients.bytes.all());
 }
 
 template <typename T>
-void addCoefficients(StreamsWriter& streams, const std::vector<T>& coefficients, const NodeOrder&) {
-  streams.addPlanes(coefficients);
+void addCoefficients(StreamsWriter& streams, const FieldArray<T>& coefficients, const NodeOrder&) {
+  streams.addPlanes(coefficients.all());
 }
 
 void readCoefficients(StreamsReader& reader, const FieldSizes& sizes, const NodeOrder& order, FieldData& data) {
   if (sizes.coefficientBytes == sizeof(float))
-    return reader.readPlanes(data.coefficients.emplace<std::vector<float>>(), sizes.coefficients);
+    return reader.readPlanes(data.coefficients.emplace<FieldArray<float>>().values(), sizes.coefficients);
   if (sizes.coefficientBytes == sizeof(double))
-    return reader.readPlanes(data.coefficients.emplace<std::vector<double>>(), sizes.coefficients);
+    return reader.readPlanes(data.coefficients.emplace<FieldArray<double>>().values(), sizes.coefficients);
   auto& coefficients = data.coefficients.emplace<QuantizedCoefficients>();
   coefficients.step = sizes.step;
   coefficients.meanBits = sizes.meanBits;
@@ -192,30 +191,6 @@ void readCoefficients(StreamsReader& reader, const FieldSizes& sizes, const Node
   coefficients.bytes = QuantizedForm(form) == QuantizedForm::integers
                            ? readQuantized(reader, sizes.coefficients, sizes.meanBits, order.leaves)
                            : reader.read(sizes.coefficients);
-}
-
-/// Throws `Error` if the arrays of a file's header need more memory than the process may take.
-void requireRoom(const detail::CheckedReader& reader, const FieldSizes& sizes) {
-  const double bytes =
-      sizeof(std::uint64_t) * double(sizes.nodes) + double(sizes.coefficientBytes) * double(sizes.coefficients) +
-      sizeof(CellBound) * double(sizes.bounds) + 3.0 * sizes.vertexBytes * double(sizes.vertices) +
-      3.0 * sizeof(std::uint32_t) * double(sizes.triangles) + sizeof(std::uint32_t) * double(sizes.lists);
-  if (bytes <= allowedMemory()) return;
-  reader.refuse(
-      "its arrays would take " + bytesText(bytes) + " of memory, more than the " + bytesText(allowedMemory()) +
-      " that are three quarters of what the machine, its control group or 'ulimit -v' allows; load it on a larger "
-      "machine");
-}
-
-/// Throws `Error` unless the numbers of nodes, base cells and bounds fit each other.
-void requireFit(const detail::CheckedReader& reader, const FieldSizes& sizes, const FieldData& data) {
-  std::uint64_t cells = 1;
-  for (const std::uint32_t n : data.grid) {
-    reader.require(n > 0 && cells <= sizes.nodes / n, "its base grid does not fit its nodes");
-    cells *= n;
-  }
-  reader.require(sizes.nodes <= kLowHalf, "it has 2^32 nodes or more");
-  reader.require(sizes.bounds == 0 || sizes.bounds == sizes.nodes, "its bounds do not fit its nodes");
 }
 
 }  // namespace
@@ -232,8 +207,6 @@ void writeCompressed(detail::CheckedWriter& writer, const FieldData& data) {
 }
 
 void readCompressed(detail::CheckedReader& reader, const FieldSizes& sizes, FieldData& data) {
-  requireFit(reader, sizes, data);
-  requireRoom(reader, sizes);
   StreamsReader streams(reader);
   data.exact.lists = readLists(streams, sizes.lists);
   const UnfinishedNodes unfinished = readNodes(streams, sizes, data);

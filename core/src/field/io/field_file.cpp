@@ -11,9 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "field/io/blocked_file.h"
 #include "field/io/compressed_arrays.h"
 #include "field/io/field_sizes.h"
 #include "hpsdf/detail/build_settings.h"
+#include "hpsdf/detail/memory.h"
 #include "hpsdf/error.h"
 #include "util/checked_file.h"
 
@@ -29,9 +31,11 @@ constexpr detail::Magic kFieldMagic = {'h', 'p', 's', 'd', 'f', '\r', '\n', '\x1
 // Version of the file format. Version 2 added the number of steps; version 3 continuity, bounds, maximum error
 // and criteria; version 4 the inside test; version 8 exact leaves, the tolerance, the measurement and
 // the settings that a replay of the construction needs; version 9 quantized coefficients; version 10 their shifts and
-// wide leaves; version 11 the exactness of a combination, which other fields do not have, so that they are written as
-// version 10. Versions 5 to 7 were never released.
-constexpr std::uint32_t kFieldVersion = 11, kPlainVersion = 10, kQuantizedVersion = 9, kExactLeavesVersion = 8;
+// wide leaves; version 11 the exactness of a combination, which other fields do not have; version 12 aligned arrays and
+// checksums of blocks, so that files can be mapped. Compressed files have version 11 if they have an exactness, or else
+// 10; all others have version 12. Versions 5 to 7 were never released.
+constexpr std::uint32_t kBlockedVersion = 12, kExactnessVersion = 11, kShiftsVersion = 10, kQuantizedVersion = 9,
+                        kExactLeavesVersion = 8;
 constexpr std::uint64_t kUnknownSteps = ~std::uint64_t{0};
 // Set in the version of a file whose arrays are compressed.
 constexpr std::uint32_t kCompressed = std::uint32_t{1} << 31;
@@ -49,7 +53,7 @@ FieldSizes sizesOf(const FieldData& data) {
           sizes.meanBits = c.meanBits;
         } else {
           sizes.coefficients = c.size();
-          sizes.coefficientBytes = sizeof(c[0]);
+          sizes.coefficientBytes = sizeof(*c.data());
         }
       },
       data.coefficients);
@@ -133,7 +137,10 @@ void measurementItem(Stream& stream, Optional& measurement) {
 
 /// Writes or reads the exactness of a combination. `Optional` is const for writing.
 template <typename Stream, typename Optional>
-void exactnessItem(Stream& stream, Optional& exactness) {
+void exactnessItem(Stream& stream, Optional& exactness, bool mayBeMissing) {
+  bool isThere = !mayBeMissing || exactness;
+  if (mayBeMissing) stream.flag(isThere);
+  if (!isThere) return;
   auto stored = static_cast<std::uint8_t>(exactness.value_or(Exactness::nowhere));
   stream.item(stored);
   stream.require(stored <= static_cast<std::uint8_t>(Exactness::nowhere), "its exactness is unknown");
@@ -186,31 +193,64 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(sizes.lists);
   stream.item(data.exact.offset);
   measurementItem(stream, m.measurement);
-  if (version >= kFieldVersion) exactnessItem(stream, m.source.exactness);
+  if (version >= kExactnessVersion) exactnessItem(stream, m.source.exactness, version >= kBlockedVersion);
   if (version < kQuantizedVersion || sizes.coefficientBytes != kQuantized) return;
   stream.item(sizes.step);
   stream.item(sizes.meanBits);
 }
 
-/// Reads an array of `size` numbers of type float or double, whose size in bytes is `bytes`, into a variant of vectors.
-template <typename Single, typename Double, typename Variant>
-void arrayOf(detail::CheckedReader& reader, std::uint32_t bytes, std::uint64_t size, Variant& out) {
-  if (bytes == sizeof(float))
-    reader.array(out.template emplace<std::vector<Single>>(), size);
-  else
-    reader.array(out.template emplace<std::vector<Double>>(), size);
-}
+/// Reads the plain arrays of a file. `Reader` is `CheckedReader` or, from version 12 on, `BlockReader`.
+template <typename Reader>
+class ArrayReader {
+ public:
+  ArrayReader(Reader& reader, Loading loading) : reader_(reader), loading_(loading) {}
 
-/// Writes the arrays as they are.
-void writePlain(detail::CheckedWriter& writer, const FieldData& data) {
-  const auto write = [&](const auto& array) { writer.array(array, array.size()); };
+  template <typename T>
+  void read(std::vector<T>& values, std::uint64_t size) {
+    align();
+    reader_.array(values, size);
+  }
+  template <typename T>
+  void read(FieldArray<T>& values, std::uint64_t size) {
+    align();
+    if constexpr (kIsBlocked) {
+      if (loading_ == Loading::mapped) return reader_.mapped(values, size);
+    }
+    reader_.array(values.values(), size);
+  }
+  /// Reads `size` numbers of type float or double, whose size in bytes is `bytes`, into a variant of arrays.
+  template <typename Single, typename Double, typename Variant>
+  void readEither(Variant& values, std::uint32_t bytes, std::uint64_t size) {
+    if (bytes == sizeof(float))
+      read(values.template emplace<Single>(), size);
+    else
+      read(values.template emplace<Double>(), size);
+  }
+
+ private:
+  static constexpr bool kIsBlocked = std::is_same_v<Reader, detail::BlockReader>;
+
+  void align() {
+    if constexpr (kIsBlocked) reader_.align();
+  }
+
+  Reader& reader_;
+  Loading loading_;
+};
+
+/// Writes the arrays as they are, each from a multiple of `BlockWriter::kAlignment` on.
+void writePlain(detail::BlockWriter& writer, const FieldData& data) {
+  const auto write = [&](const auto& array) {
+    writer.align();
+    writer.array(array, array.size());
+  };
   write(data.nodes);
   std::visit(
       [&](const auto& c) {
         if constexpr (requires { c.step; })
-          write(c.bytes);
+          write(c.bytes.all());
         else
-          write(c);
+          write(c.all());
       },
       data.coefficients);
   write(data.bounds);
@@ -220,20 +260,24 @@ void writePlain(detail::CheckedWriter& writer, const FieldData& data) {
 }
 
 /// Reads the arrays that `writePlain` wrote.
-void readPlain(detail::CheckedReader& reader, const FieldSizes& sizes, FieldData& data) {
-  reader.array(data.nodes, sizes.nodes);
+template <typename Reader>
+void readPlain(Reader& reader, const FieldSizes& sizes, Loading loading, FieldData& data) {
+  ArrayReader<Reader> arrays(reader, loading);
+  arrays.read(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == kQuantized) {
     auto& coefficients = data.coefficients.emplace<QuantizedCoefficients>();
     coefficients.step = sizes.step;
     coefficients.meanBits = sizes.meanBits;
-    reader.array(coefficients.bytes, sizes.coefficients);
+    arrays.read(coefficients.bytes, sizes.coefficients);
   } else {
-    arrayOf<float, double>(reader, sizes.coefficientBytes, sizes.coefficients, data.coefficients);
+    arrays.template readEither<FieldArray<float>, FieldArray<double>>(data.coefficients, sizes.coefficientBytes,
+                                                                      sizes.coefficients);
   }
-  reader.array(data.bounds, sizes.bounds);
-  arrayOf<Eigen::Vector3f, Eigen::Vector3d>(reader, sizes.vertexBytes, sizes.vertices, data.exact.vertices);
-  reader.array(data.exact.triangles, sizes.triangles);
-  reader.array(data.exact.lists, sizes.lists);
+  arrays.read(data.bounds, sizes.bounds);
+  arrays.template readEither<std::vector<Eigen::Vector3f>, std::vector<Eigen::Vector3d>>(
+      data.exact.vertices, sizes.vertexBytes, sizes.vertices);
+  arrays.read(data.exact.triangles, sizes.triangles);
+  arrays.read(data.exact.lists, sizes.lists);
 }
 
 /// The first items of a file.
@@ -252,9 +296,9 @@ Start readStart(detail::CheckedReader& reader) {
   const Start start{.version = *stored & ~kCompressed, .isCompressed = (*stored & kCompressed) != 0};
   constexpr std::uint32_t kLastBefore = 4;
   if (start.version == 0 || (start.version > kLastBefore && start.version < kExactLeavesVersion) ||
-      start.version > kFieldVersion)
+      start.version > kBlockedVersion || (start.isCompressed && start.version > kExactnessVersion))
     reader.refuse("has file format version " + std::to_string(start.version) + ", this program reads 1 to 4 and " +
-                  std::to_string(kExactLeavesVersion) + " to " + std::to_string(kFieldVersion) + "; build it again");
+                  std::to_string(kExactLeavesVersion) + " to " + std::to_string(kBlockedVersion) + "; build it again");
   return start;
 }
 
@@ -262,16 +306,21 @@ Start readStart(detail::CheckedReader& reader) {
 
 void save(const Field& field, const std::filesystem::path& file, const SaveOptions& options) {
   const FieldData& data = field.data();
-  detail::CheckedWriter writer(file);
-  const std::uint32_t version = data.metadata.source.exactness ? kFieldVersion : kPlainVersion;
-  writer.begin(kFieldMagic, options.compress ? version | kCompressed : version);
   const FieldSizes sizes = sizesOf(data);
-  header(writer, data, sizes, version);
-  if (options.compress)
+  if (options.compress) {
+    detail::CheckedWriter writer(file);
+    const std::uint32_t version = data.metadata.source.exactness ? kExactnessVersion : kShiftsVersion;
+    writer.begin(kFieldMagic, version | kCompressed);
+    header(writer, data, sizes, version);
     writeCompressed(writer, data);
-  else
+    writer.finish();
+  } else {
+    detail::BlockWriter writer(file);
+    writer.begin(kFieldMagic, kBlockedVersion);
+    header(writer, data, sizes, kBlockedVersion);
     writePlain(writer, data);
-  writer.finish();
+    writer.finish();
+  }
 }
 
 bool isFieldFile(const std::filesystem::path& file) {
@@ -280,9 +329,36 @@ bool isFieldFile(const std::filesystem::path& file) {
   return stream.read(first.data(), first.size()) && std::ranges::equal(first, kFieldMagic);
 }
 
-Field load(const std::filesystem::path& file) {
-  detail::CheckedReader reader(file, kFieldFile);
-  const auto [version, isCompressed] = readStart(reader);
+namespace {
+
+/// Throws `Error` unless the numbers of nodes, base cells and bounds fit each other.
+template <typename Reader>
+void requireFit(const Reader& reader, const FieldSizes& sizes, const FieldData& data) {
+  std::uint64_t cells = 1;
+  for (const std::uint32_t n : data.grid) {
+    reader.require(n > 0 && cells <= sizes.nodes / n, "its base grid does not fit its nodes");
+    cells *= n;
+  }
+  reader.require(sizes.nodes <= 0xffffffffu, "it has 2^32 nodes or more");
+  reader.require(sizes.bounds == 0 || sizes.bounds == sizes.nodes, "its bounds do not fit its nodes");
+}
+
+/// Throws `Error` if the arrays of a file's header need more memory than the process may take. `isMapped` tells that
+/// the coefficients need none.
+void requireRoom(const std::filesystem::path& file, const FieldSizes& sizes, const Start& start, bool isMapped) {
+  const double bytes = sizes.bytes() - (isMapped ? sizes.bytesOfCoefficients() : 0);
+  if (bytes <= allowedMemory()) return;
+  const bool canMap = start.version >= kBlockedVersion && !isMapped;
+  throw Error(ErrorKind::file, file.string(),
+              "its arrays would take " + bytesText(bytes) + " of memory, more than the " + bytesText(allowedMemory()) +
+                  " that are three quarters of what the machine, its control group or 'ulimit -v' allows; " +
+                  (canMap ? "map it" : "load it on a larger machine"));
+}
+
+/// Reads a file after its first items.
+template <typename Reader>
+FieldData readData(const std::filesystem::path& file, Reader& reader, const Start& start, Loading loading) {
+  const std::uint32_t version = start.version;
   FieldData data;
   FieldSizes sizes;
   header(reader, data, sizes, version);
@@ -293,11 +369,49 @@ Field load(const std::filesystem::path& file) {
   Source& source = data.metadata.source;
   reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
   if (version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
-  if (isCompressed)
-    readCompressed(reader, sizes, data);
-  else
-    readPlain(reader, sizes, data);
+  requireFit(reader, sizes, data);
+  reader.require(start.isCompressed || sizes.bytes() <= double(reader.remaining()), "it ends too early");
+  requireRoom(file, sizes, start, loading == Loading::mapped);
+  if constexpr (std::is_same_v<Reader, detail::CheckedReader>) {
+    if (start.isCompressed) {
+      readCompressed(reader, sizes, data);
+      reader.finish();
+      return data;
+    }
+  }
+  readPlain(reader, sizes, loading, data);
   reader.finish();
+  return data;
+}
+
+FieldData readBlocked(const std::filesystem::path& file, Loading loading) {
+  detail::BlockReader reader(file, kFieldFile);
+  detail::Magic magic;
+  for (char& c : magic) reader.item(c);
+  Start start;
+  reader.item(start.version);
+  return readData(file, reader, start, loading);
+}
+
+}  // namespace
+
+bool canBeMapped(const std::filesystem::path& file) {
+  try {
+    detail::CheckedReader reader(file, kFieldFile);
+    return readStart(reader).version >= kBlockedVersion;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+Field load(const std::filesystem::path& file, Loading loading) {
+  detail::CheckedReader reader(file, kFieldFile);
+  const Start start = readStart(reader);
+  const bool isBlocked = start.version >= kBlockedVersion;
+  if (loading == Loading::mapped && !isBlocked)
+    reader.refuse(start.isCompressed ? "cannot be mapped, because it is compressed; load it, and save it uncompressed"
+                                     : "cannot be mapped, because it has an older version; load it, and save it again");
+  FieldData data = isBlocked ? readBlocked(file, loading) : readData(file, reader, start, loading);
   try {
     return Field(std::move(data));
   } catch (const Error& error) {

@@ -157,7 +157,7 @@ bool addQuantized(StreamsWriter& writer, const QuantizedCoefficients& coefficien
   for (const std::uint64_t leaf : leaves) {
     const std::size_t size = query::quantizedLeafBytes(coefficients, leaf | offset);
     if (size == 0) return false;
-    splitLeaf({coefficients.bytes.data() + offset}, leaf, means, parts);
+    splitLeaf({query::leafOf(coefficients, leaf | offset)}, leaf, means, parts);
     offset += std::uint32_t(size);
   }
   if (joined(parts, leaves, coefficients.bytes.size()) != coefficients.bytes) return false;

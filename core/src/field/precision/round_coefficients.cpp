@@ -25,7 +25,7 @@ constexpr double kShareOfTolerance = 0.05;  // of a tolerance; polynomials make 
 /// Calls f(node, coefficients) for each leaf of a field with double coefficients that has a polynomial.
 template <typename F>
 void forEachPolynomial(const FieldData& field, const F& f) {
-  const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  const std::span<const double> coefficients = std::get<FieldArray<double>>(field.coefficients).all();
   query::visitNodes(field, [&](const query::OctreeNode& at) {
     const std::uint64_t bits = field.nodes[at.node];
     if (node::isLeaf(bits) && !node::isExact(bits))

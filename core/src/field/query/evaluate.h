@@ -235,28 +235,34 @@ inline Eigen::Matrix3d symmetricProduct(const Vector3& u, const Vector3& v) {
 template <typename T>
 Eigen::Matrix3d polynomialHessian(const T* coefficients, int degree, const std::array<double, 3>& local);
 
+/// Returns a pointer to the coefficients of a leaf, which is not exact. `leaf` is the packed node. Throws `Error` if
+/// they lie in a mapped file that is damaged. There is an overload for quantized coefficients (quantized.h).
+template <typename T>
+const T* leafOf(const FieldArray<T>& coefficients, std::uint64_t leaf) {
+  return coefficients.at(node::offset(leaf), coefficientCount(node::degree(leaf)));
+}
+
 /// Evaluates the polynomial of a leaf, which is not exact, at a point. The overloads with derivatives give them in
 /// world units. There are more overloads for quantized coefficients (quantized.h).
 template <typename T>
-void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
-  value = evaluate(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+void evaluateLeaf(const FieldArray<T>& coefficients, const GridFrame&, const LeafPoint& leaf, double& value) {
+  value = evaluate(leafOf(coefficients, leaf.bits), node::degree(leaf.bits), leaf.local);
 }
 
 template <typename T>
-void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame& frame, const LeafPoint& leaf,
+void evaluateLeaf(const FieldArray<T>& coefficients, const GridFrame& frame, const LeafPoint& leaf,
                   ValueAndGradient& result) {
-  result = evaluateWithGradient(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  result = evaluateWithGradient(leafOf(coefficients, leaf.bits), node::degree(leaf.bits), leaf.local);
   toWorldUnits(frame, leaf, result.gradient);
 }
 
 template <typename T>
-void evaluateLeaf(const std::vector<T>& coefficients, const GridFrame& frame, const LeafPoint& leaf,
+void evaluateLeaf(const FieldArray<T>& coefficients, const GridFrame& frame, const LeafPoint& leaf,
                   ValueGradientHessian& result) {
   ValueAndGradient first;
   evaluateLeaf(coefficients, frame, leaf, first);
   setFirstDerivatives(result, first);
-  result.hessian =
-      polynomialHessian(coefficients.data() + node::offset(leaf.bits), node::degree(leaf.bits), leaf.local);
+  result.hessian = polynomialHessian(leafOf(coefficients, leaf.bits), node::degree(leaf.bits), leaf.local);
   toWorldUnits(frame, leaf, result.hessian);
 }
 

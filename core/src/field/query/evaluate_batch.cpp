@@ -229,7 +229,7 @@ constexpr int kPrefetchedDegree = 4;
 /// Prefetches the coefficients of a leaf: the same number of cache lines for each leaf, because a varying end of the
 /// loop would be mispredicted.
 template <typename T>
-HWY_INLINE void prefetch(const std::vector<T>& coefficients, std::size_t offset, int degree) {
+HWY_INLINE void prefetch(const FieldArray<T>& coefficients, std::size_t offset, int degree) {
   const std::size_t last = coefficientCount(degree) - 1;
   for (std::size_t at = 0; at < coefficientCount(kPrefetchedDegree); at += 64 / sizeof(T))
     __builtin_prefetch(coefficients.data() + offset + std::min(at, last));
@@ -282,10 +282,25 @@ HWY_INLINE void listPoints(std::size_t first, Batch& batch, std::array<std::size
 }
 #endif
 
+template <typename T>
+bool areMapped(const FieldArray<T>& coefficients) {
+  return coefficients.isMapped();
+}
+bool areMapped(const QuantizedCoefficients& coefficients) { return coefficients.bytes.isMapped(); }
+
+/// Throws `Error` if coefficients of the leaves of a batch lie in a mapped file that is damaged.
+template <typename Coefficients>
+void requireLeaves(const Coefficients& coefficients, const Batch& batch) {
+  for (std::size_t i = 0; i < batch.count; ++i)
+    if (!node::isExact(batch.bits[i])) leafOf(coefficients, batch.bits[i]);
+}
+
 /// Groups the points of a batch by the degree of their leaves, and prefetches the leaves' coefficients. Wide leaves
 /// have no SIMD code.
 template <typename Coefficients>
 void listByDegree(const Coefficients& coefficients, Batch& batch) {
+  if (areMapped(coefficients)) [[unlikely]]
+    requireLeaves(coefficients, batch);
   std::array<std::size_t, kLists> counts{};
   for (std::size_t i = 0; i < batch.count; i += kLanes) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) prefetchLeaf(coefficients, batch.bits[i + lane]);
@@ -379,7 +394,7 @@ struct LaneLeaves {
 
 /// Loads the coefficients of several leaves of degree P.
 template <int P, typename T>
-HWY_INLINE void loadLeaves(const std::vector<T>& coefficients, const LaneLeaves& leaves,
+HWY_INLINE void loadLeaves(const FieldArray<T>& coefficients, const LaneLeaves& leaves,
                            std::array<Lanes, coefficientCount(P)>& out) {
   std::array<const T*, kLanes> from;
   for (std::size_t lane = 0; lane < kLanes; ++lane) from[lane] = coefficients.data() + leaves.offsets[lane];
@@ -398,7 +413,7 @@ HWY_INLINE void loadLeaves(const QuantizedCoefficients& coefficients, const Lane
 
 /// Returns loaded coefficients in the form that `evaluatePolynomial` takes.
 template <int P, typename T>
-HWY_INLINE const Lanes* asCoefficients(const std::vector<T>& /*coefficients*/, const Lanes* loaded) {
+HWY_INLINE const Lanes* asCoefficients(const FieldArray<T>& /*coefficients*/, const Lanes* loaded) {
   return loaded;
 }
 template <int P>
@@ -409,7 +424,7 @@ HWY_INLINE OrthonormalIntegers<P, Lanes> asCoefficients(const QuantizedCoefficie
 
 /// Converts results from the unit of loaded coefficients to that of the field. `bits` are the packed nodes.
 template <typename T>
-HWY_INLINE Vec inUnits(const std::vector<T>& /*coefficients*/, Lanes /*bits*/, Vec result) {
+HWY_INLINE Vec inUnits(const FieldArray<T>& /*coefficients*/, Lanes /*bits*/, Vec result) {
   return result;
 }
 HWY_INLINE Vec inUnits(const QuantizedCoefficients& coefficients, Lanes bits, Vec result) {

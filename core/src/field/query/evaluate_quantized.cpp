@@ -109,7 +109,7 @@ HWY_INLINE void decode(const std::uint8_t* leaf, std::uint32_t meanBits, double*
 /// Calls f(coefficients, Constant<P>) for the coefficients of a leaf of degree P from 1 to 5.
 template <typename F>
 HWY_INLINE auto withDecoded(const QuantizedCoefficients& coefficients, std::uint64_t leaf, const F& f) {
-  const std::uint8_t* const bytes = coefficients.bytes.data() + node::offset(leaf);
+  const std::uint8_t* const bytes = leafOf(coefficients, leaf);
   const auto decoded = [&](auto degree) HWY_ATTR {
     constexpr int kDegree = decltype(degree)::value;
     std::array<double, std::size_t(coefficientCount(kDegree)) + 3> integers;  // Four are written at a time.

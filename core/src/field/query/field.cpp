@@ -80,16 +80,21 @@ void checkExactLeaf(const ExactTriangles& exact, const std::vector<std::uint32_t
 
 /// Returns true if the coefficients of a leaf lie within the array.
 template <typename T>
-bool hasLeaf(const std::vector<T>& coefficients, std::uint64_t leaf) {
+bool hasLeaf(const FieldArray<T>& coefficients, std::uint64_t leaf) {
   return std::size_t(node::offset(leaf)) + coefficientCount(node::degree(leaf)) <= coefficients.size();
 }
 bool hasLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
+  const std::size_t offset = node::offset(leaf), size = coefficients.bytes.size();
+  // A leaf in a mapped file is not read before it is needed. Whatever its bytes are, it must not be read beyond the
+  // end.
+  if (coefficients.bytes.isMapped() && offset + mostQuantizedBytes(node::degree(leaf)) <= size) return true;
   return quantizedLeafBytes(coefficients, leaf) > 0;
 }
 
 template <typename T>
-void checkCoefficients(const std::vector<T>& coefficients) {
-  for (const T c : coefficients)
+void checkCoefficients(const FieldArray<T>& coefficients) {
+  if (coefficients.isMapped()) return;
+  for (const T c : coefficients.all())
     if (!std::isfinite(c)) notAField("a coefficient is not finite");
 }
 void checkCoefficients(const QuantizedCoefficients& coefficients) {
@@ -231,7 +236,18 @@ std::size_t coefficientBytes(const FieldData& field) {
         if constexpr (requires { c.bytes; })
           return c.bytes.size();
         else
-          return c.size() * sizeof(c[0]);
+          return c.size() * sizeof(*c.data());
+      },
+      field.coefficients);
+}
+
+bool isMapped(const FieldData& field) {
+  return std::visit(
+      [](const auto& c) {
+        if constexpr (requires { c.bytes; })
+          return c.bytes.isMapped();
+        else
+          return c.isMapped();
       },
       field.coefficients);
 }

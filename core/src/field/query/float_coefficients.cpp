@@ -14,10 +14,10 @@ namespace {
 
 template <typename To, typename From>
 void convert(FieldData& field) {
-  const auto* from = std::get_if<std::vector<From>>(&field.coefficients);
+  const auto* from = std::get_if<FieldArray<From>>(&field.coefficients);
   if (from == nullptr) return;
   std::vector<To> to(from->size());
-  std::ranges::transform(*from, to.begin(), [](From c) { return static_cast<To>(c); });
+  std::ranges::transform(from->all(), to.begin(), [](From c) { return static_cast<To>(c); });
   field.coefficients = std::move(to);
 }
 
@@ -29,7 +29,7 @@ const std::vector<Eigen::Vector3d>* doubleVertices(const ExactTriangles& exact) 
 /// rounded coefficients of a leaf, whose own are c.
 template <typename Rounded>
 Rounding roundingOf(const FieldData& field, const detail::AcrossParts& parts, const Rounded& rounded) {
-  const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  const std::span<const double> coefficients = std::get<FieldArray<double>>(field.coefficients).all();
   Rounding rounding;
   const double ofVertices = vertexRounding(field.exact);
   rounding.max = ofVertices;

@@ -9,6 +9,10 @@
 namespace hpsdf::query {
 namespace {
 
+/// The greatest number of bytes of a lookup grid's entries. It lies in memory, although the field may lie in a mapped
+/// file; it is the same for fields in memory, because it decides the order in which blended cells are summed.
+constexpr std::size_t kMostBytes = std::size_t{1} << 28;
+
 /// For each of the six faces of a leaf, by axis and side, the depth of the deepest leaf that touches the face.
 using FaceDepths = std::array<std::array<std::uint8_t, 2>, 3>;
 
@@ -78,14 +82,19 @@ void fillLookupGrid(const FieldData& field, LookupGrid& lookupGrid) {
   });
 }
 
+/// Returns the greatest number of bytes of the lookup grid's entries: a share of the field's bytes.
+std::size_t mostBytes(const FieldData& field) {
+  const std::size_t bytes = coefficientBytes(field) + field.nodes.size() * sizeof(field.nodes[0]);
+  const std::size_t share = std::holds_alternative<QuantizedCoefficients>(field.coefficients) ? 8 : 16;
+  return std::min(bytes / share, kMostBytes);
+}
+
 }  // namespace
 
 LookupGrid makeLookupGrid(const FieldData& field) {
   LookupGrid lookupGrid;
   const std::size_t base = std::size_t(field.grid[0]) * field.grid[1] * field.grid[2];
-  const std::size_t bytes = coefficientBytes(field) + field.nodes.size() * sizeof(field.nodes[0]);
-  const std::size_t share = std::holds_alternative<QuantizedCoefficients>(field.coefficients) ? 8 : 16;
-  const std::size_t maxEntries = bytes / share / sizeof(lookupGrid.entries[0]);
+  const std::size_t maxEntries = mostBytes(field) / sizeof(lookupGrid.entries[0]);
   while (lookupGrid.depth < kMaxDepth && base << (3 * (lookupGrid.depth + 1)) <= maxEntries) ++lookupGrid.depth;
   lookupGrid.entries.resize(base << (3 * lookupGrid.depth));
   if (field.blend > 0) {

@@ -90,7 +90,7 @@ double greatestStep(std::span<const std::uint64_t> nodes, std::span<const double
 
 void decodeAnyLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out) {
   const int degree = node::degree(leaf);
-  const LeafBits bits{coefficients.bytes.data() + node::offset(leaf)};
+  const LeafBits bits{leafOf(coefficients, leaf)};
   // Decode the integers, ordered by total degree.
   std::array<std::int32_t, std::size_t(coefficientCount(kMaxDegree))> integers;
   std::array<const std::int32_t*, kMaxDegree + 1> next;  // integer of each total degree that comes next in `out`
@@ -118,8 +118,9 @@ std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::u
   const int mostBits = node::isWide(leaf) ? QuantizedCoefficients::kMostWideBits : QuantizedCoefficients::kMostBits;
   std::size_t bits = std::size_t(degree) * kWidthBits + std::size_t(meanBitsOf(coefficients, leaf));
   if (offset + bytesOf(bits) > end) return 0;
+  const LeafBits leafBits{leafOf(coefficients, leaf)};
   for (int d = 1; d <= degree; ++d) {
-    const int width = widthOf({coefficients.bytes.data() + offset}, d);
+    const int width = widthOf(leafBits, d);
     if (width > mostBits) return 0;
     bits += std::size_t(basis::termsOfDegree(d)) * width;
   }
@@ -128,7 +129,7 @@ std::size_t quantizedLeafBytes(const QuantizedCoefficients& coefficients, std::u
 
 std::optional<Quantized> quantized(const FieldData& field, std::span<const double> steps, double fieldStep,
                                    const detail::AcrossParts& parts) {
-  const auto& coefficients = std::get<std::vector<double>>(field.coefficients);
+  const std::span<const double> coefficients = std::get<FieldArray<double>>(field.coefficients).all();
   Quantized result{
       .nodes = field.nodes,
       .coefficients = {.step = fieldStep > 0 ? fieldStep : parts.greatest(greatestStep(field.nodes, steps)),
@@ -157,18 +158,20 @@ std::optional<Quantized> quantized(const FieldData& field, std::span<const doubl
   out.meanBits = static_cast<std::uint32_t>(parts.greatest(out.meanBits));
 
   // Write the integers.
+  std::vector<std::uint8_t> bytes;
   forEachPolynomial(result.nodes, [&](std::uint64_t& node) {
     const int degree = node::degree(node);
     const Integers integers(&coefficients[node::offset(node)], degree, out.stepOf(node));
-    node = node::quantizedLeaf(degree, node::shift(node), node::isWide(node), std::uint32_t(out.bytes.size()));
-    integers.write(degree, meanBitsOf(out, node), out.bytes);
+    node = node::quantizedLeaf(degree, node::shift(node), node::isWide(node), std::uint32_t(bytes.size()));
+    integers.write(degree, meanBitsOf(out, node), bytes);
   });
-  detail::ExactSum bytes;
-  bytes.add(double(out.bytes.size()));
-  parts.add(bytes);
-  out.bytes.resize(out.bytes.size() + QuantizedCoefficients::kPadding);
-  out.bytes.shrink_to_fit();
-  if (bytes.value() + QuantizedCoefficients::kPadding > 0xffffffff) return std::nullopt;
+  detail::ExactSum size;
+  size.add(double(bytes.size()));
+  parts.add(size);
+  bytes.resize(bytes.size() + QuantizedCoefficients::kPadding);
+  bytes.shrink_to_fit();
+  out.bytes = std::move(bytes);
+  if (size.value() + QuantizedCoefficients::kPadding > 0xffffffff) return std::nullopt;
   return result;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // Quantized coefficients: decoding for single queries, and how coefficients are quantized.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -55,6 +56,20 @@ struct LeafBits {
     return word >> (position & 7);
   }
 };
+
+/// The most bytes from the first one of a leaf on that are read to decode it, whatever its widths are.
+constexpr std::size_t mostQuantizedBytes(int degree) {
+  const int bits = degree * QuantizedCoefficients::kWidthBits + QuantizedCoefficients::kMostMeanBits +
+                   (coefficientCount(degree) - 1) * QuantizedCoefficients::kMostWideBits;
+  return std::size_t(bits) / 8 + QuantizedCoefficients::kPadding;
+}
+
+/// Returns a pointer to the bytes of a leaf, like the overload for arrays of coefficients in evaluate.h.
+inline const std::uint8_t* leafOf(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
+  const std::size_t offset = node::offset(leaf);
+  return coefficients.bytes.at(offset,
+                               std::min(mostQuantizedBytes(node::degree(leaf)), coefficients.bytes.size() - offset));
+}
 
 /// Decodes the coefficients of any leaf, in units of its step. `leaf` is the packed node.
 void decodeAnyLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf, double* out);

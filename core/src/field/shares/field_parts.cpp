@@ -74,12 +74,11 @@ class Assembly {
 
   /// Copies the coefficients of the leaves, in depth-first order.
   template <typename T>
-  void joinCoefficients(const std::vector<T>&) {
+  void joinCoefficients(const FieldArray<T>&) {
     std::vector<T> joined;
     for (const std::uint32_t leaf : leaves_) {
       std::uint64_t& bits = whole_.nodes[leaf];
-      const auto& from = std::get<std::vector<T>>(parts_[source_[leaf]].coefficients);
-      const auto begin = from.begin() + node::offset(bits);
+      const T* begin = query::leafOf(std::get<FieldArray<T>>(parts_[source_[leaf]].coefficients), bits);
       if (joined.size() > 0xffffffff)
         throw Error("the field needs more than 2^32 coefficients; raise the target error");
       bits = node::leaf(node::degree(bits), static_cast<std::uint32_t>(joined.size()));
@@ -90,20 +89,21 @@ class Assembly {
 
   /// Copies the bytes of the leaves, in the order of their nodes.
   void joinCoefficients(const QuantizedCoefficients& first) {
-    QuantizedCoefficients joined{.step = first.step, .meanBits = first.meanBits, .bytes = {}};
+    std::vector<std::uint8_t> joined;
     std::ranges::sort(leaves_);
     for (const std::uint32_t leaf : leaves_) {
       std::uint64_t& bits = whole_.nodes[leaf];
       const auto& from = std::get<QuantizedCoefficients>(parts_[source_[leaf]].coefficients);
-      const auto begin = from.bytes.begin() + node::offset(bits);
-      const auto size = std::ptrdiff_t(query::quantizedLeafBytes(from, bits));
+      const std::uint8_t* begin = query::leafOf(from, bits);
+      const std::size_t size = query::quantizedLeafBytes(from, bits);
       bits = node::quantizedLeaf(node::degree(bits), node::shift(bits), node::isWide(bits),
-                                 static_cast<std::uint32_t>(joined.bytes.size()));
-      joined.bytes.insert(joined.bytes.end(), begin, begin + size);
+                                 static_cast<std::uint32_t>(joined.size()));
+      joined.insert(joined.end(), begin, begin + size);
     }
-    joined.bytes.resize(joined.bytes.size() + QuantizedCoefficients::kPadding);
-    joined.bytes.shrink_to_fit();
-    whole_.coefficients = std::move(joined);
+    joined.resize(joined.size() + QuantizedCoefficients::kPadding);
+    joined.shrink_to_fit();
+    whole_.coefficients =
+        QuantizedCoefficients{.step = first.step, .meanBits = first.meanBits, .bytes = std::move(joined)};
   }
 
   std::vector<FieldData> parts_;
@@ -117,9 +117,11 @@ void partItems(Stream& stream, Coefficients& coefficients) {
   if constexpr (requires { coefficients.meanBits; }) {
     stream.item(coefficients.step);
     stream.item(coefficients.meanBits);
-    stream.list(coefficients.bytes);
+    partItems(stream, coefficients.bytes);
+  } else if constexpr (std::is_const_v<Coefficients>) {
+    stream.list(coefficients.all());
   } else {
-    stream.list(coefficients);
+    stream.list(coefficients.values());
   }
 }
 
