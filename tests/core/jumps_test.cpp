@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <set>
 
 #include "basis/legendre.h"
 #include "field/query/evaluate.h"
@@ -247,43 +248,62 @@ Field steppedField() {
   return Field(std::move(data));
 }
 
-TEST(FaceSteps, equalTheJumpBetweenTheTwoLeaves) {
+/// Each leaf of the field is constant, so that a random point's step is the jump of the interface on which it lies.
+TEST(FaceSteps, equalTheJumpsOfInterfaces) {
   const Field field = steppedField();
   const Jumps jumps = findJumps(field);
   ASSERT_GT(jumps.hanging, 100u);
-  for (const Interface& face : jumps.interfaces) {
-    const FaceSteps steps = stepsAcrossFaces(field, std::span(&face, 1), 5, 1, 1);
-    ASSERT_EQ(steps.points, 5u);
-    ASSERT_EQ(steps.value, face.value.max) << face.center.transpose();
+  std::set<double> known, found;
+  for (const Interface& face : jumps.interfaces) known.insert(face.value.max);
+  constexpr std::size_t kSeeds = 300;
+  for (std::size_t seed = 0; seed < kSeeds; ++seed) {
+    const FaceSteps steps = stepsAcrossFaces(field, 1, seed, 1);
+    ASSERT_EQ(steps.points, 1u);
+    ASSERT_TRUE(known.contains(steps.value)) << seed;
     ASSERT_EQ(steps.gradient, 0);
+    found.insert(steps.value);
+  }
+  EXPECT_GT(found.size(), kSeeds / 2) << "most points lie on different interfaces";
+  EXPECT_EQ(stepsAcrossFaces(field, 100 * jumps.interfaces.size()).value, jumps.value.max);
+}
+
+TEST(Jumps, totalsNeedNoInterfaces) {
+  const Field field = randomField(11, {.grid = {5, 4, 3}, .maxDepth = 3});
+  const Jumps jumps = findJumps(field);
+  for (const int threads : {1, 3}) {
+    const JumpTotals totals = measureJumps(field, threads);
+    EXPECT_EQ(totals.hanging, jumps.hanging);
+    EXPECT_EQ(totals.area, jumps.area);
+    EXPECT_EQ(totals.value.rms, jumps.value.rms);
+    EXPECT_EQ(totals.value.max, jumps.value.max);
+    EXPECT_EQ(totals.gradient.rms, jumps.gradient.rms);
+    EXPECT_EQ(totals.gradient.max, jumps.gradient.max);
   }
 }
 
 TEST(FaceSteps, approachTheGreatestJumpFromRandomPoints) {
   const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
   const Jumps jumps = findJumps(field);
-  const FaceSteps steps = stepsAcrossFaces(field, jumps.interfaces, 50'000);
+  const FaceSteps steps = stepsAcrossFaces(field, 50'000);
   EXPECT_GT(steps.value, 0.7 * jumps.value.max);
   EXPECT_LT(steps.value, 1.01 * jumps.value.max);
   EXPECT_GT(steps.gradient, 0.7 * jumps.gradient.max);
   EXPECT_LT(steps.gradient, 1.01 * jumps.gradient.max);
-  const FaceSteps blended = stepsAcrossFaces(hpsdf::blended(field), jumps.interfaces, 50'000);
+  const FaceSteps blended = stepsAcrossFaces(hpsdf::blended(field), 50'000);
   EXPECT_LT(blended.value, 1e-13);
   EXPECT_LT(blended.gradient, 1e-10);
-  const FaceSteps one = stepsAcrossFaces(field, jumps.interfaces, 9'999, 7, 1);
-  const FaceSteps three = stepsAcrossFaces(field, jumps.interfaces, 9'999, 7, 3);
+  const FaceSteps one = stepsAcrossFaces(field, 9'999, 7, 1);
+  const FaceSteps three = stepsAcrossFaces(field, 9'999, 7, 3);
   EXPECT_EQ(one.points, 9'999u);
   EXPECT_EQ(one.value, three.value);
   EXPECT_EQ(one.gradient, three.gradient);
-  EXPECT_NE(one.value, stepsAcrossFaces(field, jumps.interfaces, 9'999, 8).value);
+  EXPECT_NE(one.value, stepsAcrossFaces(field, 9'999, 8).value);
 }
 
 TEST(FaceSteps, areZeroWithoutFacesAndCanBeCancelled) {
-  EXPECT_EQ(stepsAcrossFaces(Field(row({{1}})), {}, 100).points, 0u);
+  EXPECT_EQ(stepsAcrossFaces(Field(row({{1}})), 100).points, 0u);
   const Field field = randomField(11, {.grid = {3, 3, 3}, .maxDepth = 2});
-  const Jumps jumps = findJumps(field);
-  EXPECT_THROW(stepsAcrossFaces(field, jumps.interfaces, 100, 1, 2, {.report = {}, .cancelled = [] { return true; }}),
-               Cancelled);
+  EXPECT_THROW(stepsAcrossFaces(field, 100, 1, 2, {.report = {}, .cancelled = [] { return true; }}), Cancelled);
 }
 
 TEST(Jumps, oneCellHasNoInterfaces) {

@@ -26,7 +26,7 @@ struct Verified {
   std::string surface;
   VerifyOptions options;
   Verification figures;
-  const Jumps& jumps;
+  JumpTotals jumps;
   FaceSteps steps;
   double diagonal;  ///< length of the domain's diagonal
 };
@@ -286,9 +286,9 @@ void runVerify(Session& session, const Arguments& arguments) {
   Verification figures = withProgress(session.console(), [&](const Progress& progress) {
     return verify(current.field, {*reference.distance, reference.normal, reference.mesh}, options, progress);
   });
-  const Jumps& jumps = session.jumps();
+  const JumpTotals jumps = session.jumpTotals(options.threads);
   const FaceSteps steps = withProgress(session.console(), [&](const Progress& progress) {
-    return stepsAcrossFaces(current.field, jumps.interfaces, options.points, options.seed, options.threads, progress);
+    return stepsAcrossFaces(current.field, options.points, options.seed, options.threads, progress);
   });
   const Verified verified{
       current.name, surface, options, std::move(figures), jumps, steps, current.field.domain().diagonal().norm()};

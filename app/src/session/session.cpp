@@ -59,6 +59,12 @@ void Session::setFileBytes(std::uintmax_t bytes) { field_->fileBytes = bytes; }
 
 const Jumps& Session::jumps() { return jumpsOf(current().field, jumps_, console_); }
 
+JumpTotals Session::jumpTotals(int threads) {
+  if (jumps_) return *jumps_;
+  return withProgress(console_,
+                      [&](const Progress& progress) { return measureJumps(current().field, threads, progress); });
+}
+
 bool Session::knowsExact() const {
   return exact_ || exactOfArgument_ || isShape(current().field.metadata().source.name);
 }

@@ -72,6 +72,8 @@ class Session {
   /// Returns the jumps of the current field across cell faces. The first call measures them. Throws `Cancelled` after
   /// Ctrl-C.
   const Jumps& jumps();
+  /// Returns the totals of these jumps. If the jumps are not known, measures the totals alone, and does not keep them.
+  JumpTotals jumpTotals(int threads);
   bool knowsJumps() const { return jumps_.has_value(); }
 
   /// Returns the exact distance to `surface` and keeps it for later calls. If `surface` is empty, takes the surface

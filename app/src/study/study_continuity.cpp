@@ -74,8 +74,8 @@ class ContinuityStudy {
       row[name + "_ratio"] = figure.get<double>() / (first_.is_null() ? row : first_)[name].get<double>();
     };
     const int threads = input_.options.threads;
-    const Jumps jumps =
-        withProgress(console_, [&](const Progress& progress) { return findJumps(field, threads, progress); });
+    const JumpTotals jumps =
+        withProgress(console_, [&](const Progress& progress) { return measureJumps(field, threads, progress); });
     add("jump_rms", jumps.value.rms);
     add("jump_max", jumps.value.max);
     add("rms", measureError(field, uniform_, threads).rms);

@@ -3,11 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "hpsdf/error.h"
 #include "hpsdf/field.h"
-#include "hpsdf/jumps.h"
 
 namespace hpsdf {
 
@@ -20,12 +18,11 @@ struct FaceSteps {
   void add(const FaceSteps& other);
 };
 
-/// Queries a field on both sides of faces at `count` random points. Each point lies on a random element of `faces`,
-/// which are interfaces of the field (`Jumps::interfaces`). Small faces are chosen as often as large faces. At each
-/// point the field is queried at two positions that lie in different leaves and differ only by the spacing of
-/// floating-point numbers. The result depends on the seed, not on `threads` (0: all that the machine offers). Throws
-/// `Cancelled` when `progress` says so.
-FaceSteps stepsAcrossFaces(const Field& field, std::span<const Interface> faces, std::size_t count,
-                           std::uint64_t seed = 1, int threads = 0, const Progress& progress = {});
+/// Queries a field on both sides of the interfaces between its leaves (`Interface`), at `count` random points. Each
+/// point lies on a random interface; small ones are chosen as often as large ones. At each point the field is queried
+/// at two positions that lie in different leaves and differ only by the spacing of floating-point numbers. The result
+/// depends on the seed, not on `threads` (0: all that the machine offers). Throws `Cancelled` when `progress` says so.
+FaceSteps stepsAcrossFaces(const Field& field, std::size_t count, std::uint64_t seed = 1, int threads = 0,
+                           const Progress& progress = {});
 
 }  // namespace hpsdf

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -277,25 +279,45 @@ class FaceMeter {
   std::array<std::vector<double>, 2> along_;  ///< local coordinates of the samples along the face
 };
 
-void computeTotals(Jumps& jumps) {
+/// Sums over interfaces, from which their totals follow.
+struct JumpSums {
+  JumpTotals totals;
   double valueSquares = 0, gradientSquares = 0;
-  for (const Interface& face : jumps.interfaces) {
-    jumps.hanging += face.hanging();
-    jumps.area += face.area;
+
+  void add(const Interface& face) {
+    totals.hanging += face.hanging();
+    totals.area += face.area;
     valueSquares += face.area * face.value.rms * face.value.rms;
     gradientSquares += face.area * face.gradient.rms * face.gradient.rms;
-    jumps.value.max = std::max(jumps.value.max, face.value.max);
-    jumps.gradient.max = std::max(jumps.gradient.max, face.gradient.max);
+    addMaxima(face.value, face.gradient);
   }
-  if (jumps.area > 0) {
-    jumps.value.rms = std::sqrt(valueSquares / jumps.area);
-    jumps.gradient.rms = std::sqrt(gradientSquares / jumps.area);
+  void add(const JumpSums& other) {
+    totals.hanging += other.totals.hanging;
+    totals.area += other.totals.area;
+    valueSquares += other.valueSquares;
+    gradientSquares += other.gradientSquares;
+    addMaxima(other.totals.value, other.totals.gradient);
   }
-}
+  JumpTotals result() const {
+    JumpTotals all = totals;
+    if (all.area > 0) {
+      all.value.rms = std::sqrt(valueSquares / all.area);
+      all.gradient.rms = std::sqrt(gradientSquares / all.area);
+    }
+    return all;
+  }
 
-}  // namespace
+ private:
+  void addMaxima(const Jump& value, const Jump& gradient) {
+    totals.value.max = std::max(totals.value.max, value.max);
+    totals.gradient.max = std::max(totals.gradient.max, gradient.max);
+  }
+};
 
-Jumps findJumps(const Field& field, int threads, const Progress& progress) {
+/// Measures the faces of all leaves, in chunks, and returns their totals. Calls keep(chunk, faces) for the faces of
+/// each chunk, on any thread.
+template <typename Keep>
+JumpTotals measureAll(const Field& field, int threads, const Progress& progress, const Keep& keep) {
   const FieldData& data = field.data();
   const std::vector<OctreeNode> leaves = allLeaves(data);
   int maxDegree = 0;
@@ -304,15 +326,40 @@ Jumps findJumps(const Field& field, int threads, const Progress& progress) {
   for (int degree = 0; degree <= maxDegree; ++degree) samples.emplace_back(degree);
 
   constexpr std::size_t kChunk = 256;
-  const auto measure = [&](std::vector<Interface>& faces, std::size_t first, std::size_t count) {
+  const auto measure = [&](JumpSums& sums, std::size_t first, std::size_t count) {
     FaceMeter meter(field, samples);
+    std::vector<Interface> faces;
     for (std::size_t n = first; n < first + count; ++n) meter.measureLeaf(leaves[n], faces);
+    for (const Interface& face : faces) sums.add(face);
+    keep(first / kChunk, std::move(faces));
   };
-  Jumps jumps;
-  jumps.interfaces = withThreads(threads, [&] {
-    return detail::listOfChunks<Interface>(leaves.size(), kChunk, progress, "measuring jumps", measure);
+  return withThreads(threads, [&] {
+    return detail::sumOfChunks<JumpSums>(leaves.size(), kChunk, progress, "measuring jumps", measure).result();
   });
-  computeTotals(jumps);
+}
+
+}  // namespace
+
+JumpTotals measureJumps(const Field& field, int threads, const Progress& progress) {
+  return measureAll(field, threads, progress, [](std::size_t, const std::vector<Interface>&) {});
+}
+
+Jumps findJumps(const Field& field, int threads, const Progress& progress) {
+  std::mutex keeping;
+  std::map<std::size_t, std::vector<Interface>> chunks;
+  Jumps jumps{measureAll(field, threads, progress,
+                         [&](std::size_t chunk, std::vector<Interface>&& faces) {
+                           const std::lock_guard lock(keeping);
+                           chunks[chunk] = std::move(faces);
+                         }),
+              {}};
+  std::size_t count = 0;
+  for (const auto& [chunk, faces] : chunks) count += faces.size();
+  jumps.interfaces.reserve(count);
+  for (auto& [chunk, faces] : chunks) {
+    jumps.interfaces.insert(jumps.interfaces.end(), faces.begin(), faces.end());
+    faces = {};
+  }
   return jumps;
 }
 
