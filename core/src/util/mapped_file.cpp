@@ -50,4 +50,14 @@ MappedFile::~MappedFile() {
   if (!bytes_.empty()) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
 }
 
+void MappedFile::readAnywhere() const {
+  ::madvise(const_cast<std::byte*>(bytes_.data()), bytes_.size(), MADV_RANDOM);  // A failure only costs time.
+}
+
+void MappedFile::readSoon(std::size_t first, std::size_t size) const {
+  static const auto kPage = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  const std::size_t start = first / kPage * kPage;
+  ::madvise(const_cast<std::byte*>(bytes_.data()) + start, first + size - start, MADV_WILLNEED);
+}
+
 }  // namespace hpsdf::detail

@@ -18,6 +18,12 @@ class MappedFile {
 
   std::span<const std::byte> bytes() const { return bytes_; }
 
+  /// Tells the operating system that parts of the file will be read in any order, so that it reads no further pages
+  /// than those that are touched or announced by `readSoon`.
+  void readAnywhere() const;
+  /// Tells the operating system to begin reading the pages that hold these bytes, which must lie in the file.
+  void readSoon(std::size_t first, std::size_t size) const;
+
  private:
   std::span<const std::byte> bytes_;
 };

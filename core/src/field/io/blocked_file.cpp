@@ -4,9 +4,12 @@
 #include <array>
 #include <cstring>
 
+#include "hpsdf/detail/memory.h"
+
 namespace hpsdf::detail {
 namespace {
 
+constexpr std::size_t kSequence = 16;  // number of blocks, read one after the other, after which as many are read ahead
 constexpr std::size_t kHashBytes = sizeof(std::uint64_t);
 
 std::uint64_t checksumOf(std::span<const std::byte> bytes) {
@@ -22,8 +25,8 @@ std::size_t paddingAt(std::size_t position) {
 
 }  // namespace
 
-CheckedBlocks::CheckedBlocks(const std::filesystem::path& file, const FileKind& kind)
-    : path_(file), kind_(kind), file_(file) {
+CheckedBlocks::CheckedBlocks(const std::filesystem::path& file, const FileKind& kind, ReadOrder order)
+    : path_(file), kind_(kind), file_(file), mostInMemory_(std::size_t(allowedMemory() / 4) / kBlockBytes) {
   const std::span<const std::byte> all = file_.bytes();
   if (all.size() < 2 * kHashBytes) damaged("it ends too early");
   // Each block adds its bytes and its checksum to the length of the file, the last one at least one byte.
@@ -37,14 +40,36 @@ CheckedBlocks::CheckedBlocks(const std::filesystem::path& file, const FileKind& 
   if (checksumOf(table) != ofTable) damaged("its checksums are damaged, or its length is wrong");
   checksums_.resize(count);
   std::memcpy(checksums_.data(), table.data(), table.size());
-  checked_ = std::make_unique<std::atomic<std::uint8_t>[]>(count);
+  states_ = std::make_unique<std::atomic<State>[]>(count);
+  if (order == ReadOrder::any) file_.readAnywhere();
 }
 
-void CheckedBlocks::check(std::size_t block) const {
+bool CheckedBlocks::isInSequence(std::size_t block) const {
+  if (block < kSequence) return false;
+  for (std::size_t before = block - kSequence; before < block; ++before)
+    if (states_[before].load(std::memory_order_relaxed) != State::inMemory) return false;
+  return true;
+}
+
+void CheckedBlocks::read(std::size_t block) const {
   const std::size_t first = block * kBlockBytes;
-  if (checksumOf(content_.subspan(first, std::min(kBlockBytes, content_.size() - first))) != checksums_[block])
+  const bool isUnchecked = states_[block].load(std::memory_order_relaxed) == State::unchecked;
+  if (isInSequence(block))
+    file_.readSoon(first, std::min(kSequence * kBlockBytes, content_.size() - first));
+  else if (isUnchecked)
+    file_.readSoon(first, sizeOf(block));
+  if (isUnchecked && checksumOf(content_.subspan(first, sizeOf(block))) != checksums_[block])
     damaged("its checksum of the block at byte " + std::to_string(first) + " is wrong");
-  checked_[block].store(1, std::memory_order_relaxed);
+  states_[block].store(State::inMemory, std::memory_order_relaxed);
+  if (++countInMemory_ > mostInMemory_) forgetMemory();
+}
+
+void CheckedBlocks::forgetMemory() const {
+  countInMemory_ = 0;
+  for (std::size_t block = 0; block < checksums_.size(); ++block) {
+    State state = State::inMemory;
+    states_[block].compare_exchange_strong(state, State::checked, std::memory_order_relaxed);
+  }
 }
 
 void requireBlocks(const CheckedBlocks& blocks, const void* first, std::size_t bytes) {

@@ -385,7 +385,8 @@ FieldData readData(const std::filesystem::path& file, Reader& reader, const Star
 }
 
 FieldData readBlocked(const std::filesystem::path& file, Loading loading) {
-  detail::BlockReader reader(file, kFieldFile);
+  detail::BlockReader reader(file, kFieldFile,
+                             loading == Loading::mapped ? detail::ReadOrder::any : detail::ReadOrder::sequential);
   detail::Magic magic;
   for (char& c : magic) reader.item(c);
   Start start;
