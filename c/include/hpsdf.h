@@ -185,7 +185,8 @@ HPSDF_API hpsdf_status hpsdf_field_load(const char* file, hpsdf_field** field);
 
 /* Like hpsdf_field_load, but the field stays in the file, and its coefficients are read and checked only where they are
  * needed: for fields that are larger than the memory. The file must be uncompressed, and must not be changed while the
- * field exists. Functions that work on the field fail with HPSDF_FILE_ERROR where the file is damaged. */
+ * field exists: if it becomes shorter, the system ends the process with the signal SIGBUS. Functions that work on the
+ * field fail with HPSDF_FILE_ERROR where the file is damaged. */
 HPSDF_API hpsdf_status hpsdf_field_map(const char* file, hpsdf_field** field);
 
 /* Writes a field as a .hpsdf file, whole or not at all. If compress is not 0, the file is smaller, and writing takes
@@ -202,7 +203,7 @@ HPSDF_API hpsdf_status hpsdf_field_gradients(const hpsdf_field* field, const dou
 /* Writes the domain of a field to box: six numbers. */
 HPSDF_API hpsdf_status hpsdf_field_domain(const hpsdf_field* field, double* box);
 
-/* Returns the bytes of memory that a field takes, or 0 for NULL. */
+/* Returns the bytes that a field takes, or 0 for NULL. The coefficients of a mapped field lie in its file. */
 HPSDF_API size_t hpsdf_field_bytes(const hpsdf_field* field);
 
 HPSDF_API void hpsdf_field_free(hpsdf_field* field);

@@ -198,11 +198,13 @@ FieldClass addField(py::module_& module) {
                              "units of length, or of uint8, the packed integers of quantized coefficients. "
                              "docs/file-format.md describes both.")
       .def_property_readonly("domain", &domain, "The lower and the upper corner of the domain: float64, shape (2, 3).")
-      .def_property_readonly("nbytes", &Field::bytes, "The bytes of memory that the field takes.")
+      .def_property_readonly("nbytes", &Field::bytes,
+                             "The bytes that the field takes; the coefficients of a mapped field lie in its file.")
       .def("__repr__", &description);
   module.def("load", &loadedField, "path"_a, py::kw_only(), "mapped"_a = false,
              "Reads a field from a .hpsdf file. The file is not needed afterwards. With mapped, the field stays in the "
-             "file, which must be uncompressed and must not be changed: its coefficients are read and checked only "
+             "file, which must be uncompressed and must not be changed (if it becomes shorter, the system ends the "
+             "process): its coefficients are read and checked only "
              "where they are needed, so that it may be larger than the memory. Raises FileError (an OSError), for a "
              "mapped field also where it is used.");
   return fields;

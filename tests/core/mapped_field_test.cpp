@@ -5,14 +5,18 @@
 #include <iterator>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "field/io/blocked_file.h"
 #include "hpsdf/build.h"
 #include "hpsdf/continuity.h"
 #include "hpsdf/exact_distance.h"
 #include "hpsdf/field_file.h"
 #include "hpsdf/jumps.h"
+#include "hpsdf/mesh_file.h"
 #include "hpsdf/shapes.h"
 #include "hpsdf/verify.h"
 #include "support/file_checksums.h"
@@ -161,7 +165,9 @@ TEST_F(Mapped, damageIsFoundWhereItIsRead) {
   expectFound([&](const Field& mapped) { mapped.cellAt(near); });
   expectFound([&](const Field& mapped) { mapped.values(std::vector<Vector3>(3, near), std::span(values).first(3)); });
   expectFound([&](const Field& mapped) { mapped.valuesAndGradients(points, answers); });
-  expectFound([&](const Field& mapped) { statistics(mapped); });
+  expectFound([&](const Field& mapped) { mapped.forEachCell([](const Cell&) {}); });
+  expectFound([&](const Field& mapped) { measureJumps(mapped); });
+  EXPECT_EQ(statistics(load(file(), Loading::mapped)).leaves, statistics(field).leaves) << "needs no coefficients";
   expectFound([&](const Field& mapped) { findJumps(mapped); });
   expectFound([&](const Field& mapped) { weaklyContinuous(mapped, {}); });
   expectFound([&](const Field& mapped) { save(mapped, folder_.path() / "again.hpsdf"); });
@@ -199,6 +205,131 @@ TEST_F(Mapped, forgedQuantizedLeavesAreNotReadBeyondTheEnd) {
   std::fill_n(bytes.begin() + std::ptrdiff_t(at), stored.size(), char(0xff));
   writeAll(file(), support::withBlockChecksums(bytes));
   EXPECT_NE(messageOf([&] { load(file(), Loading::mapped); }).find("not well formed"), std::string::npos);
+}
+
+TEST_F(Mapped, theLastLeavesAreCheckedAtOnceAndNameTheFileOnce) {
+  const Field field = torusField(CoefficientType::quantized);
+  save(field, file());
+  std::string bytes = readAll(file());
+  const auto& coefficients = std::get<QuantizedCoefficients>(field.data().coefficients).bytes;
+  const std::string stored(reinterpret_cast<const char*>(coefficients.data()), coefficients.size());
+  bytes[bytes.find(stored) + stored.size() - 20] ^= 1;
+  writeAll(file(), bytes);
+  const std::string message = messageOf([&] { load(file(), Loading::mapped); });
+  EXPECT_TRUE(message.starts_with(file().string() + ": the field file is damaged")) << message;
+  EXPECT_EQ(message.find(file().string(), 1), std::string::npos) << message;
+}
+
+/// Numbers that are not finite are found where they are read, although their checksum is right.
+TEST_F(Mapped, coefficientsAreFinite) {
+  for (const auto type : {CoefficientType::float64, CoefficientType::float32}) {
+    const Field field = torusField(type);
+    save(field, file());
+    std::string bytes = readAll(file());
+    const std::size_t numberBytes = type == CoefficientType::float64 ? 8 : 4;
+    const std::size_t at = bytes.size() / 2 / numberBytes * numberBytes + numberBytes - 2;
+    bytes[at] = char(0xff), bytes[at + 1] = char(0x7f);
+    writeAll(file(), support::withBlockChecksums(bytes));
+    EXPECT_NE(messageOf([&] { load(file()); }).find("a coefficient is not finite"), std::string::npos);
+    const Field mapped = load(file(), Loading::mapped);
+    EXPECT_NE(messageOf([&] { mapped.forEachCell([](const Cell&) {}); }).find("a coefficient is not finite"),
+              std::string::npos);
+  }
+}
+
+TEST_F(Mapped, fieldsWithExactLeavesAndBoundsAreMapped) {
+  const ExactDistance gear(loadMesh("builtin:gear"));
+  const Field field =
+      build(gear, domainAround(gear.source().box), {.targetError = 1e-4, .strategy = Strategy::hpx, .bounds = true});
+  ASSERT_FALSE(field.data().exact.empty());
+  save(field, file());
+  const Field mapped = load(file(), Loading::mapped);
+  ASSERT_TRUE(mapped.isMapped());
+  EXPECT_EQ(mapped.data().bounds.size(), field.data().bounds.size());
+  for (const Vector3& point : randomPoints(field.domain(), 2000)) EXPECT_EQ(mapped.value(point), field.value(point));
+}
+
+TEST_F(Mapped, severalThreadsBeginTogether) {
+  const Field field = torusField(CoefficientType::float64);
+  save(field, file());
+  const Field mapped = load(file(), Loading::mapped);
+  const std::vector<Vector3> points = randomPoints(field.domain(), 2000);
+  std::vector<std::vector<double>> found(4, std::vector<double>(points.size()));
+  std::vector<std::thread> threads;
+  for (auto& values : found) threads.emplace_back([&] { mapped.values(points, values); });
+  for (std::thread& thread : threads) thread.join();
+  std::vector<double> expected(points.size());
+  field.values(points, expected);
+  for (const auto& values : found) EXPECT_EQ(values, expected);
+}
+
+/// Writes bytes and returns those that both readers read.
+class BlockedFile : public Mapped {
+ protected:
+  static constexpr detail::FileKind kKind{"test file", "a test file", "write it again"};
+
+  void write(const std::vector<std::uint8_t>& bytes) const {
+    detail::BlockWriter writer(file());
+    writer.put(std::as_bytes(std::span(bytes)));
+    writer.finish();
+  }
+  template <typename Reader>
+  std::vector<std::uint8_t> read(std::size_t count) const {
+    Reader reader(file(), kKind);
+    std::vector<std::uint8_t> bytes(count);
+    reader.get(std::as_writable_bytes(std::span(bytes)));
+    reader.finish();
+    return bytes;
+  }
+};
+
+std::vector<std::uint8_t> randomBytes(std::size_t count) {
+  std::mt19937_64 random(5);
+  std::vector<std::uint8_t> bytes(count);
+  for (std::uint8_t& byte : bytes) byte = std::uint8_t(random());
+  return bytes;
+}
+
+TEST_F(BlockedFile, anyNumberOfBytesIsRead) {
+  for (const std::size_t count :
+       {std::size_t{1}, std::size_t{8}, kBlock - 1, kBlock, kBlock + 1, 2 * kBlock, 3 * kBlock - 8, 3 * kBlock + 8}) {
+    const std::vector<std::uint8_t> bytes = randomBytes(count);
+    write(bytes);
+    EXPECT_EQ(read<detail::BlockStreamReader>(count), bytes);
+    EXPECT_EQ(read<detail::MappedBlockReader>(count), bytes);
+    const std::string whole = readAll(file());
+    EXPECT_EQ(whole.size(), count + (count + kBlock - 1) / kBlock * 8 + 8);
+    for (const std::size_t length : {whole.size() - 1, whole.size() - 8, whole.size() - 9, std::size_t{15}}) {
+      writeAll(file(), whole.substr(0, length));
+      EXPECT_NE(messageOf([&] { read<detail::BlockStreamReader>(count); }), "") << count << " " << length;
+      EXPECT_NE(messageOf([&] { read<detail::MappedBlockReader>(count); }), "") << count << " " << length;
+    }
+    for (const std::size_t at : {std::size_t{0}, count - 1, count, whole.size() - 1}) {
+      std::string damaged = whole;
+      damaged[at] ^= 1;
+      writeAll(file(), damaged);
+      EXPECT_NE(messageOf([&] { read<detail::BlockStreamReader>(count); }), "") << count << " " << at;
+      EXPECT_NE(messageOf([&] { read<detail::MappedBlockReader>(count); }), "") << count << " " << at;
+    }
+  }
+}
+
+TEST_F(BlockedFile, blocksAreReadInAnyOrderAndMoreThanMemoryHolds) {
+  constexpr std::size_t kBlocks = 100;
+  const std::vector<std::uint8_t> bytes = randomBytes(kBlocks * kBlock);
+  write(bytes);
+  const detail::CheckedBlocks blocks(file(), kKind, 20);
+  const auto expectBlock = [&](std::size_t block) {
+    blocks.require(block * kBlock + 10, kBlock - 20);
+    EXPECT_TRUE(std::ranges::equal(blocks.content().subspan(block * kBlock, kBlock),
+                                   std::as_bytes(std::span(bytes)).subspan(block * kBlock, kBlock)));
+  };
+  for (int pass = 0; pass < 2; ++pass)
+    for (std::size_t block = 0; block < kBlocks; ++block) expectBlock(block);
+  std::mt19937_64 random(6);
+  for (int n = 0; n < 300; ++n) expectBlock(random() % kBlocks);
+  blocks.require(0, 0);
+  blocks.require(bytes.size(), 0);
 }
 
 TEST_F(Mapped, filesThatCannotBeMappedSayWhy) {

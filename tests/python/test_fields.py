@@ -56,6 +56,14 @@ def test_mapped_files(field: hpsdf.Field, points: Array, tmp_path: pathlib.Path)
     assert numpy.array_equal(mapped(points), field(points))
     assert numpy.array_equal(mapped.coefficients, field.coefficients)
     mapped.save(tmp_path / "small.hpsdf", compress=True)
+    large = hpsdf.build(hpsdf.load_mesh("builtin:torus"), target_error=1e-8, coefficients="double", strategy="hp")
+    large.save(tmp_path / "large.hpsdf")
+    content = bytearray((tmp_path / "large.hpsdf").read_bytes())
+    content[len(content) // 2] ^= 1
+    (tmp_path / "large.hpsdf").write_bytes(content)
+    damaged = hpsdf.load(tmp_path / "large.hpsdf", mapped=True)
+    with pytest.raises(hpsdf.FileError, match="its checksum of the block"):
+        damaged.coefficients  # noqa: B018 reads all
     with pytest.raises(hpsdf.FileError, match="cannot be mapped, because it is compressed"):
         hpsdf.load(tmp_path / "small.hpsdf", mapped=True)
     with pytest.raises(TypeError):

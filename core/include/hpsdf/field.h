@@ -102,7 +102,7 @@ class Field {
   /// Returns the grid in which queries start their descent of the octree, for uploads to a GPU and tests.
   const LookupGrid& lookupGrid() const { return lookupGrid_; }
 
-  /// Returns the bytes that each part of the field takes.
+  /// Returns the bytes that each part of the field takes. The coefficients of a mapped field lie in its file.
   FieldBytes bytesOfParts() const;
   /// Returns the bytes that the whole field takes.
   std::size_t bytes() const { return bytesOfParts().total(); }

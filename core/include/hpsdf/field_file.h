@@ -28,14 +28,15 @@ enum class Loading : std::uint8_t {
   /// fields can be larger than the memory. Coefficients are checked when they are first needed, in blocks of 64 KiB
   /// with a checksum each: queries and all else that reads them can throw `Error` (of the kind `file`). The octree,
   /// bounds and triangles are read and checked at once. The file must not be changed as long as the field or a copy of
-  /// it exists; saving to it is safe, because `save` makes a new file. Compressed files and those of versions before 12
+  /// it exists: where it has become shorter, or the disk fails, the system ends the process with the signal SIGBUS. To
+  /// save to it is safe, because `save` makes a new file. Compressed files and those of versions before 12
   /// cannot be mapped.
   mapped,
 };
 
-/// Reads the field from a file that `save` wrote. Compressed files need no option. Sizes are checked before
-/// memory is allocated: against the file's length or, of compressed arrays, against what so many bytes can hold and
-/// the memory that the process may take. Throws `Error` if the file is missing, is truncated, is altered, has an
+/// Reads the field from a file that `save` wrote. Compressed files need no option. Sizes are checked before memory is
+/// allocated: against the file's length or, of compressed arrays, against what so many bytes can hold, and against the
+/// memory that the process may take. Throws `Error` if the file is missing, is truncated, is altered, has an
 /// unknown version, is not a `.hpsdf` file, or cannot be loaded in the asked way.
 Field load(const std::filesystem::path& file, Loading loading = Loading::resident);
 

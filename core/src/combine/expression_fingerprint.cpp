@@ -28,7 +28,8 @@ void addAll(Checksum& sum, const std::vector<T>& numbers) {
 }
 template <typename T>
 void addAll(Checksum& sum, const FieldArray<T>& numbers) {
-  addAll(sum, numbers.all());
+  sum.add(bytesOf(std::uint64_t{numbers.size()}));
+  numbers.forEachPiece([&](std::span<const T> piece) { sum.add(std::as_bytes(piece)); });
 }
 
 void addAll(Checksum& sum, const QuantizedCoefficients& coefficients) {

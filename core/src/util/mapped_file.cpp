@@ -14,10 +14,10 @@ namespace hpsdf::detail {
 namespace {
 
 [[noreturn]] void refuseToMap(const std::filesystem::path& file) {
-  const bool isTooLarge = errno == ENOMEM;
+  const int error = errno;
   throw Error(ErrorKind::file, file.string(),
-              "cannot be mapped into memory: " + std::generic_category().message(errno) +
-                  (isTooLarge ? "; raise the limit of the address space (ulimit -v)" : ""));
+              "cannot be mapped into memory: " + std::generic_category().message(error) +
+                  (error == ENOMEM ? "; raise the limit of the address space (ulimit -v)" : ""));
 }
 
 /// A file that is open until the end of the scope.

@@ -57,6 +57,7 @@ class CpuRenderer final : public Renderer {
   ViewBuffers surface(const SurfaceView& view, int width, int height, std::span<const std::uint8_t> chosen) override {
     checkOffset(view.offset);
     checkChosen(chosen, width, height);
+    field_.prepareTracing();
     const RayGeometry geometry(field_.space(), view.camera, width, height, view.clip);
     ViewBuffers buffers = emptyBuffers(width, height, true);
     tbb::parallel_for(0, height, [&](int y) {

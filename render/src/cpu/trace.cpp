@@ -80,11 +80,13 @@ double certainlyAbove(double height, double steepest) {
 }  // namespace
 
 TraceField::TraceField(const Field& field)
-    : field_(field.data()),
-      blendExtents_(field.lookupGrid().blendExtents),
-      space_(field_),
-      zones_(blendZoneBounds(field)),
-      bounds_(surfaceBounds(field_, zones_)) {}
+    : whole_(field), field_(field.data()), blendExtents_(field.lookupGrid().blendExtents), space_(field_) {}
+
+void TraceField::prepareTracing() {
+  if (!bounds_.empty()) return;
+  zones_ = blendZoneBounds(whole_);
+  bounds_ = surfaceBounds(field_, zones_);
+}
 
 bool TraceField::inBlendZone(const CellPoint& at) const {
   return field_.blend > 0 && ((at.fraction.array() < field_.blend) || (at.fraction.array() > 1 - field_.blend)).any();

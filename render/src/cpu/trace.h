@@ -70,7 +70,10 @@ class TraceField {
   /// Converts a gradient with respect to a cell's local coordinates into one with respect to world coordinates.
   Vector3 worldGradient(const Vector3& local, int depth) const;
 
-  /// The first crossing of f = offset along a ray (docs/rendering.md, "Tracing").
+  /// Makes the bounds of cells that `trace` needs, unless they are there. That reads all coefficients.
+  void prepareTracing();
+
+  /// The first crossing of f = offset along a ray (docs/rendering.md, "Tracing"). Needs `prepareTracing`.
   std::optional<Hit> trace(const Ray& ray, double offset) const;
 
  private:
@@ -114,6 +117,7 @@ class TraceField {
   /// The inverse of worldGradient.
   Vector3 localGradient(const Vector3& world, int depth) const;
 
+  const Field& whole_;
   const FieldData& field_;
   const std::vector<std::uint32_t>& blendExtents_;
   GridSpace space_;

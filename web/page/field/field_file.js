@@ -125,7 +125,7 @@ class Cursor {
    * @param {number} size
    * @returns {ArrayBuffer}
    */
-  block(size) {
+  take(size) {
     const from = this.skip(size);
     return this.bytes.slice(from, from + size).buffer;
   }
@@ -136,7 +136,7 @@ class Cursor {
    */
   array(size) {
     this.align();
-    return this.block(size);
+    return this.take(size);
   }
 
   /**
@@ -216,7 +216,7 @@ function withinDomain(box, lower, upper) {
  */
 function readZones(cursor, { nodes, blend }) {
   if (blend > MOST_BLEND) throw new FieldError("the field is damaged: its blended zones are too wide");
-  const zones = new Float32Array(cursor.block(3 * 4 * nodes));
+  const zones = new Float32Array(cursor.take(3 * 4 * nodes));
   if (!zones.every((bound) => bound >= 0)) throw new FieldError("the field is damaged: a bound of its blended zones is no number");
   return zones;
 }

@@ -53,20 +53,45 @@ class FieldArray {
     }
     return own_.data() + first;
   }
-  /// Returns all numbers. Those in a file are all read and checked.
+  /// Returns all numbers. Those in a file are all read and checked; `forEachPiece` does that better if the file is
+  /// larger than the memory.
   std::span<const T> all() const { return {at(0, size()), size()}; }
+  /// Calls f(numbers) for pieces of the array, from the first one to the last one.
+  template <typename F>
+  void forEachPiece(const F& f) const {
+    for (std::size_t first = 0; first < size(); first += kPiece) {
+      const std::size_t count = std::min(kPiece, size() - first);
+      f(std::span<const T>(at(first, count), count));
+    }
+  }
   /// Returns all numbers so that they can be changed. Those in a file are first copied into memory.
   std::vector<T>& values() {
-    if (isMapped()) *this = FieldArray(std::vector<T>(all().begin(), all().end()));
+    if (isMapped()) {
+      std::vector<T> copies;
+      copies.reserve(size());
+      forEachPiece([&](std::span<const T> piece) { copies.insert(copies.end(), piece.begin(), piece.end()); });
+      *this = FieldArray(std::move(copies));
+    }
     return own_;
   }
   /// Returns a pointer to the first number. Only numbers to which `at` has given access may be read through it, and any
   /// may be prefetched.
   const T* data() const { return isMapped() ? mapped_.data() : own_.data(); }
 
-  friend bool operator==(const FieldArray& a, const FieldArray& b) { return std::ranges::equal(a.all(), b.all()); }
+  friend bool operator==(const FieldArray& a, const FieldArray& b) {
+    if (a.size() != b.size()) return false;
+    bool areEqual = true;
+    std::size_t first = 0;
+    a.forEachPiece([&](std::span<const T> piece) {
+      areEqual = areEqual && std::ranges::equal(piece, std::span(b.at(first, piece.size()), piece.size()));
+      first += piece.size();
+    });
+    return areEqual;
+  }
 
  private:
+  static constexpr std::size_t kPiece = (std::size_t{1} << 16) / sizeof(T);
+
   std::vector<T> own_;
   std::shared_ptr<const detail::CheckedBlocks> blocks_;
   std::span<const T> mapped_;
@@ -161,6 +186,8 @@ struct QuantizedCoefficients {
   double step = 0;  ///< from `kLeastStep` to `kGreatestStep`
   std::uint32_t meanBits = 0;
   FieldArray<std::uint8_t> bytes;  ///< the leaves, and `kPadding` zero bytes
+
+  bool isMapped() const { return bytes.isMapped(); }
 
   /// Returns the step of a leaf. `leaf` is the packed node.
   double stepOf(std::uint64_t leaf) const {

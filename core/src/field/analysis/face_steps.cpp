@@ -35,12 +35,14 @@ struct Face {
 /// All interfaces between leaves. Each is a whole face of the smaller leaf.
 class Faces {
  public:
-  explicit Faces(const FieldData& field) : field_(field), leaves_(query::allLeaves(field)), ends_(leaves_.size()) {
+  Faces(const FieldData& field, const Progress& progress)
+      : field_(field), leaves_(query::allLeaves(field)), ends_(leaves_.size()) {
     constexpr std::size_t kChunk = 1024;
-    detail::forEachChunk(leaves_.size(), kChunk, [&](std::size_t, std::size_t first, std::size_t count) {
-      for (std::size_t n = first; n < first + count; ++n)
-        query::forEachInterface(field_, leaves_[n], [&](int, int, const query::OctreeNode&) { ++ends_[n]; });
-    });
+    detail::forEachChunk(
+        leaves_.size(), kChunk, progress, "counting faces", [&](std::size_t, std::size_t first, std::size_t count) {
+          for (std::size_t n = first; n < first + count; ++n)
+            query::forEachInterface(field_, leaves_[n], [&](int, int, const query::OctreeNode&) { ++ends_[n]; });
+        });
     std::partial_sum(ends_.begin(), ends_.end(), ends_.begin());
   }
 
@@ -86,7 +88,7 @@ void FaceSteps::add(const FaceSteps& other) {
 FaceSteps stepsAcrossFaces(const Field& field, std::size_t count, std::uint64_t seed, int threads,
                            const Progress& progress) {
   return withThreads(threads, [&] {
-    const Faces faces(field.data());
+    const Faces faces(field.data(), progress);
     if (faces.size() == 0) return FaceSteps{};
     constexpr std::size_t kChunk = 4096;
     const auto step = [&](FaceSteps& steps, std::size_t first, std::size_t chunkCount) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <mutex>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -314,52 +313,61 @@ struct JumpSums {
   }
 };
 
-/// Measures the faces of all leaves, in chunks, and returns their totals. Calls keep(chunk, faces) for the faces of
-/// each chunk, on any thread.
-template <typename Keep>
-JumpTotals measureAll(const Field& field, int threads, const Progress& progress, const Keep& keep) {
-  const FieldData& data = field.data();
-  const std::vector<OctreeNode> leaves = allLeaves(data);
-  int maxDegree = 0;
-  for (const OctreeNode& leaf : leaves) maxDegree = std::max(maxDegree, sampleDegree(data.nodes[leaf.node]));
-  std::vector<Samples> samples;
-  for (int degree = 0; degree <= maxDegree; ++degree) samples.emplace_back(degree);
+/// Measures the faces of all leaves of a field, in chunks of leaves.
+class LeafJumps {
+ public:
+  static constexpr std::size_t kChunk = 256;
 
-  constexpr std::size_t kChunk = 256;
-  const auto measure = [&](JumpSums& sums, std::size_t first, std::size_t count) {
-    FaceMeter meter(field, samples);
-    std::vector<Interface> faces;
-    for (std::size_t n = first; n < first + count; ++n) meter.measureLeaf(leaves[n], faces);
+  explicit LeafJumps(const Field& field) : field_(field), leaves_(allLeaves(field.data())) {
+    int maxDegree = 0;
+    for (const OctreeNode& leaf : leaves_) maxDegree = std::max(maxDegree, sampleDegree(field.data().nodes[leaf.node]));
+    for (int degree = 0; degree <= maxDegree; ++degree) samples_.emplace_back(degree);
+  }
+
+  std::size_t leaves() const { return leaves_.size(); }
+
+  /// Appends the faces of a chunk to `faces`, which must be empty, and adds them to `sums`.
+  void measure(std::size_t first, std::size_t count, std::vector<Interface>& faces, JumpSums& sums) const {
+    FaceMeter meter(field_, samples_);
+    for (std::size_t n = first; n < first + count; ++n) meter.measureLeaf(leaves_[n], faces);
     for (const Interface& face : faces) sums.add(face);
-    keep(first / kChunk, std::move(faces));
-  };
-  return withThreads(threads, [&] {
-    return detail::sumOfChunks<JumpSums>(leaves.size(), kChunk, progress, "measuring jumps", measure).result();
-  });
-}
+  }
+
+ private:
+  const Field& field_;
+  std::vector<OctreeNode> leaves_;
+  std::vector<Samples> samples_;  ///< for each degree
+};
+
+constexpr const char* kMeasuringJumps = "measuring jumps";
 
 }  // namespace
 
 JumpTotals measureJumps(const Field& field, int threads, const Progress& progress) {
-  return measureAll(field, threads, progress, [](std::size_t, const std::vector<Interface>&) {});
+  const LeafJumps leaves(field);
+  const auto measure = [&](JumpSums& sums, std::size_t first, std::size_t count) {
+    std::vector<Interface> faces;
+    leaves.measure(first, count, faces, sums);
+  };
+  return withThreads(threads, [&] {
+    return detail::sumOfChunks<JumpSums>(leaves.leaves(), LeafJumps::kChunk, progress, kMeasuringJumps, measure)
+        .result();
+  });
 }
 
 Jumps findJumps(const Field& field, int threads, const Progress& progress) {
-  std::mutex keeping;
-  std::map<std::size_t, std::vector<Interface>> chunks;
-  Jumps jumps{measureAll(field, threads, progress,
-                         [&](std::size_t chunk, std::vector<Interface>&& faces) {
-                           const std::lock_guard lock(keeping);
-                           chunks[chunk] = std::move(faces);
-                         }),
-              {}};
-  std::size_t count = 0;
-  for (const auto& [chunk, faces] : chunks) count += faces.size();
-  jumps.interfaces.reserve(count);
-  for (auto& [chunk, faces] : chunks) {
-    jumps.interfaces.insert(jumps.interfaces.end(), faces.begin(), faces.end());
-    faces = {};
-  }
+  const LeafJumps leaves(field);
+  std::vector<JumpSums> sumsOfChunks(detail::chunksOf(leaves.leaves(), LeafJumps::kChunk));
+  const auto measure = [&](std::vector<Interface>& faces, std::size_t first, std::size_t count) {
+    leaves.measure(first, count, faces, sumsOfChunks[first / LeafJumps::kChunk]);
+  };
+  Jumps jumps;
+  jumps.interfaces = withThreads(threads, [&] {
+    return detail::listOfChunks<Interface>(leaves.leaves(), LeafJumps::kChunk, progress, kMeasuringJumps, measure);
+  });
+  JumpSums sums;
+  for (const JumpSums& ofChunk : sumsOfChunks) sums.add(ofChunk);
+  static_cast<JumpTotals&>(jumps) = sums.result();
   return jumps;
 }
 

@@ -1,7 +1,7 @@
 #include "field/io/blocked_file.h"
 
-#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 
 #include "hpsdf/detail/memory.h"
@@ -9,8 +9,8 @@
 namespace hpsdf::detail {
 namespace {
 
+constexpr std::size_t kBlockBytes = BlockedLayout::kBlockBytes;
 constexpr std::size_t kSequence = 16;  // number of blocks, read one after the other, after which as many are read ahead
-constexpr std::size_t kHashBytes = sizeof(std::uint64_t);
 
 std::uint64_t checksumOf(std::span<const std::byte> bytes) {
   Checksum checksum;
@@ -18,30 +18,45 @@ std::uint64_t checksumOf(std::span<const std::byte> bytes) {
   return checksum.value();
 }
 
-/// Returns the number of zeros that are needed to go on to a multiple of `BlockWriter::kAlignment`.
-std::size_t paddingAt(std::size_t position) {
-  return (BlockWriter::kAlignment - position % BlockWriter::kAlignment) % BlockWriter::kAlignment;
+std::string blockIsWrong(std::size_t block) {
+  return "its checksum of the block at byte " + std::to_string(block * kBlockBytes) + " is wrong";
+}
+
+constexpr const char* kTableIsWrong = "its checksums are damaged, or its length is wrong";
+
+template <typename T>
+bool areFinite(std::span<const std::byte> bytes) {
+  const std::span numbers(reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T));
+  return std::ranges::all_of(numbers, [](T number) { return std::isfinite(number); });
 }
 
 }  // namespace
 
-CheckedBlocks::CheckedBlocks(const std::filesystem::path& file, const FileKind& kind, ReadOrder order)
-    : path_(file), kind_(kind), file_(file), mostInMemory_(std::size_t(allowedMemory() / 4) / kBlockBytes) {
-  const std::span<const std::byte> all = file_.bytes();
-  if (all.size() < 2 * kHashBytes) damaged("it ends too early");
-  // Each block adds its bytes and its checksum to the length of the file, the last one at least one byte.
-  const std::size_t withBlocks = all.size() - kHashBytes;
-  const std::size_t count = (withBlocks + kBlockBytes + kHashBytes - 1) / (kBlockBytes + kHashBytes);
-  if (withBlocks - (count - 1) * (kBlockBytes + kHashBytes) <= kHashBytes) damaged("its length is wrong");
-  content_ = all.first(withBlocks - count * kHashBytes);
-  const auto table = all.subspan(content_.size(), count * kHashBytes);
+BlockedLayout BlockedLayout::of(std::size_t fileBytes, const std::filesystem::path& file, const FileKind& kind) {
+  if (fileBytes < 2 * kHashBytes) throwDamaged(file, kind, "it ends too early");
+  // Each block adds its bytes and its hash to the length of the file, the last one at least one byte.
+  constexpr std::size_t kWithHash = BlockedLayout::kBlockBytes + kHashBytes;
+  const std::size_t withHashes = fileBytes - kHashBytes;
+  const std::size_t blocks = (withHashes + kWithHash - 1) / kWithHash;
+  if (withHashes - (blocks - 1) * kWithHash <= kHashBytes) throwDamaged(file, kind, "its length is wrong");
+  return {.content = withHashes - blocks * kHashBytes, .blocks = blocks};
+}
+
+CheckedBlocks::CheckedBlocks(const std::filesystem::path& file, const FileKind& kind, std::size_t mostInMemory)
+    : path_(file),
+      kind_(kind),
+      file_(file),
+      layout_(BlockedLayout::of(file_.bytes().size(), file, kind)),
+      content_(file_.bytes().first(layout_.content)),
+      checksums_(layout_.blocks),
+      states_(std::make_unique<std::atomic<State>[]>(layout_.blocks)),
+      mostInMemory_(mostInMemory > 0 ? mostInMemory : std::size_t(hpsdf::allowedMemory() / 4) / kBlockBytes) {
+  const auto table = file_.bytes().subspan(layout_.content, layout_.blocks * BlockedLayout::kHashBytes);
   std::uint64_t ofTable = 0;
-  std::memcpy(&ofTable, all.data() + withBlocks, kHashBytes);
-  if (checksumOf(table) != ofTable) damaged("its checksums are damaged, or its length is wrong");
-  checksums_.resize(count);
+  std::memcpy(&ofTable, table.data() + table.size(), sizeof ofTable);
+  if (checksumOf(table) != ofTable) damaged(kTableIsWrong);
   std::memcpy(checksums_.data(), table.data(), table.size());
-  states_ = std::make_unique<std::atomic<State>[]>(count);
-  if (order == ReadOrder::any) file_.readAnywhere();
+  file_.readAnywhere();
 }
 
 bool CheckedBlocks::isInSequence(std::size_t block) const {
@@ -54,21 +69,31 @@ bool CheckedBlocks::isInSequence(std::size_t block) const {
 void CheckedBlocks::read(std::size_t block) const {
   const std::size_t first = block * kBlockBytes;
   const bool isUnchecked = states_[block].load(std::memory_order_relaxed) == State::unchecked;
-  if (isInSequence(block))
+  if (block % kSequence == 0 && isInSequence(block))
     file_.readSoon(first, std::min(kSequence * kBlockBytes, content_.size() - first));
   else if (isUnchecked)
-    file_.readSoon(first, sizeOf(block));
-  if (isUnchecked && checksumOf(content_.subspan(first, sizeOf(block))) != checksums_[block])
-    damaged("its checksum of the block at byte " + std::to_string(first) + " is wrong");
+    file_.readSoon(first, layout_.sizeOf(block));
+  if (isUnchecked) check(block);
   states_[block].store(State::inMemory, std::memory_order_relaxed);
   if (++countInMemory_ > mostInMemory_) forgetMemory();
 }
 
+void CheckedBlocks::check(std::size_t block) const {
+  const std::size_t first = block * kBlockBytes, end = first + layout_.sizeOf(block);
+  if (checksumOf(content_.subspan(first, end - first)) != checksums_[block]) damaged(blockIsWrong(block));
+  const std::size_t from = std::max(first, numbers_.first), to = std::min(end, numbers_.end);
+  if (from >= to) return;
+  const auto numbers = content_.subspan(from, to - from);
+  if (!(numbers_.areDoubles ? areFinite<double>(numbers) : areFinite<float>(numbers)))
+    damaged("a coefficient is not finite");
+}
+
 void CheckedBlocks::forgetMemory() const {
   countInMemory_ = 0;
-  for (std::size_t block = 0; block < checksums_.size(); ++block) {
+  for (std::size_t block = 0; block < layout_.blocks; ++block) {
     State state = State::inMemory;
-    states_[block].compare_exchange_strong(state, State::checked, std::memory_order_relaxed);
+    if (states_[block].load(std::memory_order_relaxed) == state)
+      states_[block].compare_exchange_strong(state, State::checked, std::memory_order_relaxed);
   }
 }
 
@@ -78,12 +103,12 @@ void requireBlocks(const CheckedBlocks& blocks, const void* first, std::size_t b
 
 void BlockWriter::align() {
   static constexpr std::array<std::byte, kAlignment> kZeros{};
-  put(std::span(kZeros).first(paddingAt(position_)));
+  put(std::span(kZeros).first((kAlignment - position_ % kAlignment) % kAlignment));
 }
 
 void BlockWriter::put(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
-    const std::size_t left = CheckedBlocks::kBlockBytes - position_ % CheckedBlocks::kBlockBytes;
+    const std::size_t left = kBlockBytes - position_ % kBlockBytes;
     const auto piece = bytes.first(std::min(left, bytes.size()));
     block_.add(piece);
     output_.write(piece);
@@ -99,25 +124,59 @@ void BlockWriter::finishBlock() {
 }
 
 void BlockWriter::finish() {
-  if (position_ % CheckedBlocks::kBlockBytes != 0) finishBlock();
+  if (position_ % kBlockBytes != 0) finishBlock();
   const auto table = std::as_bytes(std::span(checksums_));
   output_.write(table);
   output_.write(bytesOf(checksumOf(table)));
   output_.commit();
 }
 
-void BlockReader::align() {
-  std::array<std::byte, BlockWriter::kAlignment> padding;
-  const auto read = std::span(padding).first(paddingAt(position_));
-  get(read);
-  require(std::ranges::all_of(read, [](std::byte b) { return b == std::byte{0}; }), "its padding is not 0");
+BlockStreamReader::BlockStreamReader(const std::filesystem::path& file, const FileKind& kind)
+    : path_(file),
+      kind_(kind),
+      stream_(file, std::ios::binary),
+      layout_(BlockedLayout::of(std::filesystem::file_size(file), file, kind)) {}
+
+void BlockStreamReader::read(std::span<std::byte> bytes) {
+  stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  require(bool(stream_), "it cannot be read to its end");
 }
 
-void BlockReader::get(std::span<std::byte> bytes) {
+void BlockStreamReader::get(std::span<std::byte> bytes) {
   require(bytes.size() <= remaining(), "it ends too early");
-  blocks_->require(position_, bytes.size());
-  std::ranges::copy(blocks_->content().subspan(position_, bytes.size()), bytes.begin());
-  position_ += bytes.size();
+  while (!bytes.empty()) {
+    const std::size_t left = kBlockBytes - position_ % kBlockBytes;
+    const auto piece = bytes.first(std::min(left, bytes.size()));
+    read(piece);
+    block_.add(piece);
+    position_ += piece.size();
+    bytes = bytes.subspan(piece.size());
+    if (piece.size() < left && remaining() > 0) continue;
+    found_.push_back(block_.value());
+    block_ = Checksum();
+  }
+}
+
+void BlockStreamReader::finish() {
+  require(remaining() == 0, "it goes on too long");
+  std::vector<std::uint64_t> stored(layout_.blocks);
+  std::uint64_t ofTable = 0;
+  read(std::as_writable_bytes(std::span(stored)));
+  read(std::as_writable_bytes(std::span(&ofTable, 1)));
+  require(checksumOf(std::as_bytes(std::span(stored))) == ofTable, kTableIsWrong);
+  const auto wrong = std::ranges::mismatch(stored, found_).in1;
+  if (wrong != stored.end()) damaged(blockIsWrong(std::size_t(wrong - stored.begin())));
+}
+
+void MappedBlockReader::get(std::span<std::byte> bytes) {
+  require(bytes.size() <= remaining(), "it ends too early");
+  while (!bytes.empty()) {  // Blocks are read one by one, because the file may be larger than the memory.
+    const std::size_t count = std::min(bytes.size(), kBlockBytes - position_ % kBlockBytes);
+    blocks_->require(position_, count);
+    std::ranges::copy(blocks_->content().subspan(position_, count), bytes.begin());
+    position_ += count;
+    bytes = bytes.subspan(count);
+  }
 }
 
 }  // namespace hpsdf::detail

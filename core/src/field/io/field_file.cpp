@@ -135,7 +135,8 @@ void measurementItem(Stream& stream, Optional& measurement) {
   if constexpr (!std::is_const_v<Optional>) measurement = m;
 }
 
-/// Writes or reads the exactness of a combination. `Optional` is const for writing.
+/// Writes or reads the exactness of a combination. If it may be missing, a flag tells whether it is there. `Optional`
+/// is const for writing.
 template <typename Stream, typename Optional>
 void exactnessItem(Stream& stream, Optional& exactness, bool mayBeMissing) {
   bool isThere = !mayBeMissing || exactness;
@@ -199,11 +200,17 @@ void header(Stream& stream, Data& data, SizesRef& sizes, std::uint32_t version) 
   stream.item(sizes.meanBits);
 }
 
-/// Reads the plain arrays of a file. `Reader` is `CheckedReader` or, from version 12 on, `BlockReader`.
+template <typename Reader>
+constexpr bool kIsBlocked = !std::is_same_v<Reader, detail::CheckedReader>;
+template <typename Reader>
+constexpr bool kIsMapped = std::is_same_v<Reader, detail::MappedBlockReader>;
+
+/// Reads the plain arrays of a file. `Reader` is `CheckedReader` or, from version 12 on, `BlockStreamReader` or
+/// `MappedBlockReader`.
 template <typename Reader>
 class ArrayReader {
  public:
-  ArrayReader(Reader& reader, Loading loading) : reader_(reader), loading_(loading) {}
+  explicit ArrayReader(Reader& reader) : reader_(reader) {}
 
   template <typename T>
   void read(std::vector<T>& values, std::uint64_t size) {
@@ -213,10 +220,10 @@ class ArrayReader {
   template <typename T>
   void read(FieldArray<T>& values, std::uint64_t size) {
     align();
-    if constexpr (kIsBlocked) {
-      if (loading_ == Loading::mapped) return reader_.mapped(values, size);
-    }
-    reader_.array(values.values(), size);
+    if constexpr (kIsMapped<Reader>)
+      reader_.refer(values, size);
+    else
+      reader_.array(values.values(), size);
   }
   /// Reads `size` numbers of type float or double, whose size in bytes is `bytes`, into a variant of arrays.
   template <typename Single, typename Double, typename Variant>
@@ -228,14 +235,11 @@ class ArrayReader {
   }
 
  private:
-  static constexpr bool kIsBlocked = std::is_same_v<Reader, detail::BlockReader>;
-
   void align() {
-    if constexpr (kIsBlocked) reader_.align();
+    if constexpr (kIsBlocked<Reader>) reader_.align();
   }
 
   Reader& reader_;
-  Loading loading_;
 };
 
 /// Writes the arrays as they are, each from a multiple of `BlockWriter::kAlignment` on.
@@ -244,13 +248,17 @@ void writePlain(detail::BlockWriter& writer, const FieldData& data) {
     writer.align();
     writer.array(array, array.size());
   };
+  const auto writeNumbers = [&](const auto& numbers) {
+    writer.align();
+    numbers.forEachPiece([&](const auto& piece) { writer.array(piece, piece.size()); });
+  };
   write(data.nodes);
   std::visit(
       [&](const auto& c) {
         if constexpr (requires { c.step; })
-          write(c.bytes.all());
+          writeNumbers(c.bytes);
         else
-          write(c.all());
+          writeNumbers(c);
       },
       data.coefficients);
   write(data.bounds);
@@ -261,8 +269,8 @@ void writePlain(detail::BlockWriter& writer, const FieldData& data) {
 
 /// Reads the arrays that `writePlain` wrote.
 template <typename Reader>
-void readPlain(Reader& reader, const FieldSizes& sizes, Loading loading, FieldData& data) {
-  ArrayReader<Reader> arrays(reader, loading);
+void readPlain(Reader& reader, const FieldSizes& sizes, FieldData& data) {
+  ArrayReader<Reader> arrays(reader);
   arrays.read(data.nodes, sizes.nodes);
   if (sizes.coefficientBytes == kQuantized) {
     auto& coefficients = data.coefficients.emplace<QuantizedCoefficients>();
@@ -357,7 +365,7 @@ void requireRoom(const std::filesystem::path& file, const FieldSizes& sizes, con
 
 /// Reads a file after its first items.
 template <typename Reader>
-FieldData readData(const std::filesystem::path& file, Reader& reader, const Start& start, Loading loading) {
+FieldData readData(const std::filesystem::path& file, Reader& reader, const Start& start) {
   const std::uint32_t version = start.version;
   FieldData data;
   FieldSizes sizes;
@@ -371,27 +379,36 @@ FieldData readData(const std::filesystem::path& file, Reader& reader, const Star
   if (version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
   requireFit(reader, sizes, data);
   reader.require(start.isCompressed || sizes.bytes() <= double(reader.remaining()), "it ends too early");
-  requireRoom(file, sizes, start, loading == Loading::mapped);
-  if constexpr (std::is_same_v<Reader, detail::CheckedReader>) {
+  requireRoom(file, sizes, start, kIsMapped<Reader>);
+  if constexpr (!kIsBlocked<Reader>) {
     if (start.isCompressed) {
       readCompressed(reader, sizes, data);
       reader.finish();
       return data;
     }
   }
-  readPlain(reader, sizes, loading, data);
+  readPlain(reader, sizes, data);
   reader.finish();
   return data;
 }
 
-FieldData readBlocked(const std::filesystem::path& file, Loading loading) {
-  detail::BlockReader reader(file, kFieldFile,
-                             loading == Loading::mapped ? detail::ReadOrder::any : detail::ReadOrder::sequential);
+/// Reads a file whose blocks each have a checksum.
+template <typename Reader>
+FieldData readBlocked(const std::filesystem::path& file, const Start& start) {
+  Reader reader(file, kFieldFile);
   detail::Magic magic;
   for (char& c : magic) reader.item(c);
-  Start start;
-  reader.item(start.version);
-  return readData(file, reader, start, loading);
+  std::uint32_t version = 0;
+  reader.item(version);
+  reader.require(magic == kFieldMagic && version == start.version, "it has been replaced while it was read");
+  return readData(file, reader, start);
+}
+
+FieldData readAny(const std::filesystem::path& file, detail::CheckedReader& reader, const Start& start,
+                  Loading loading) {
+  if (start.version < kBlockedVersion) return readData(file, reader, start);
+  if (loading == Loading::mapped) return readBlocked<detail::MappedBlockReader>(file, start);
+  return readBlocked<detail::BlockStreamReader>(file, start);
 }
 
 }  // namespace
@@ -408,14 +425,14 @@ bool canBeMapped(const std::filesystem::path& file) {
 Field load(const std::filesystem::path& file, Loading loading) {
   detail::CheckedReader reader(file, kFieldFile);
   const Start start = readStart(reader);
-  const bool isBlocked = start.version >= kBlockedVersion;
-  if (loading == Loading::mapped && !isBlocked)
+  if (loading == Loading::mapped && start.version < kBlockedVersion)
     reader.refuse(start.isCompressed ? "cannot be mapped, because it is compressed; load it, and save it uncompressed"
                                      : "cannot be mapped, because it has an older version; load it, and save it again");
-  FieldData data = isBlocked ? readBlocked(file, loading) : readData(file, reader, start, loading);
+  FieldData data = readAny(file, reader, start, loading);
   try {
     return Field(std::move(data));
   } catch (const Error& error) {
+    if (error.kind() == ErrorKind::file) throw;  // a damaged block of a mapped file
     reader.refuse(error.what());
   }
 }

@@ -313,7 +313,8 @@ inline void continueOutside(const Vector3& offset, ValueGradientHessian& result)
 }
 
 /// Makes the lookup grid of a field, an array of the octree nodes of one depth. Chooses the greatest depth at which the
-/// array takes at most a sixteenth of the bytes of the nodes and coefficients, or an eighth if they are quantized.
+/// array takes at most a sixteenth of the bytes of the nodes and coefficients, or an eighth if they are quantized, and
+/// at most 2^28 bytes.
 LookupGrid makeLookupGrid(const FieldData& field);
 
 /// Evaluates a field at many points. On every instruction set, the results are bit for bit equal to those of

@@ -282,12 +282,6 @@ HWY_INLINE void listPoints(std::size_t first, Batch& batch, std::array<std::size
 }
 #endif
 
-template <typename T>
-bool areMapped(const FieldArray<T>& coefficients) {
-  return coefficients.isMapped();
-}
-bool areMapped(const QuantizedCoefficients& coefficients) { return coefficients.bytes.isMapped(); }
-
 /// Throws `Error` if coefficients of the leaves of a batch lie in a mapped file that is damaged.
 template <typename Coefficients>
 void requireLeaves(const Coefficients& coefficients, const Batch& batch) {
@@ -299,7 +293,7 @@ void requireLeaves(const Coefficients& coefficients, const Batch& batch) {
 /// have no SIMD code.
 template <typename Coefficients>
 void listByDegree(const Coefficients& coefficients, Batch& batch) {
-  if (areMapped(coefficients)) [[unlikely]]
+  if (coefficients.isMapped()) [[unlikely]]
     requireLeaves(coefficients, batch);
   std::array<std::size_t, kLists> counts{};
   for (std::size_t i = 0; i < batch.count; i += kLanes) {

@@ -50,8 +50,9 @@ struct alignas(64) FourDigits {
   double bias;
 };
 
+/// One entry for each width that a leaf can tell: nobody has checked leaves in a mapped file.
 constexpr auto kFourDigits = [] {
-  std::array<FourDigits, QuantizedCoefficients::kMostBits + 1> digits{};
+  std::array<FourDigits, QuantizedCoefficients::kMostWideBits + 1> digits{};
   for (std::uint64_t width = 0; width < digits.size(); ++width) {
     const std::uint64_t values = std::uint64_t{1} << width;
     digits[width] = {{0, width, 2 * width, 3 * width}, values - 1, std::bit_cast<double>(values >> 1 | kWholeBits)};

@@ -87,13 +87,13 @@ bool hasLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
   const std::size_t offset = node::offset(leaf), size = coefficients.bytes.size();
   // A leaf in a mapped file is not read before it is needed. Whatever its bytes are, it must not be read beyond the
   // end.
-  if (coefficients.bytes.isMapped() && offset + mostQuantizedBytes(node::degree(leaf)) <= size) return true;
+  if (coefficients.isMapped() && offset + mostQuantizedBytes(node::degree(leaf)) <= size) return true;
   return quantizedLeafBytes(coefficients, leaf) > 0;
 }
 
 template <typename T>
 void checkCoefficients(const FieldArray<T>& coefficients) {
-  if (coefficients.isMapped()) return;
+  if (coefficients.isMapped()) return;  // They are checked when they are read.
   for (const T c : coefficients.all())
     if (!std::isfinite(c)) notAField("a coefficient is not finite");
 }
@@ -242,14 +242,7 @@ std::size_t coefficientBytes(const FieldData& field) {
 }
 
 bool isMapped(const FieldData& field) {
-  return std::visit(
-      [](const auto& c) {
-        if constexpr (requires { c.bytes; })
-          return c.bytes.isMapped();
-        else
-          return c.isMapped();
-      },
-      field.coefficients);
+  return std::visit([](const auto& c) { return c.isMapped(); }, field.coefficients);
 }
 
 FieldBytes Field::bytesOfParts() const {
@@ -330,17 +323,25 @@ std::string levelName(int level) {
 FieldStatistics statistics(const Field& field) {
   FieldStatistics s;
   const FieldData& data = field.data();
+  assertNotMovedFrom(data);
   std::vector<std::size_t> exactLists;
   const double domainVolume = (field.domain().max() - field.domain().min()).prod();
-  field.forEachCell([&](const Cell& cell) {
-    const double share = (cell.box.max() - cell.box.min()).prod() / domainVolume;
+  visitNodes(data, [&](const OctreeNode& at) {  // `forEachCell` would read all coefficients.
+    const std::uint64_t bits = data.nodes[at.node];
+    if (!node::isLeaf(bits)) return true;
+    const Box box = cellBox(field.lookupGrid().frame, at.depth, at.cellIndex);
+    const double share = (box.max() - box.min()).prod() / domainVolume;
+    const int degree = node::degree(bits);
     ++s.leaves;
-    ++s.degreeLeaves[cell.degree];
-    ++s.depthLeaves[cell.depth];
-    s.degreeVolume[cell.degree] += share;
-    s.depthVolume[cell.depth] += share;
-    if (cell.degree != kExactDegree) s.coefficients += coefficientCount(cell.degree);
-    if (cell.degree == kExactDegree) exactLists.push_back(TriangleListView(data.exact, data.nodes[cell.id]).count());
+    ++s.degreeLeaves[degree];
+    ++s.depthLeaves[at.depth];
+    s.degreeVolume[degree] += share;
+    s.depthVolume[at.depth] += share;
+    if (degree == kExactDegree)
+      exactLists.push_back(TriangleListView(data.exact, bits).count());
+    else
+      s.coefficients += coefficientCount(degree);
+    return true;
   });
   s.nodes = data.nodes.size();
   s.bytes = field.bytes();
