@@ -17,6 +17,7 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <random>
 #include <span>
@@ -97,7 +98,7 @@ TEST(Ranks, BuildTheSameBytesFromAMesh) {
                      {{.targetError = 1e-5}, {.targetError = 1e-5, .criterion = Criterion::optimal}}, {2, 5});
 }
 
-/// Passes calls on to ranks, and records the bytes that the last exchange has sent.
+/// Passes calls on to ranks, and records the bytes that each exchange has sent.
 class RecordedRanks : public Ranks {
  public:
   explicit RecordedRanks(Ranks& ranks) : ranks_(ranks) {}
@@ -107,15 +108,18 @@ class RecordedRanks : public Ranks {
     return ranks_.gatherAll(own, whileWaiting);
   }
   std::vector<Message> exchange(std::vector<Message> toEach) override {
-    sent_ = 0;
-    for (const Message& message : toEach) sent_ += message.size();
+    sent_.push_back(0);
+    for (const Message& message : toEach) sent_.back() += message.size();
     return ranks_.exchange(std::move(toEach));
   }
-  std::size_t sent() const { return sent_; }
+  /// Returns the bytes of the last exchanges.
+  std::size_t sentAtLast(int exchanges) const {
+    return std::accumulate(sent_.end() - exchanges, sent_.end(), std::size_t{0});
+  }
 
  private:
   Ranks& ranks_;
-  std::size_t sent_ = 0;
+  std::vector<std::size_t> sent_;
 };
 
 TEST(Ranks, HoldPartsOfTheFieldOfAboutEqualSize) {
@@ -124,7 +128,7 @@ TEST(Ranks, HoldPartsOfTheFieldOfAboutEqualSize) {
   runRanks(4, [&](Ranks& ranks) {
     RecordedRanks recorded(ranks);
     buildByRanks(recorded, spheres, cube(), options);
-    sent[std::size_t(ranks.rank())] = recorded.sent();
+    sent[std::size_t(ranks.rank())] = recorded.sentAtLast(ranks.count());  // nodes, then each part's coefficients
   });
   const auto all = double(build(spheres, cube(), options).bytes());
   EXPECT_EQ(sent[0], 0u);

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -112,14 +113,20 @@ AcrossParts Shares::across() {
 }
 
 FieldData Shares::gatheredAtFirst(FieldData&& part) {
-  std::vector<Message> messages{std::size_t(count())};
-  if (!isFirst()) messages.front() = messageOf(part);
-  const std::vector<Message> received = exchange(std::move(messages));
-  if (!isFirst()) return {};
-  std::vector<FieldData> parts;
-  parts.push_back(std::move(part));
-  for (int from = 1; from < count(); ++from) parts.push_back(partOf(received[std::size_t(from)]));
-  return putTogether(std::move(parts));
+  const auto toFirst = [&](Message&& own) {
+    std::vector<Message> messages{std::size_t(count())};
+    if (!isFirst()) messages.front() = std::move(own);
+    return exchange(std::move(messages));
+  };
+  const std::vector<Message> nodes = toFirst(isFirst() ? Message{} : nodesOf(part));
+  std::optional<Assembly> assembly;
+  if (isFirst()) assembly.emplace(std::move(part), std::span(nodes).subspan(1));
+  // The coefficients of one part after another, so that rank 0 need not hold all parts besides the field.
+  for (int from = 1; from < count(); ++from) {
+    const std::vector<Message> received = toFirst(rank() == from ? coefficientsOf(part) : Message{});
+    if (isFirst()) assembly->add(std::uint32_t(from), received[std::size_t(from)]);
+  }
+  return isFirst() ? assembly->take() : FieldData{};
 }
 
 Message Shares::fromFirst(Message own) { return gatherAll(isFirst() ? std::move(own) : Message{}).front(); }
