@@ -202,6 +202,18 @@ TEST(Ranks, RefuseWhatOneProcessMustDo) {
   }
 }
 
+TEST(Ranks, RefuseDifferentInputs) {
+  for (const bool haveOtherDomains : {false, true}) {
+    const auto thrown = runRanks(3, [&](Ranks& ranks) {
+      const bool isOther = ranks.rank() == 2;
+      const Box domain(cube().min(), haveOtherDomains && isOther ? Vector3(2 * cube().max()) : cube().max());
+      buildByRanks(ranks, spheres, domain, {.targetError = !haveOtherDomains && isOther ? 1e-4 : 1e-5, .threads = 1});
+    });
+    for (const std::exception_ptr& error : thrown)
+      EXPECT_THAT(messageOf(error), testing::HasSubstr("different surfaces, domains or options"));
+  }
+}
+
 TEST(ExactSums, DependOnlyOnTheSummands) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> mantissa(-1, 1);

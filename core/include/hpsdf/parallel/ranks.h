@@ -48,7 +48,7 @@ class Ranks {
 ///
 /// Throws as `build` and `buildResumably` do. Ranks where nothing failed throw an `Error` with the message of the first
 /// that did, unless they have done their part and returned. Also throws `Error` for a tolerance and for a limit of
-/// bytes.
+/// bytes, and on all ranks if their surfaces (`Source`), domains or options differ.
 std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance, const Box& domain,
                                   const BuildOptions& options, const Checkpoint* checkpoint = nullptr,
                                   const Progress& progress = {});

@@ -68,6 +68,8 @@ std::optional<Field> buildByRanks(Ranks& ranks, const DistanceFunction& distance
   Shares shares(ranks);
   const auto construct = [&]() -> std::optional<FieldData> {
     const BuildOptions settings = settled(options, distance, domain, progress);
+    if (!shares.areEqual(digestOfInputs(distance.source(), settings, domain)))
+      throw Error("the processes have different surfaces, domains or options; start all of them with the same command");
     std::optional<CheckpointFile> file;
     if (checkpoint != nullptr && shares.isFirst()) file.emplace(*checkpoint, distance, domain, settings);
     Construction construction(distance, domain, settings, progress);

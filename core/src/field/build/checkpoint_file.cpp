@@ -197,6 +197,13 @@ void requireLeaves(const CheckedReader& reader, const BuildTree& tree, std::span
 
 }  // namespace
 
+std::uint64_t digestOfInputs(const Source& source, const BuildOptions& options, const Box& domain) {
+  Digest digest;
+  digest.add(digestOf(source));
+  digest.add(digestOf(options, domain, {}));
+  return digest.value();
+}
+
 CheckpointFile::CheckpointFile(const Checkpoint& checkpoint, const DistanceFunction& distance, const Box& domain,
                                const BuildOptions& options)
     : checkpoint_(checkpoint),

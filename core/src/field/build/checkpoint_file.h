@@ -52,6 +52,9 @@ class CheckpointFile {
   Clock::time_point next_;
 };
 
+/// Returns a digest of the surface, the settings and the domain of a construction.
+std::uint64_t digestOfInputs(const Source& source, const BuildOptions& options, const Box& domain);
+
 /// Writes the numbers of a construction state that are not part of its octree, and the number of evaluations of the
 /// exact distance, to a message; and reads them.
 void write(MessageWriter& message, ConstructionState& state, std::uint64_t evaluations);

@@ -86,6 +86,11 @@ std::uint64_t Shares::sum(std::uint64_t value) {
   return sum;
 }
 
+bool Shares::areEqual(std::uint64_t value) {
+  const std::vector<Message> all = gatherAll(messageOfNumbers(std::vector{value}));
+  return std::ranges::all_of(all, [&](const Message& message) { return message == all.front(); });
+}
+
 void Shares::add(ExactSum& sum) {
   const auto own = sum.numbers();
   ExactSum all;

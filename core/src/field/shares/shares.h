@@ -49,6 +49,9 @@ class Shares {
 
   /// Returns the greatest number of all ranks.
   double greatest(double own);
+  /// Returns true if all ranks pass the same number.
+  bool areEqual(std::uint64_t value);
+
   /// Returns the functions for numbers over all ranks.
   AcrossParts across();
 
