@@ -173,9 +173,7 @@ Json times(const std::filesystem::path& file, hpsdf::Loading loading) {
     std::ranges::transform(points, values.begin(), [&](const Vector3& point) { return field.value(point); });
     return values;
   });
-  const auto made = std::chrono::steady_clock::now();
   const auto renderer = hpsdf::render::makeCpuRenderer(field);
-  result["renderer"] = Seconds(std::chrono::steady_clock::now() - made).count();
   const auto slice = hpsdf::render::axisSlice(field.domain(), 2, 0.1, kWidth, kHeight);
   result["slice"] = timed([&] { return renderer->slice(slice, kWidth, kHeight).value; });
   const hpsdf::render::SurfaceView view{.camera = hpsdf::render::cameraOf({}, field.domain(), kWidth, kHeight)};

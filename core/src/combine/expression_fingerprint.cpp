@@ -18,13 +18,9 @@ using detail::bytesOf;
 using detail::Checksum;
 
 template <typename T>
-void addAll(Checksum& sum, std::span<const T> numbers) {
-  sum.add(bytesOf(std::uint64_t{numbers.size()}));
-  sum.add(std::as_bytes(numbers));
-}
-template <typename T>
 void addAll(Checksum& sum, const std::vector<T>& numbers) {
-  addAll(sum, std::span(numbers));
+  sum.add(bytesOf(std::uint64_t{numbers.size()}));
+  sum.add(std::as_bytes(std::span(numbers)));
 }
 template <typename T>
 void addAll(Checksum& sum, const FieldArray<T>& numbers) {

@@ -15,8 +15,7 @@ namespace hpsdf::parts {
 namespace {
 
 // A part's file holds `Head`, and then the arrays of the part in the order of `forEachMember`, each of them from a
-// multiple of kAlignment bytes on. The file belongs to the machine that wrote it: it is read by the same program.
-constexpr std::size_t kAlignment = 64;
+// multiple of kArrayAlignment bytes on. The file belongs to the machine that wrote it: it is read by the same program.
 constexpr std::size_t kMembers = 12;
 
 using Head = std::array<std::uint64_t, kMembers>;  ///< the lengths of arrays, and the bits of numbers
@@ -28,7 +27,7 @@ void forEachMember(Part& part, const Visit& visit) {
   visit(part.faces);
 }
 
-constexpr std::size_t aligned(std::size_t bytes) { return (bytes + kAlignment - 1) / kAlignment * kAlignment; }
+constexpr std::size_t withPadding(std::size_t bytes) { return bytes + detail::paddingAt(bytes); }
 
 template <typename T>
 std::span<const std::byte> contentsOf(const detail::SharedArray<T>& array) {
@@ -42,13 +41,12 @@ PartStamp writePart(const MeshPart& part, const std::filesystem::path& file) {
   detail::Checksum checksum;
   PartStamp stamp;
   const auto write = [&](std::span<const std::byte> bytes) {
-    constexpr std::array<std::byte, kAlignment> kZeros{};
-    const std::size_t end = aligned(bytes.size());
-    for (const auto piece : {bytes, std::span<const std::byte>(kZeros).first(end - bytes.size())}) {
+    constexpr std::array<std::byte, detail::kArrayAlignment> kZeros{};
+    for (const auto piece : {bytes, std::span<const std::byte>(kZeros).first(detail::paddingAt(bytes.size()))}) {
       output.write(piece);
       checksum.add(piece);
+      stamp.bytes += piece.size();
     }
-    stamp.bytes += end;
   };
   Head head{};
   std::size_t at = 0;
@@ -82,7 +80,7 @@ std::shared_ptr<const MeshPart> mapPart(const std::filesystem::path& file, const
   }
   Head head{};
   std::memcpy(head.data(), bytes.data(), sizeof(head));
-  std::size_t at = 0, offset = aligned(sizeof(head));
+  std::size_t at = 0, offset = withPadding(sizeof(head));
   auto part = std::make_shared<MeshPart>();
   forEachMember(*part, [&]<typename Member>(Member& member) {
     if constexpr (std::is_same_v<Member, double>) {
@@ -92,7 +90,7 @@ std::shared_ptr<const MeshPart> mapPart(const std::filesystem::path& file, const
       const std::uint64_t count = head[at++];
       if (offset > bytes.size() || count > (bytes.size() - offset) / sizeof(T)) refuse();
       member = Member(mapped, reinterpret_cast<const T*>(bytes.data() + offset), count);
-      offset += aligned(count * sizeof(T));
+      offset += withPadding(count * sizeof(T));
     }
   });
   return part;

@@ -33,6 +33,11 @@ std::span<const std::byte> bytesOf(const T& value) {
   return std::as_bytes(std::span(&value, 1));
 }
 
+constexpr std::size_t kArrayAlignment = 64;  ///< of arrays in files that are mapped: a line of the processor's cache
+
+/// Returns the number of bytes from a position on to the next multiple of `kArrayAlignment`.
+constexpr std::size_t paddingAt(std::size_t position) { return -position % kArrayAlignment; }
+
 /// The XXH3 hash (64 bits) of all bytes that are added with `add`.
 class Checksum {
  public:

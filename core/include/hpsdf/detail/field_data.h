@@ -187,8 +187,6 @@ struct QuantizedCoefficients {
   std::uint32_t meanBits = 0;
   FieldArray<std::uint8_t> bytes;  ///< the leaves, and `kPadding` zero bytes
 
-  bool isMapped() const { return bytes.isMapped(); }
-
   /// Returns the step of a leaf. `leaf` is the packed node.
   double stepOf(std::uint64_t leaf) const {
     const std::uint64_t shift = leaf >> 48 & 31;
@@ -251,6 +249,18 @@ constexpr bool hasOnlyKnownBits(std::uint64_t n, bool isQuantized) {
 }
 constexpr std::uint64_t internal(std::uint32_t firstChild) { return firstChild; }
 }  // namespace node
+
+/// Returns why no field has these base cells and numbers of nodes and bounds, or nullptr if one can have them.
+const char* misfitOf(const std::array<std::uint32_t, 3>& grid, std::uint64_t nodes, std::uint64_t bounds);
+
+/// Returns the array that holds coefficients: numbers, or the bytes of quantized ones.
+template <typename Coefficients>
+auto& arrayOf(Coefficients& coefficients) {
+  if constexpr (requires { coefficients.bytes; })
+    return coefficients.bytes;
+  else
+    return coefficients;
+}
 
 /// Returns the bytes that the coefficients of a field take.
 std::size_t coefficientBytes(const FieldData& field);

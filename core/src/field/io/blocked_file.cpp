@@ -24,6 +24,17 @@ std::string blockIsWrong(std::size_t block) {
 
 constexpr const char* kTableIsWrong = "its checksums are damaged, or its length is wrong";
 
+/// Calls f(piece) for the pieces of `bytes` that lie in one block each. `bytes` begin at `position` of the content.
+template <typename Byte, typename F>
+void forEachPiece(std::span<Byte> bytes, std::size_t position, const F& f) {
+  while (!bytes.empty()) {
+    const auto piece = bytes.first(std::min(bytes.size(), kBlockBytes - position % kBlockBytes));
+    f(piece);
+    position += piece.size();
+    bytes = bytes.subspan(piece.size());
+  }
+}
+
 template <typename T>
 bool areFinite(std::span<const std::byte> bytes) {
   const std::span numbers(reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T));
@@ -102,20 +113,17 @@ void requireBlocks(const CheckedBlocks& blocks, const void* first, std::size_t b
 }
 
 void BlockWriter::align() {
-  static constexpr std::array<std::byte, kAlignment> kZeros{};
-  put(std::span(kZeros).first((kAlignment - position_ % kAlignment) % kAlignment));
+  static constexpr std::array<std::byte, kArrayAlignment> kZeros{};
+  put(std::span(kZeros).first(paddingAt(position_)));
 }
 
 void BlockWriter::put(std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const std::size_t left = kBlockBytes - position_ % kBlockBytes;
-    const auto piece = bytes.first(std::min(left, bytes.size()));
+  forEachPiece(bytes, position_, [&](std::span<const std::byte> piece) {
     block_.add(piece);
     output_.write(piece);
     position_ += piece.size();
-    bytes = bytes.subspan(piece.size());
-    if (piece.size() == left) finishBlock();
-  }
+    if (position_ % kBlockBytes == 0) finishBlock();
+  });
 }
 
 void BlockWriter::finishBlock() {
@@ -144,17 +152,14 @@ void BlockStreamReader::read(std::span<std::byte> bytes) {
 
 void BlockStreamReader::get(std::span<std::byte> bytes) {
   require(bytes.size() <= remaining(), "it ends too early");
-  while (!bytes.empty()) {
-    const std::size_t left = kBlockBytes - position_ % kBlockBytes;
-    const auto piece = bytes.first(std::min(left, bytes.size()));
+  forEachPiece(bytes, position_, [&](std::span<std::byte> piece) {
     read(piece);
     block_.add(piece);
     position_ += piece.size();
-    bytes = bytes.subspan(piece.size());
-    if (piece.size() < left && remaining() > 0) continue;
+    if (position_ % kBlockBytes != 0 && remaining() > 0) return;
     found_.push_back(block_.value());
     block_ = Checksum();
-  }
+  });
 }
 
 void BlockStreamReader::finish() {
@@ -170,13 +175,12 @@ void BlockStreamReader::finish() {
 
 void MappedBlockReader::get(std::span<std::byte> bytes) {
   require(bytes.size() <= remaining(), "it ends too early");
-  while (!bytes.empty()) {  // Blocks are read one by one, because the file may be larger than the memory.
-    const std::size_t count = std::min(bytes.size(), kBlockBytes - position_ % kBlockBytes);
-    blocks_->require(position_, count);
-    std::ranges::copy(blocks_->content().subspan(position_, count), bytes.begin());
-    position_ += count;
-    bytes = bytes.subspan(count);
-  }
+  // Blocks are read one by one, because the file may be larger than the memory.
+  forEachPiece(bytes, position_, [&](std::span<std::byte> piece) {
+    blocks_->require(position_, piece.size());
+    std::ranges::copy(blocks_->content().subspan(position_, piece.size()), piece.begin());
+    position_ += piece.size();
+  });
 }
 
 }  // namespace hpsdf::detail

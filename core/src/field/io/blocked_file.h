@@ -104,13 +104,11 @@ class BlockWriter : public NumberWriter<BlockWriter> {
   void item(const T& value) {
     put(bytesOf(value));
   }
-  /// Writes zeros up to a multiple of `kAlignment`.
+  /// Writes zeros up to a multiple of `kArrayAlignment`.
   void align();
   void put(std::span<const std::byte> bytes);
   /// Writes the checksums and commits the file.
   void finish();
-
-  static constexpr std::size_t kAlignment = 64;  ///< of arrays: a line of the processor's cache
 
  private:
   void finishBlock();
@@ -130,9 +128,10 @@ class BlockReaderBase : public NumberReader<Stream> {
   void item(T& value) {
     stream().get(std::as_writable_bytes(std::span(&value, 1)));
   }
-  /// Goes on to a multiple of `BlockWriter::kAlignment`.
+  /// Goes on to a multiple of `kArrayAlignment`.
   void align() {
-    for (std::byte padding{}; stream().position() % BlockWriter::kAlignment != 0;) {
+    for (std::size_t left = paddingAt(stream().position()); left > 0; --left) {
+      std::byte padding{};
       item(padding);
       stream().require(padding == std::byte{0}, "its padding is not 0");
     }

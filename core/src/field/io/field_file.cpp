@@ -46,14 +46,11 @@ FieldSizes sizesOf(const FieldData& data) {
   FieldSizes sizes{.nodes = data.nodes.size(), .bounds = data.bounds.size()};
   std::visit(
       [&](const auto& c) {
+        sizes.coefficients = arrayOf(c).size();
+        sizes.coefficientBytes = sizeof(*arrayOf(c).data());
         if constexpr (requires { c.step; }) {
-          sizes.coefficients = c.bytes.size();
-          sizes.coefficientBytes = kQuantized;
           sizes.step = c.step;
           sizes.meanBits = c.meanBits;
-        } else {
-          sizes.coefficients = c.size();
-          sizes.coefficientBytes = sizeof(*c.data());
         }
       },
       data.coefficients);
@@ -242,25 +239,18 @@ class ArrayReader {
   Reader& reader_;
 };
 
-/// Writes the arrays as they are, each from a multiple of `BlockWriter::kAlignment` on.
+/// Writes the arrays as they are, each from a multiple of `kArrayAlignment` on.
 void writePlain(detail::BlockWriter& writer, const FieldData& data) {
   const auto write = [&](const auto& array) {
     writer.align();
     writer.array(array, array.size());
   };
-  const auto writeNumbers = [&](const auto& numbers) {
+  const auto writePieces = [&](const auto& c) {
     writer.align();
-    numbers.forEachPiece([&](const auto& piece) { writer.array(piece, piece.size()); });
+    arrayOf(c).forEachPiece([&](const auto& piece) { writer.array(piece, piece.size()); });
   };
   write(data.nodes);
-  std::visit(
-      [&](const auto& c) {
-        if constexpr (requires { c.step; })
-          writeNumbers(c.bytes);
-        else
-          writeNumbers(c);
-      },
-      data.coefficients);
+  std::visit(writePieces, data.coefficients);
   write(data.bounds);
   std::visit(write, data.exact.vertices);
   write(data.exact.triangles);
@@ -339,18 +329,6 @@ bool isFieldFile(const std::filesystem::path& file) {
 
 namespace {
 
-/// Throws `Error` unless the numbers of nodes, base cells and bounds fit each other.
-template <typename Reader>
-void requireFit(const Reader& reader, const FieldSizes& sizes, const FieldData& data) {
-  std::uint64_t cells = 1;
-  for (const std::uint32_t n : data.grid) {
-    reader.require(n > 0 && cells <= sizes.nodes / n, "its base grid does not fit its nodes");
-    cells *= n;
-  }
-  reader.require(sizes.nodes <= 0xffffffffu, "it has 2^32 nodes or more");
-  reader.require(sizes.bounds == 0 || sizes.bounds == sizes.nodes, "its bounds do not fit its nodes");
-}
-
 /// Throws `Error` if the arrays of a file's header need more memory than the process may take. `isMapped` tells that
 /// the coefficients need none.
 void requireRoom(const std::filesystem::path& file, const FieldSizes& sizes, const Start& start, bool isMapped) {
@@ -377,7 +355,8 @@ FieldData readData(const std::filesystem::path& file, Reader& reader, const Star
   Source& source = data.metadata.source;
   reader.require(source.insideTest <= InsideTest::outerHull, "its inside test is unknown");
   if (version < 4 && source.faces > 0) source.insideTest = InsideTest::pseudonormal;  // versions 1 to 3 had no other
-  requireFit(reader, sizes, data);
+  const char* misfit = misfitOf(data.grid, sizes.nodes, sizes.bounds);
+  reader.require(misfit == nullptr, misfit);
   reader.require(start.isCompressed || sizes.bytes() <= double(reader.remaining()), "it ends too early");
   requireRoom(file, sizes, start, kIsMapped<Reader>);
   if constexpr (!kIsBlocked<Reader>) {

@@ -293,7 +293,7 @@ void requireLeaves(const Coefficients& coefficients, const Batch& batch) {
 /// have no SIMD code.
 template <typename Coefficients>
 void listByDegree(const Coefficients& coefficients, Batch& batch) {
-  if (coefficients.isMapped()) [[unlikely]]
+  if (arrayOf(coefficients).isMapped()) [[unlikely]]
     requireLeaves(coefficients, batch);
   std::array<std::size_t, kLists> counts{};
   for (std::size_t i = 0; i < batch.count; i += kLanes) {

@@ -30,17 +30,6 @@ void checkDomain(const FieldData& data) {
     notAField("its domain is empty or not finite");
 }
 
-/// Returns the number of base cells. Throws if there are fewer nodes than base cells.
-std::size_t checkGrid(const FieldData& data) {
-  std::size_t cells = 1;
-  for (const std::uint32_t n : data.grid) {
-    if (n == 0 || cells > data.nodes.size() / n) notAField("its base grid does not fit its nodes");
-    cells *= n;
-  }
-  if (data.nodes.size() > 0xffffffffu) notAField("it has more than 2^32 nodes");
-  return cells;
-}
-
 /// Returns where the lists of triangles begin. Throws `Error` unless the lists are whole and refer to triangles.
 std::vector<std::uint32_t> checkLists(const ExactTriangles& exact) {
   const std::span<const std::uint32_t> words = exact.lists;
@@ -87,7 +76,7 @@ bool hasLeaf(const QuantizedCoefficients& coefficients, std::uint64_t leaf) {
   const std::size_t offset = node::offset(leaf), size = coefficients.bytes.size();
   // A leaf in a mapped file is not read before it is needed. Whatever its bytes are, it must not be read beyond the
   // end.
-  if (coefficients.isMapped() && offset + mostQuantizedBytes(node::degree(leaf)) <= size) return true;
+  if (coefficients.bytes.isMapped() && offset + mostQuantizedBytes(node::degree(leaf)) <= size) return true;
   return quantizedLeafBytes(coefficients, leaf) > 0;
 }
 
@@ -114,7 +103,8 @@ void checkQuantization(const FieldData& data) {
 
 /// Throws `Error` unless the nodes form trees: every group of children must belong to exactly one node, which precedes
 /// the group.
-void checkNodes(const FieldData& data, std::size_t baseCells) {
+void checkNodes(const FieldData& data) {
+  const std::size_t baseCells = std::size_t{data.grid[0]} * data.grid[1] * data.grid[2];
   const std::vector<std::uint32_t> lists = checkLists(data.exact);
   const auto& nodes = data.nodes;
   const bool isQuantized = std::holds_alternative<QuantizedCoefficients>(data.coefficients);
@@ -163,7 +153,6 @@ void checkExact(const ExactTriangles& exact) {
 
 void checkBlendAndBounds(const FieldData& data) {
   if (!(data.blend >= 0 && data.blend <= kMaxBlend)) notAField("its blended zones have a width out of range");
-  if (!data.bounds.empty() && data.bounds.size() != data.nodes.size()) notAField("its bounds do not fit its nodes");
   for (const CellBound& bound : data.bounds)
     if (!(bound.error >= 0) || !(bound.slope >= 0)) notAField("a bound is not a number above 0");
 }
@@ -221,28 +210,33 @@ bool FieldMetadata::hasEstimate() const {
 
 Field::Field(FieldData data) : data_(std::move(data)) {
   checkDomain(data_);
-  const std::size_t baseCells = checkGrid(data_);
+  if (const char* misfit = misfitOf(data_.grid, data_.nodes.size(), data_.bounds.size())) notAField(misfit);
   checkQuantization(data_);
-  checkNodes(data_, baseCells);
+  checkNodes(data_);
   std::visit([](const auto& coefficients) { checkCoefficients(coefficients); }, data_.coefficients);
   checkExact(data_.exact);
   checkBlendAndBounds(data_);
   lookupGrid_ = makeLookupGrid(data_);
 }
 
+const char* misfitOf(const std::array<std::uint32_t, 3>& grid, std::uint64_t nodes, std::uint64_t bounds) {
+  std::uint64_t cells = 1;
+  for (const std::uint32_t n : grid) {
+    if (n == 0 || cells > nodes / n) return "its base grid does not fit its nodes";
+    cells *= n;
+  }
+  if (nodes > 0xffffffffu) return "it has 2^32 nodes or more";
+  if (bounds != 0 && bounds != nodes) return "its bounds do not fit its nodes";
+  return nullptr;
+}
+
 std::size_t coefficientBytes(const FieldData& field) {
   return std::visit(
-      [](const auto& c) {
-        if constexpr (requires { c.bytes; })
-          return c.bytes.size();
-        else
-          return c.size() * sizeof(*c.data());
-      },
-      field.coefficients);
+      [](const auto& c) { return arrayOf(c).size() * sizeof(*arrayOf(c).data()); }, field.coefficients);
 }
 
 bool isMapped(const FieldData& field) {
-  return std::visit([](const auto& c) { return c.isMapped(); }, field.coefficients);
+  return std::visit([](const auto& c) { return arrayOf(c).isMapped(); }, field.coefficients);
 }
 
 FieldBytes Field::bytesOfParts() const {

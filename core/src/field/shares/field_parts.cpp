@@ -21,15 +21,6 @@ std::size_t sizeOf(const FieldArray<T>&, std::uint64_t leaf) {
   return coefficientCount(node::degree(leaf));
 }
 
-/// Returns the array of coefficients.
-template <typename Coefficients>
-auto& arrayOf(Coefficients& coefficients) {
-  if constexpr (requires { coefficients.bytes; })
-    return coefficients.bytes;
-  else
-    return coefficients;
-}
-
 /// Returns the number of elements of each node's coefficients.
 std::vector<std::uint32_t> sizesOf(const FieldData& part) {
   std::vector<std::uint32_t> sizes(part.nodes.size(), 0);
