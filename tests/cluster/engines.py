@@ -83,10 +83,17 @@ def parallel(parts: int) -> list[str]:
     return ["parallel", "-j", "2", "--retries", "3", *job, ":::", *map(str, range(1, parts + 1))]
 
 
-def snakemake(parts: int) -> list[str]:
-    """Returns the command line by which Snakemake builds the list of the current folder in two processes."""
-    return ["snakemake", "-s", str(ROOT / "workflow" / "Snakefile"), "--cores", "2", "--config", "list=list.txt", f"parts={parts}",
-            f"hpsdf={PROGRAM}", "options=" + " ".join(OPTIONS)]  # fmt: skip
+def snakemake(parts: int, where: tuple[str, ...] = ("--cores", "2")) -> list[str]:
+    """Returns the command line by which Snakemake builds the list of the current folder, in two processes or as `where` tells."""
+    return ["snakemake", "-s", str(ROOT / "workflow" / "Snakefile"), *where, "--config", "list=list.txt", f"parts={parts}",
+            f"hpsdf={PROGRAM}", "options=" + " ".join(OPTIONS), "memory=1000"]  # fmt: skip
+
+
+def snakemake_by_slurm(parts: int) -> list[str]:
+    """Returns the command line by which Snakemake submits the list of the current folder to Slurm."""
+    submit = "sbatch --parsable --cpus-per-task={threads} --mem={resources.mem_mb}"
+    status = str(ROOT / "workflow" / "slurm-status")
+    return snakemake(parts, ("--jobs", "4", "--cluster", submit, "--cluster-status", status))
 
 
 def free_ports(count: int) -> list[int]:
@@ -156,11 +163,16 @@ class Slurm:
 
     def is_done(self, job: str) -> bool:
         """Returns true if no task of the job waits or runs. Tasks that were queued again start at once."""
-        tasks = self.run("squeue", "-h", "-r", "-j", job, "-o", "%i %t %r")
-        for task in tasks.splitlines():
-            if task.endswith(" PD BeginTime"):  # Slurm lets them wait for two minutes
-                self.run("scontrol", "update", f"JobId={task.split()[0]}", "StartTime=now")
+        tasks = self.start_queued("-j", job)
         return tasks.strip() == "" or "Invalid job id" in tasks
+
+    def start_queued(self, *which: str) -> str:
+        """Starts those jobs that were queued again, which Slurm would let wait for two minutes. Returns the list of jobs."""
+        tasks = self.run("squeue", "-h", "-r", *which, "-o", "%i %t %r")
+        for task in tasks.splitlines():
+            if task.endswith(" PD BeginTime"):
+                self.run("scontrol", "update", f"JobId={task.split()[0]}", "StartTime=now")
+        return tasks
 
     def kill_node(self, name: str) -> None:
         """Ends a node at once, with what runs on it, as if it had lost its power."""
