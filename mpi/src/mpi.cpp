@@ -89,12 +89,14 @@ class CommunicatorRanks : public Ranks {
     for (const Message& message : toEach) sent.push_back(message.size());
     MPI_Alltoall(sent.data(), 1, MPI_UINT64_T, received.data(), 1, MPI_UINT64_T, communicator_);
     std::vector<Message> messages{std::size_t(count_)};
+    onAllRanks([&] {
+      for (int other = 0; other < count_; ++other)
+        if (other != rank_) messages[std::size_t(other)].resize(received[std::size_t(other)]);
+    });
     std::vector<MPI_Request> requests;
     for (int other = 0; other < count_; ++other) {
       if (other == rank_) continue;
-      Message& message = messages[std::size_t(other)];
-      message.resize(received[std::size_t(other)]);
-      inParts(message, [&](std::span<std::byte> part, int tag) {
+      inParts(messages[std::size_t(other)], [&](std::span<std::byte> part, int tag) {
         MPI_Irecv(part.data(), number(part.size()), MPI_BYTE, other, tag, communicator_, &requests.emplace_back());
       });
     }
@@ -110,6 +112,21 @@ class CommunicatorRanks : public Ranks {
   }
 
  private:
+  /// Allocates memory on all ranks before any of them counts on the others' messages. Throws on all ranks if `allocate`
+  /// throws on one.
+  void onAllRanks(const std::function<void()>& allocate) {
+    std::exception_ptr failure;
+    try {
+      allocate();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    int hasAnyFailed = failure ? 1 : 0;
+    MPI_Allreduce(MPI_IN_PLACE, &hasAnyFailed, 1, MPI_INT, MPI_MAX, communicator_);
+    if (failure) std::rethrow_exception(failure);
+    if (hasAnyFailed != 0) throw Error("another process has no memory for a message to it");
+  }
+
   /// Calls f(part, number of the part) for parts of a message that are not too long for one call.
   template <typename F>
   static void inParts(Message& message, const F& f) {
@@ -160,7 +177,7 @@ class CommunicatorRanks : public Ranks {
       call->begins.push_back(number(begin));
       begin += size;
     }
-    call->rest.resize(all);
+    onAllRanks([&] { call->rest.resize(all); });
     MPI_Iallgatherv(call->own.data() + inHead, number(call->own.size() - inHead), MPI_BYTE, call->rest.data(),
                     call->counts.data(), call->begins.data(), MPI_BYTE, communicator_, &call->request);
     wait(call, whileWaiting, failure);

@@ -117,3 +117,9 @@ def test_errors_are_one_line(tmp_path: pathlib.Path, words: list[str], why: str)
     assert why in result.stderr
     assert result.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_a_rank_without_room_for_a_message_fails_on_all() -> None:
+    program = os.environ["HPSDF_MPI_MESSAGES"]
+    result = subprocess.run(by_ranks(3, [program]), env=environment(), capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr

@@ -16,7 +16,8 @@
 namespace hpsdf {
 
 /// A group of processes, the ranks 0 … `count() - 1`, that send each other messages. All of them must make the same
-/// calls in the same order. The processes must run on machines of the same byte order.
+/// calls in the same order. The processes must run on machines of the same byte order. If a rank has no memory for the
+/// messages that it receives, a call throws on all ranks, which may then make further calls.
 class Ranks {
  public:
   using Message = std::vector<std::byte>;

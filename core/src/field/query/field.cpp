@@ -231,8 +231,7 @@ const char* misfitOf(const std::array<std::uint32_t, 3>& grid, std::uint64_t nod
 }
 
 std::size_t coefficientBytes(const FieldData& field) {
-  return std::visit(
-      [](const auto& c) { return arrayOf(c).size() * sizeof(*arrayOf(c).data()); }, field.coefficients);
+  return std::visit([](const auto& c) { return arrayOf(c).size() * sizeof(*arrayOf(c).data()); }, field.coefficients);
 }
 
 bool isMapped(const FieldData& field) {
