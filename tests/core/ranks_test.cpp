@@ -197,7 +197,8 @@ TEST(Ranks, RefuseWhatOneProcessMustDo) {
        {std::pair(BuildOptions{.targetError = 0, .tolerance = 0.01},
                   "cannot build a field within a tolerance: leave out the tolerance, or start one process"),
         std::pair(BuildOptions{.maxBytes = 100000}, "cannot build a field within a limit of bytes")}) {
-    const auto thrown = runRanks(2, [&, &options = options](Ranks& ranks) { buildByRanks(ranks, spheres, cube(), options); });
+    const auto thrown =
+        runRanks(2, [&, &options = options](Ranks& ranks) { buildByRanks(ranks, spheres, cube(), options); });
     for (const std::exception_ptr& error : thrown) EXPECT_THAT(messageOf(error), testing::HasSubstr(why));
   }
 }
