@@ -40,6 +40,7 @@ constexpr std::uint32_t kBaseCells = 5;  // along each axis
 constexpr int kDepth = 5;                // of all leaves
 constexpr int kBlockDepth = 1;           // of the nodes whose leaves are built together
 constexpr double kNear = 0.02;           // greatest distance of the queried points from the surface
+constexpr int kCalls = 20;
 constexpr int kWidth = 960, kHeight = 540;
 
 hpsdf::DistanceFunction torus() { return hpsdf::shapes::analytic("analytic:torus"); }
@@ -126,7 +127,7 @@ std::vector<Vector3> pointsNearSurface(const hpsdf::Box& domain, std::size_t cou
   return points;
 }
 
-/// Takes the time of a first call and the least time of five further ones. All calls must give the same numbers, of
+/// Takes the time of a first call and the least time of `kCalls` further ones. All calls must give the same numbers, of
 /// which a hash is told.
 template <typename Work>
 Json timed(const Work& work) {
@@ -139,7 +140,7 @@ Json timed(const Work& work) {
   };
   const auto [first, hash] = once();
   double least = std::numeric_limits<double>::infinity();
-  for (int run = 0; run < 5; ++run) {
+  for (int run = 0; run < kCalls; ++run) {
     const auto [seconds, again] = once();
     if (again != hash) throw hpsdf::Error("a repeated call gave other numbers");
     least = std::min(least, seconds);

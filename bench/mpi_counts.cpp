@@ -59,6 +59,14 @@ int MPI_Iallgatherv(const void* sent, int sentCount, MPI_Datatype sentType, void
                           request);
 }
 
+int MPI_Iallreduce(const void* sent, void* received, int count, MPI_Datatype type, MPI_Op operation,
+                   MPI_Comm communicator, MPI_Request* request) {
+  int size = 0;
+  PMPI_Type_size(type, &size);
+  countToAll(count * size);
+  return PMPI_Iallreduce(sent, received, count, type, operation, communicator, request);
+}
+
 int MPI_Isend(const void* sent, int count, MPI_Datatype type, int to, int tag, MPI_Comm communicator,
               MPI_Request* request) {
   ++counts.messages;

@@ -40,6 +40,7 @@ struct Call {
   std::vector<std::byte> own, rest;
   std::vector<Head> heads;
   std::vector<int> counts, begins;
+  int failed = -1;  ///< a rank that has no memory for the messages to it
 };
 
 class CommunicatorRanks : public Ranks {
@@ -89,10 +90,13 @@ class CommunicatorRanks : public Ranks {
     for (const Message& message : toEach) sent.push_back(message.size());
     MPI_Alltoall(sent.data(), 1, MPI_UINT64_T, received.data(), 1, MPI_UINT64_T, communicator_);
     std::vector<Message> messages{std::size_t(count_)};
-    onAllRanks([&] {
+    auto call = std::make_unique<Call>();
+    std::exception_ptr failure;
+    const auto allocate = [&] {
       for (int other = 0; other < count_; ++other)
         if (other != rank_) messages[std::size_t(other)].resize(received[std::size_t(other)]);
-    });
+    };
+    if (!allocateOnAll(call, allocate, {}, failure)) std::rethrow_exception(failure);
     std::vector<MPI_Request> requests;
     for (int other = 0; other < count_; ++other) {
       if (other == rank_) continue;
@@ -112,19 +116,25 @@ class CommunicatorRanks : public Ranks {
   }
 
  private:
-  /// Allocates memory on all ranks before any of them counts on the others' messages. Throws on all ranks if `allocate`
-  /// throws on one.
-  void onAllRanks(const std::function<void()>& allocate) {
-    std::exception_ptr failure;
+  /// Allocates memory on all ranks before any of them counts on the others' messages. Returns false on all ranks if
+  /// `allocate` throws on one; `failure` is then an exception, if it was none before.
+  bool allocateOnAll(std::unique_ptr<Call>& call, const std::function<void()>& allocate,
+                     const std::function<void()>& whileWaiting, std::exception_ptr& failure) {
+    std::exception_ptr own;
     try {
       allocate();
     } catch (...) {
-      failure = std::current_exception();
+      own = std::current_exception();
     }
-    int hasAnyFailed = failure ? 1 : 0;
-    MPI_Allreduce(MPI_IN_PLACE, &hasAnyFailed, 1, MPI_INT, MPI_MAX, communicator_);
-    if (failure) std::rethrow_exception(failure);
-    if (hasAnyFailed != 0) throw Error("another process has no memory for a message to it");
+    call->failed = own ? rank_ : -1;
+    MPI_Iallreduce(MPI_IN_PLACE, &call->failed, 1, MPI_INT, MPI_MAX, communicator_, &call->request);
+    wait(call, whileWaiting, failure);
+    if (call->failed < 0) return true;
+    if (!own)
+      own = std::make_exception_ptr(
+          Error("process " + std::to_string(call->failed) + " has no memory for the messages to it"));
+    if (!failure) failure = own;
+    return false;
   }
 
   /// Calls f(part, number of the part) for parts of a message that are not too long for one call.
@@ -177,7 +187,12 @@ class CommunicatorRanks : public Ranks {
       call->begins.push_back(number(begin));
       begin += size;
     }
-    onAllRanks([&] { call->rest.resize(all); });
+    const auto allocate = [&] {
+      call->rest.resize(all);
+      for (std::size_t from = 0; from < messages.size(); ++from)
+        messages[from].reserve(messages[from].size() + sizes[from]);
+    };
+    if (!allocateOnAll(call, allocate, whileWaiting, failure)) return;
     MPI_Iallgatherv(call->own.data() + inHead, number(call->own.size() - inHead), MPI_BYTE, call->rest.data(),
                     call->counts.data(), call->begins.data(), MPI_BYTE, communicator_, &call->request);
     wait(call, whileWaiting, failure);

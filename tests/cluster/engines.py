@@ -91,7 +91,7 @@ def snakemake(parts: int, where: tuple[str, ...] = ("--cores", "2")) -> list[str
 
 def snakemake_by_slurm(parts: int) -> list[str]:
     """Returns the command line by which Snakemake submits the list of the current folder to Slurm."""
-    submit = "sbatch --parsable --cpus-per-task={threads} --mem={resources.mem_mb}"
+    submit = "sbatch --parsable --requeue --cpus-per-task={threads} --mem={resources.mem_mb}"
     status = str(ROOT / "workflow" / "slurm-status")
     return snakemake(parts, ("--jobs", "4", "--cluster", submit, "--cluster-status", status))
 

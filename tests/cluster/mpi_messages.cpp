@@ -2,8 +2,10 @@
 // program: mpirun -n 3 mpi_messages. The exit status is 0 if all of it went right.
 
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <cstddef>
+#include <cstdlib>
 #include <exception>
 #include <fstream>
 #include <functional>
@@ -19,8 +21,9 @@ namespace {
 using hpsdf::Ranks;
 using Message = Ranks::Message;
 
-constexpr std::size_t kLarge = std::size_t{256} << 20;  // bytes that one process has no room for
-constexpr std::size_t kRoom = std::size_t{64} << 20;    // bytes that it has room for
+constexpr std::size_t kRoom = std::size_t{64} << 20;    // bytes that one process has room for
+constexpr std::size_t kLarge = std::size_t{256} << 20;  // bytes that it has no room for
+constexpr std::size_t kTwice = std::size_t{40} << 20;   // bytes that it has room for once, but not twice
 
 void require(bool holds, const char* what) {
   if (!holds) throw hpsdf::Error(what);
@@ -46,7 +49,7 @@ void gather(Ranks& ranks, std::size_t size) {
 std::size_t addressSpace() {
   std::size_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
-  return pages * 4096;
+  return pages * std::size_t(sysconf(_SC_PAGESIZE));
 }
 
 /// Lets the process take `kRoom` more bytes, or as many as it was allowed before.
@@ -55,7 +58,7 @@ class LessMemory {
   LessMemory() {
     getrlimit(RLIMIT_AS, &before_);
     const rlimit less{.rlim_cur = addressSpace() + kRoom, .rlim_max = before_.rlim_max};
-    setrlimit(RLIMIT_AS, &less);
+    require(setrlimit(RLIMIT_AS, &less) == 0, "the limit of the address space cannot be set");
   }
   ~LessMemory() { setrlimit(RLIMIT_AS, &before_); }
   LessMemory(const LessMemory&) = delete;
@@ -83,16 +86,15 @@ void testMessages(Ranks& ranks) {
 
 /// Rank 0 sends rank 1 more than it has room for. All ranks must get an exception.
 void testNoRoom(Ranks& ranks) {
+  const std::size_t size = ranks.rank() == 0 ? 1 : 0;
   std::vector<Message> toEach(std::size_t(ranks.count()));
-  Message large;
-  if (ranks.rank() == 0) {
-    toEach[1] = Message(kLarge);
-    large = Message(kLarge);
-  }
+  toEach[1] = Message(size * kLarge);
+  const Message large(size * kLarge), twice(size * kTwice);
   std::unique_ptr<LessMemory> less;
   if (ranks.rank() == 1) less = std::make_unique<LessMemory>();
   require(throws([&] { ranks.exchange(std::move(toEach)); }), "an exchange without room did not throw");
   require(throws([&] { ranks.gatherAll(large, {}); }), "a gathered message without room did not throw");
+  require(throws([&] { ranks.gatherAll(twice, {}); }), "a gathered message without room for a copy did not throw");
 }
 
 }  // namespace
@@ -106,7 +108,7 @@ int main() {
     testMessages(*ranks);
     return 0;
   } catch (const std::exception& error) {
-    std::cerr << "rank " << ranks->rank() << ": " << error.what() << "\n";
-    return 1;
+    std::cerr << "rank " << ranks->rank() << ": " << error.what() << std::endl;
+    std::_Exit(1);  // without MPI_Finalize, which would wait for the others
   }
 }

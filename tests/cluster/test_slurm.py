@@ -31,14 +31,18 @@ def test_a_dead_node_loses_nothing(tmp_path: pathlib.Path, folder: pathlib.Path,
 def test_jobs_of_snakemake_survive_a_dead_node(tmp_path: pathlib.Path, folder: pathlib.Path, plain: Plain) -> None:
     with engines.slurm(tmp_path / "slurm") as cluster, open(folder / "snakemake.log", "wb") as log:
         running = subprocess.Popen(engines.snakemake_by_slurm(parts=20), cwd=folder, env=cluster.environment, stdout=log, stderr=log)
-        engines.wait_until(lambda: engines.count_built(folder) > 40, "some fields are there")
-        cluster.kill_node("two")
 
         def has_ended() -> bool:
             cluster.start_queued()
             return running.poll() is not None
 
-        engines.wait_until(has_ended, "Snakemake has ended")
+        try:
+            engines.wait_until(lambda: engines.count_built(folder) > 40, "some fields are there")
+            cluster.kill_node("two")
+            engines.wait_until(has_ended, "Snakemake has ended")
+        finally:
+            engines.kill_tree(running.pid)
+            running.wait()
     assert running.returncode == 0, (folder / "snakemake.log").read_text()
     assert "Nodes two not responding, setting DOWN" in (tmp_path / "slurm" / "controller.out").read_text()
     meshes.check(folder, *plain[1:])

@@ -27,7 +27,7 @@ void forEachMember(Part& part, const Visit& visit) {
   visit(part.faces);
 }
 
-constexpr std::size_t withPadding(std::size_t bytes) { return bytes + detail::paddingAt(bytes); }
+std::size_t withPadding(std::size_t bytes) { return bytes + detail::paddingAt(bytes).size(); }
 
 template <typename T>
 std::span<const std::byte> contentsOf(const detail::SharedArray<T>& array) {
@@ -41,8 +41,7 @@ PartStamp writePart(const MeshPart& part, const std::filesystem::path& file) {
   detail::Checksum checksum;
   PartStamp stamp;
   const auto write = [&](std::span<const std::byte> bytes) {
-    constexpr std::array<std::byte, detail::kArrayAlignment> kZeros{};
-    for (const auto piece : {bytes, std::span<const std::byte>(kZeros).first(detail::paddingAt(bytes.size()))}) {
+    for (const auto piece : {bytes, detail::paddingAt(bytes.size())}) {
       output.write(piece);
       checksum.add(piece);
       stamp.bytes += piece.size();

@@ -35,8 +35,11 @@ std::span<const std::byte> bytesOf(const T& value) {
 
 constexpr std::size_t kArrayAlignment = 64;  ///< of arrays in files that are mapped: a line of the processor's cache
 
-/// Returns the number of bytes from a position on to the next multiple of `kArrayAlignment`.
-constexpr std::size_t paddingAt(std::size_t position) { return -position % kArrayAlignment; }
+/// Returns the zeros from a position on to the next multiple of `kArrayAlignment`.
+inline std::span<const std::byte> paddingAt(std::size_t position) {
+  static constexpr std::array<std::byte, kArrayAlignment> kZeros{};
+  return std::span(kZeros).first(-position % kArrayAlignment);
+}
 
 /// The XXH3 hash (64 bits) of all bytes that are added with `add`.
 class Checksum {

@@ -1,6 +1,5 @@
 #include "field/io/blocked_file.h"
 
-#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -112,10 +111,7 @@ void requireBlocks(const CheckedBlocks& blocks, const void* first, std::size_t b
   blocks.require(std::size_t(static_cast<const std::byte*>(first) - blocks.content().data()), bytes);
 }
 
-void BlockWriter::align() {
-  static constexpr std::array<std::byte, kArrayAlignment> kZeros{};
-  put(std::span(kZeros).first(paddingAt(position_)));
-}
+void BlockWriter::align() { put(paddingAt(position_)); }
 
 void BlockWriter::put(std::span<const std::byte> bytes) {
   forEachPiece(bytes, position_, [&](std::span<const std::byte> piece) {

@@ -130,7 +130,7 @@ class BlockReaderBase : public NumberReader<Stream> {
   }
   /// Goes on to a multiple of `kArrayAlignment`.
   void align() {
-    for (std::size_t left = paddingAt(stream().position()); left > 0; --left) {
+    for (std::size_t left = paddingAt(stream().position()).size(); left > 0; --left) {
       std::byte padding{};
       item(padding);
       stream().require(padding == std::byte{0}, "its padding is not 0");

@@ -7,7 +7,8 @@
 
 namespace hpsdf::io {
 
-constexpr std::uint32_t kQuantized = 1;  ///< stands in place of the bytes of a coefficient
+/// Stands in place of the bytes of a coefficient: quantized ones are an array of bytes.
+constexpr std::uint32_t kQuantized = sizeof(std::uint8_t);
 
 struct FieldSizes {
   std::uint64_t nodes = 0;
