@@ -22,14 +22,16 @@ body { max-width: none; }
 .choices input, .choices select, .choices button { font: inherit; padding: .25rem .5rem; }
 .choices input { flex: 1; min-width: 12rem; }
 .choices output { color: var(--quiet); }
-#meshes th, #meshes td { padding-right: 1rem; vertical-align: middle; }
+#meshes th, #meshes td { padding-right: .8rem; vertical-align: middle; overflow-wrap: normal; }
 #meshes th.number, #meshes td.number { text-align: right; white-space: nowrap; }
 #meshes th button { all: unset; cursor: pointer; }
 #meshes th button:focus-visible { outline: 2px solid var(--bar); }
 #meshes img { display: block; height: 5.5rem; border-radius: 4px; }
-#meshes .files a { display: inline-block; margin-right: .5rem; }
-#meshes td.file { min-width: 16rem; }
+#meshes td.files { min-width: 9rem; }
+#meshes .files a { display: inline-block; margin-right: .5rem; white-space: nowrap; }
+#meshes td.file { min-width: 13rem; overflow-wrap: anywhere; }
 #meshes td.told { font-weight: 600; }
+#meshes small.told { color: inherit; }
 #meshes small { display: block; color: var(--quiet); overflow-wrap: anywhere; }
 )";
 
@@ -71,8 +73,8 @@ function row(mesh) {
   cells[0].className = 'file';
   cells[0].append(element('small', mesh.name));
   if (mesh.told !== null) {
+    cells[0].append(element('small', mesh.told, 'told'));
     cells[1].className = 'told';
-    cells[1].append(element('small', mesh.told));
   }
   const picture = element('td'), files = element('td', '', 'files');
   const image = mesh.endings.find((ending) => ending.endsWith('.png'));
