@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "batch/mesh_record.h"
+#include "console/progress_line.h"
 #include "console/version.h"
 #include "files/html_page.h"
 #include "hpsdf/detail/memory.h"
