@@ -18,9 +18,10 @@ def page(tmp_path_factory: pytest.TempPathFactory, program: Callable[..., str], 
     """A browser with the page of four meshes, one of which is missing."""
     folder = tmp_path_factory.mktemp("set")
     (folder / "list.txt").write_text("\n".join(MESHES) + "\n")
-    for words in (["build", "--batch", folder / "list.txt", "--target-error", "1e-4"], ["index", "--batch", folder / "list.txt"]):
+    meshes = ["--batch", folder / "list.txt"]
+    for words in (["build", *meshes, "-o", folder / "fields", "--target-error", "1e-4"], ["index", folder / "fields", *meshes]):
         with pytest.raises(subprocess.CalledProcessError) as raised:
-            program(*words, *(["-o"] if words[0] == "build" else []), folder / "fields")
+            program(*words)
         assert raised.value.returncode == 3  # one mesh is missing
     browser.get((folder / "fields" / "index.html").as_uri())
     return browser
