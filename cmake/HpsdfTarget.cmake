@@ -25,6 +25,10 @@ function(hpsdf_target target)
     # false alarms in GCC 12's own std::string (GCC bugs 105651, 105329)
     target_compile_options(${target} PRIVATE -Wno-restrict -Wno-stringop-overflow -Wno-array-bounds)
   endif()
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    # GCC seldom collects garbage in its own memory: a sixth less time to compile, for a fifth more memory
+    target_compile_options(${target} PRIVATE --param=ggc-min-expand=300 --param=ggc-min-heapsize=1048576)
+  endif()
   if(HPSDF_SANITIZE)
     # what UndefinedBehaviorSanitizer finds ends the program, as the others' findings do: a report alone fails no test
     target_compile_options(${target} PUBLIC

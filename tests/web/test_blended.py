@@ -78,14 +78,16 @@ def test_leaves_that_were_built_without_blending_have_the_values_of_the_program(
 
 
 def test_pictures_show_the_blended_field(browser: Any, field: pathlib.Path) -> None:
-    test_page.test_slices_show_the_cells_of_the_field(browser, field, "through=0.1,0,0,1,2,0.5")
+    opened(browser, field.with_suffix(".html"))
+    test_page.check_slice(browser, "through=0.1,0,0,1,2,0.5")
     test_page.test_surfaces_lie_where_the_field_has_the_offset(browser, field)
 
 
 def test_questions_are_answered_by_the_blended_field(browser: Any, field: pathlib.Path, program: Callable[..., str], tmp_path: pathlib.Path) -> None:
     if field.stem == "exact":
         pytest.skip("one field suffices")
-    test_questions.test_lines_equal_those_of_the_program(browser, field, program, tmp_path, "through")
+    opened(browser, field.with_suffix(".html"))
+    test_questions.check_line(browser, field, program, tmp_path, "through")
     greatest = "const all = new hpsdf.Jumps(field); all.run(1e9); return Math.max(...all.axes.map((_, n) => all.at(n).value))"
     assert asked(browser, greatest) < 1e-12
     thickness = "return hpsdf.thicknessAt(field, page.viewer.painter.renderer.bounds, [1, 0, 0], 0)"

@@ -138,14 +138,13 @@ def probed(browser: Any, line: tuple[list[float], list[float]]) -> Any:
     return numpy.array(asked(browser, script, *line))
 
 
-@pytest.mark.parametrize("line", LINES)
-def test_lines_equal_those_of_the_program(browser: Any, field: pathlib.Path, program: Program, tmp_path: pathlib.Path, line: str) -> None:
-    opened(browser, field.with_suffix(".html"))
+def check_line(browser: Any, field: pathlib.Path, program: Program, folder: pathlib.Path, line: str) -> None:
+    """Checks the samples of a line through the page's field."""
     ours = probed(browser, LINES[line])
     if line == "outside":
         assert (ours[:, 5] == -1).all() and (ours[:, 7] > 0.5).all(), "the program refuses this line; the page shows the continuation"
         return
-    table = tmp_path / "line.csv"
+    table = folder / "line.csv"
     start, end = (",".join(map(str, point)) for point in LINES[line])
     program("probe", field, "--from", start, "--to", end, "--samples", 200, "-o", table)
     names = ("t", "s", "x", "y", "z", "cell", "depth", "value", "gx", "gy", "gz", "slope_along")
@@ -155,6 +154,12 @@ def test_lines_equal_those_of_the_program(browser: Any, field: pathlib.Path, pro
     assert abs(ours[:, :5] - theirs[:, :5]).max() < 1e-12
     assert abs(ours - theirs).max() < 1e-5
     assert abs(ours[:, 7] - theirs[::-1, 7]).max() > 1e-3, "the comparison would notice another line"
+
+
+def test_lines_equal_those_of_the_program(browser: Any, field: pathlib.Path, program: Program, tmp_path: pathlib.Path) -> None:
+    opened(browser, field.with_suffix(".html"))
+    for line in LINES:
+        check_line(browser, field, program, tmp_path, line)
 
 
 @pytest.fixture(scope="module")
